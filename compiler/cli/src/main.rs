@@ -1,0 +1,3 @@
+//! The `gcc-robot` command.
+
+fn main() {}

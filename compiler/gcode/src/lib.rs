@@ -1,0 +1,10 @@
+//! G-code syntax: lossless, error-tolerant, knows nothing of meaning.
+//!
+//! [`scan`] turns the text of a chunk (whole lines) into flat tables: lines, words, and for lines with
+//! structure (expressions, O-words, assignments) nodes of an arena. Plain word lines take a byte-level fast
+//! path; lines with structure go through a chumsky grammar over logos tokens. Both give the same tables, and
+//! a test demands it. Every byte of the text is covered by a word's span or is blank.
+
+mod model;
+
+pub use model::*;

@@ -1,0 +1,27 @@
+//! RS274NGC interpreter: parsed blocks in, canonical calls out.
+//!
+//! | module | job |
+//! |---|---|
+//! | `setup` | what a run starts from: dialect, tool table, parameters, INI, budgets |
+//! | `state` | everything a block can change, as plain data that can be compared and stored |
+//! | `params` | numbered and named parameters |
+//! | `block` | one block's words after evaluation |
+//! | `eval` | expressions |
+//! | `check` | which words go together |
+//! | `exec` | the order of execution in a block, modal groups |
+//! | `control` | O-words, calls, loops, M98/M99, macro statements |
+//! | `motion`, `arc`, `comp`, `cycles`, `thread`, `rough`, `spline` | motion of one kind each |
+//! | `queue` | calls held back while cutter compensation looks ahead |
+//!
+//! Lengths are in program units throughout, as in the controller, so that results agree to the last bit
+//! that matters; the motion IR converts.
+
+mod block;
+mod fault;
+mod setup;
+mod state;
+
+pub use block::{Block, Group};
+pub use fault::{Fault, Res};
+pub use setup::{Budgets, Ini, Setup, Tool, ToolTable};
+pub use state::{Modal, Side, State};

@@ -1,0 +1,158 @@
+use bytemuck::{Pod, Zeroable};
+use gr_canon::{Axes, Plane, Units};
+
+/// Number of spindles a machine may have.
+pub const SPINDLES: usize = 8;
+
+/// Which side of the contour the tool is on.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[expect(missing_docs, reason = "plain words")]
+#[repr(u8)]
+pub enum Side {
+    Off = 0,
+    Right = 1,
+    Left = 2,
+}
+
+/// Everything a plain block can change, as plain data: comparing and hashing it is comparing its bytes
+/// (`-0.0` is normalised away before a state becomes a key). Lengths in program units.
+#[derive(Clone, Copy, Pod, Zeroable, Debug)]
+#[repr(C)]
+pub struct Modal {
+    /// Current point in the active work frame; X and Y are the *tool centre's* while cutter compensation is on.
+    pub current: Axes,
+    /// The programmed X, Y, Z while cutter compensation is on.
+    pub program: [f64; 3],
+    /// Active G5x offset.
+    pub origin: Axes,
+    /// Active G92 offset.
+    pub g92: Axes,
+    /// Active tool length offset.
+    pub tool_offset: Axes,
+    /// Rotation of the work frame, degrees.
+    pub rotation: f64,
+    /// Feed in units per minute, per revolution, or 1/min.
+    pub feed: f64,
+    /// Rapid speed as the controller reports it.
+    pub traverse: f64,
+    /// Spindle speeds.
+    pub speed: [f64; SPINDLES],
+    /// G64 P.
+    pub tolerance: f64,
+    /// G64 Q.
+    pub naivecam: f64,
+    /// Cutter compensation radius.
+    pub comp_radius: f64,
+    /// Canned cycle memory: normal axis bottom, I J K P Q R, old level.
+    pub cycle_cc: f64,
+    #[expect(missing_docs, reason = "named after the word")]
+    pub cycle_i: f64,
+    #[expect(missing_docs, reason = "named after the word")]
+    pub cycle_j: f64,
+    #[expect(missing_docs, reason = "named after the word")]
+    pub cycle_k: f64,
+    #[expect(missing_docs, reason = "named after the word")]
+    pub cycle_p: f64,
+    #[expect(missing_docs, reason = "named after the word")]
+    pub cycle_q: f64,
+    #[expect(missing_docs, reason = "named after the word")]
+    pub cycle_r: f64,
+    /// Level to come back to (G98).
+    pub cycle_il: f64,
+    /// Last I and J of a G5, for a following G5 without them.
+    pub spline_tail: [f64; 2],
+    /// Canned cycle repeats.
+    pub cycle_l: i32,
+    /// Tool orientation 0 … 9 for lathe compensation.
+    pub comp_orientation: i32,
+    /// Active motion code times ten, −1 = none (G80 = 800).
+    pub motion: i32,
+    /// Pocket (index) of the tool in the spindle.
+    pub pocket: i32,
+    /// Tool number selected by T, and its pocket index; −1 = none.
+    pub selected_tool: i32,
+    #[expect(missing_docs, reason = "see selected_tool")]
+    pub selected_pocket: i32,
+    /// 1 = G54 … 9 = G59.3.
+    pub origin_index: i32,
+    /// Spindle that feed per revolution and surface speed follow.
+    pub active_spindle: i32,
+    /// N number of the current block, −1 = none.
+    pub n_number: i32,
+    /// 0 stopped, 1 clockwise, 2 counter-clockwise.
+    pub turning: [u8; SPINDLES],
+    /// 0 rpm, 1 surface speed.
+    pub css: [u8; SPINDLES],
+    /// Speed override on.
+    pub speed_override: [u8; SPINDLES],
+    /// [`Units`] as u8.
+    pub units: u8,
+    /// [`Plane`] as u8.
+    pub plane: u8,
+    /// 1 = G91.
+    pub incremental: u8,
+    /// 1 = G90.1 (I J K absolute).
+    pub ijk_absolute: u8,
+    /// 0 = G94, 1 = G93, 2 = G95.
+    pub feed_mode: u8,
+    /// 0 = G98, 1 = G99.
+    pub retract_r: u8,
+    /// 0 = G61, 1 = G61.1, 2 = G64.
+    pub path_mode: u8,
+    /// [`Side`] as u8.
+    pub comp_side: u8,
+    /// The next compensated move is the first.
+    pub comp_first: u8,
+    /// Straight motion must follow (compensation was just switched off).
+    pub arc_not_allowed: u8,
+    /// `cycle_il` is valid.
+    pub cycle_il_set: u8,
+    /// G7.
+    pub lathe_diameter: u8,
+    /// Feed override on.
+    pub feed_override: u8,
+    /// Adaptive feed on.
+    pub adaptive_feed: u8,
+    /// Feed hold on.
+    pub feed_hold: u8,
+    /// M7.
+    pub mist: u8,
+    /// M8.
+    pub flood: u8,
+    /// G92 offsets are applied.
+    pub g92_applied: u8,
+    /// Program began with `%`.
+    pub percent: u8,
+    /// A probe move was made and its result is not read yet.
+    pub probed: u8,
+    /// Set by M6/M61 for #5400.
+    pub tool_changed: u8,
+    /// Always 0; keeps the size a multiple of eight.
+    pub pad: [u8; 7],
+}
+
+impl Modal {
+    /// Program units.
+    pub fn units(&self) -> Units {
+        if self.units == Units::Inch as u8 { Units::Inch } else { Units::Mm }
+    }
+    /// Working plane.
+    pub fn plane(&self) -> Plane {
+        [Plane::Xy, Plane::Yz, Plane::Xz, Plane::Uv, Plane::Vw, Plane::Uw][self.plane.clamp(1, 6) as usize - 1]
+    }
+    /// Compensation side.
+    pub fn side(&self) -> Side {
+        [Side::Off, Side::Right, Side::Left][self.comp_side.min(2) as usize]
+    }
+    /// The bytes that make two states the same state.
+    pub fn bytes(&self) -> &[u8] {
+        bytemuck::bytes_of(self)
+    }
+}
+
+/// The whole state between two blocks.
+#[derive(Clone, Debug)]
+pub struct State {
+    /// Plain part.
+    pub modal: Modal,
+}

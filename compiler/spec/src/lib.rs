@@ -1,0 +1,204 @@
+//! The tables of the top-level `spec/` folder as static data.
+//!
+//! One job: give code, `explain`, hover texts and docs the same facts. Nothing here computes anything.
+
+include!(concat!(env!("OUT_DIR"), "/tables.rs"));
+
+/// How bad a diagnostic is.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, PartialOrd, Ord)]
+pub enum Severity {
+    /// The program can't be built.
+    Error,
+    /// The program can be built; someone should look.
+    Warning,
+    /// Something worth knowing.
+    Hint,
+}
+
+/// One row of `spec/diagnostics`.
+#[derive(Debug)]
+pub struct DiagnosticDef {
+    /// Stable code, `E0203`.
+    pub code: &'static str,
+    /// Stable readable name, `arc/radius-mismatch`.
+    pub slug: &'static str,
+    /// Its usual severity.
+    pub severity: Severity,
+    /// A machinist's lint: raised on programs the controller accepts.
+    pub lint: bool,
+    /// The message, with `{0}`, `{1}` … for its arguments.
+    pub message: &'static str,
+    /// What it means and why it matters (Markdown).
+    pub explanation: &'static str,
+    /// What to do about it, with the same arguments.
+    pub fix: Option<&'static str>,
+    /// Dialect of the examples; none = `linuxcnc`.
+    pub dialect: Option<&'static str>,
+    /// Tool table the examples need.
+    pub tools: Option<&'static str>,
+    /// A program that raises exactly this.
+    pub bad: Option<&'static str>,
+    /// The mended program, which raises nothing.
+    pub good: Option<&'static str>,
+}
+
+/// Which diagnostic: a row of the registry. Constants are in [`code`].
+#[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct Code(u16);
+
+impl Code {
+    /// The registry row.
+    pub fn def(self) -> &'static DiagnosticDef {
+        &DIAGNOSTICS[self.0 as usize]
+    }
+    /// All rows, in order of their codes.
+    pub fn all() -> impl Iterator<Item = Code> {
+        (0..DIAGNOSTICS.len() as u16).map(Code)
+    }
+    /// Finds `E0203` or `arc/radius-mismatch`, in any case.
+    pub fn find(name: &str) -> Option<Code> {
+        Self::all().find(|c| c.def().code.eq_ignore_ascii_case(name) || c.def().slug.eq_ignore_ascii_case(name))
+    }
+}
+
+impl std::fmt::Debug for Code {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{} {}", self.def().code, self.def().slug)
+    }
+}
+
+/// A message text of the real `rs274`. Constants are in [`rs274`].
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+pub struct Rs274(u16);
+
+impl Rs274 {
+    /// The text, with `{0}`, `{1}` … for its arguments.
+    pub fn text(self) -> &'static str {
+        RS274[self.0 as usize]
+    }
+}
+
+/// Puts `args` in place of `{0}`, `{1}` ….
+pub fn fill(template: &str, args: &[String]) -> String {
+    let mut out = String::with_capacity(template.len() + 16);
+    let mut rest = template;
+    while let Some(open) = rest.find('{') {
+        out.push_str(&rest[..open]);
+        let tail = &rest[open..];
+        match tail.find('}').and_then(|close| Some((close, tail[1..close].parse::<usize>().ok()?))) {
+            Some((close, n)) => {
+                out.push_str(args.get(n).map_or("", |s| s.as_str()));
+                rest = &tail[close + 1..];
+            }
+            None => {
+                out.push('{');
+                rest = &tail[1..];
+            }
+        }
+    }
+    out.push_str(rest);
+    out
+}
+
+/// Which grammar and interpretation rules a dialect follows.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Default)]
+pub enum Family {
+    /// RS274NGC as LinuxCNC has it: blanks anywhere, O-words, `#<names>`.
+    #[default]
+    Linuxcnc,
+    /// Fanuc Macro B: `#n`, IF/GOTO/WHILE, O-numbers as program numbers, M98 P.
+    Fanuc,
+    /// grbl: plain words only.
+    Grbl,
+    /// The UFMG 2008 subset: eleven words, decimal comma allowed.
+    Ufmg2008,
+}
+
+/// One dialect of `spec/dialects`.
+#[derive(Debug)]
+pub struct Dialect {
+    /// `linuxcnc-2.9`
+    pub id: &'static str,
+    /// Other names: `linuxcnc`.
+    pub aliases: &'static [&'static str],
+    /// For people.
+    pub title: &'static str,
+    /// Rules it follows.
+    pub family: Family,
+    /// Longest line in bytes the controller reads; 0 = no limit.
+    pub line_limit: u32,
+    /// A program must end with M2, M30 or `%` (otherwise a missing end is normal).
+    pub needs_end: bool,
+    /// A comma may stand for the decimal point.
+    pub decimal_comma: bool,
+    /// File extensions that suggest it.
+    pub extensions: &'static [&'static str],
+    /// Words.
+    pub words: &'static [WordDef],
+    /// G, M and other codes.
+    pub codes: &'static [CodeDef],
+}
+
+/// A word letter of a dialect.
+#[derive(Debug)]
+pub struct WordDef {
+    /// Upper case; `@ ^ $` too.
+    pub letter: char,
+    /// Short name.
+    pub title: &'static str,
+    /// `length`, `angle`, `feed`, `rpm`, `integer`, … or empty.
+    pub unit: &'static str,
+    /// One sentence or more (Markdown).
+    pub what: &'static str,
+}
+
+/// A code of a dialect.
+#[derive(Debug)]
+pub struct CodeDef {
+    /// `G83`, `G5.1`, `M6`.
+    pub code: &'static str,
+    /// Short name.
+    pub title: &'static str,
+    /// Modal group as a slug (`motion`, `plane`, …), or `none`.
+    pub group: &'static str,
+    /// Its words.
+    pub args: &'static [ArgDef],
+    /// What it does (Markdown).
+    pub what: &'static str,
+    /// Codes of diagnostics it can raise.
+    pub errors: &'static [&'static str],
+    /// Where the row comes from.
+    pub source: &'static str,
+}
+
+/// A word that a code takes.
+#[derive(Debug)]
+pub struct ArgDef {
+    /// Upper-case letter(s); several mean each of them.
+    pub letters: &'static str,
+    /// Must be there.
+    pub required: bool,
+    /// Unit slug.
+    pub unit: &'static str,
+    /// What it says.
+    pub what: &'static str,
+}
+
+impl Dialect {
+    /// All dialects.
+    pub fn all() -> &'static [Dialect] {
+        DIALECTS
+    }
+    /// By id or alias.
+    pub fn find(name: &str) -> Option<&'static Dialect> {
+        DIALECTS.iter().find(|d| d.id == name || d.aliases.contains(&name))
+    }
+    /// The default: LinuxCNC 2.9.
+    pub fn linuxcnc() -> &'static Dialect {
+        Self::find("linuxcnc-2.9").expect("the table has it")
+    }
+    /// The row of a code such as `G83`.
+    pub fn code(&self, code: &str) -> Option<&'static CodeDef> {
+        self.codes.iter().find(|c| c.code == code)
+    }
+}
