@@ -139,9 +139,49 @@ fn flag(t: &toml::Table, key: &str) -> bool {
     t.get(key).and_then(|v| v.as_bool()).unwrap_or(false)
 }
 
+/// A later version of a dialect names its elder in `extends`: it takes over the elder's rows, replaces those with
+/// the same `key` in place, adds new ones at the end and leaves out those named in `without`.
+fn inherit(child: &toml::Table, elder: &toml::Table, list: &str, key: &str) -> toml::Value {
+    let name = |t: &toml::Table| t.get(key).and_then(|v| v.as_str()).unwrap_or_default().to_string();
+    let without: Vec<&str> =
+        child.get("without").and_then(|v| v.as_array()).into_iter().flatten().filter_map(|v| v.as_str()).collect();
+    let mut merged: Vec<toml::Table> =
+        rows(elder, list).filter(|r| !without.contains(&name(r).as_str())).cloned().collect();
+    for row in rows(child, list) {
+        match merged.iter_mut().find(|r| name(r) == name(row)) {
+            Some(old) => *old = row.clone(),
+            None => merged.push(row.clone()),
+        }
+    }
+    toml::Value::Array(merged.into_iter().map(toml::Value::Table).collect())
+}
+
+fn dialect_tables(dir: &Path) -> Vec<(PathBuf, toml::Table)> {
+    let all = tables(dir);
+    all.iter()
+        .filter(|(_, t)| t.contains_key("id"))
+        .map(|(path, t)| {
+            let at = path.display().to_string();
+            let mut t = t.clone();
+            if let Some(elder) = t.get("extends").and_then(|v| v.as_str()) {
+                let elder = &all
+                    .iter()
+                    .find(|(_, e)| e.get("id").and_then(|v| v.as_str()) == Some(elder))
+                    .unwrap_or_else(|| panic!("{at}: extends {elder}, which is not there"))
+                    .1;
+                for (list, key) in [("word", "letter"), ("code", "code"), ("fact", "key")] {
+                    let merged = inherit(&t, elder, list, key);
+                    t.insert(list.to_string(), merged);
+                }
+            }
+            (path.clone(), t)
+        })
+        .collect()
+}
+
 fn dialects(dir: &Path, code: &mut String) {
     writeln!(code, "pub(crate) static DIALECTS: &[crate::Dialect] = &[").expect("string");
-    for (path, t) in tables(dir) {
+    for (path, t) in dialect_tables(dir) {
         let at = path.display().to_string();
         writeln!(
             code,
