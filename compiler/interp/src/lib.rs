@@ -16,12 +16,23 @@
 //! Lengths are in program units throughout, as in the controller, so that results agree to the last bit
 //! that matters; the motion IR converts.
 
+mod arc;
 mod block;
+mod comp;
+mod cycles;
 mod fault;
+mod params;
+mod queue;
+mod rough;
+mod run;
 mod setup;
+mod spline;
 mod state;
+mod thread;
 
 pub use block::{Block, Group};
 pub use fault::{Fault, Res};
+pub use params::Params;
+pub use run::{Files, Interp, Place};
 pub use setup::{Budgets, Ini, Setup, Tool, ToolTable};
 pub use state::{Modal, Side, State};

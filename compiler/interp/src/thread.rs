@@ -1,0 +1,14 @@
+#![allow(dead_code, clippy::unused_self)]
+
+use gr_canon::Sink;
+
+use crate::{Interp, Res};
+
+impl<S: Sink> Interp<'_, S> {
+    pub(crate) fn convert_spindle_sync(&mut self, _g: i16) -> Res {
+        Ok(())
+    }
+    pub(crate) fn convert_thread(&mut self) -> Res {
+        Ok(())
+    }
+}
