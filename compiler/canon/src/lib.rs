@@ -3,9 +3,11 @@
 //! The set follows the canonical machining functions of RS274/NGC (NIST IR 6556) as LinuxCNC 2.9 has
 //! them. Two consumers read the same stream: [`print`] writes it as text, the motion IR is lowered from it.
 
+mod number;
 mod print;
 
 pub use gr_text::FileId;
+pub use number::{push_fixed, push_int};
 pub use print::{Printer, Version};
 
 /// X Y Z A B C U V W, in this order, everywhere.
