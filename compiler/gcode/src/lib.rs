@@ -5,6 +5,13 @@
 //! path; lines with structure go through a chumsky grammar over logos tokens. Both give the same tables, and
 //! a test demands it. Every byte of the text is covered by a word's span or is blank.
 
+mod build;
+mod chunks;
+mod fast;
 mod model;
+mod number;
+mod scan;
 
+pub use chunks::split_chunks;
 pub use model::*;
+pub use scan::{scan, scan_by_grammar};
