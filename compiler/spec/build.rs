@@ -12,6 +12,7 @@ fn main() {
     diagnostics(&root.join("diagnostics"), &mut code);
     rs274(&root.join("rs274"), &mut code);
     dialects(&root.join("dialects"), &mut code);
+    targets(&root.join("targets"), &mut code);
     std::fs::write(out.join("tables.rs"), code).expect("OUT_DIR is writable");
 }
 
@@ -77,13 +78,14 @@ fn diagnostics(dir: &Path, code: &mut String) {
         };
         writeln!(
             code,
-            "crate::DiagnosticDef {{ code: {id:?}, slug: {slug:?}, severity: crate::Severity::{severity}, lint: {}, message: {:?}, explanation: {:?}, fix: {}, dialect: {}, tools: {}, bad: {}, good: {} }},",
+            "crate::DiagnosticDef {{ code: {id:?}, slug: {slug:?}, severity: crate::Severity::{severity}, lint: {}, message: {:?}, explanation: {:?}, fix: {}, dialect: {}, tools: {}, options: {}, bad: {}, good: {} }},",
             row.get("lint").and_then(|v| v.as_bool()).unwrap_or(false),
             field(row, "message", &at),
             field(row, "explanation", &at).trim(),
             optional(row, "fix"),
             optional(row, "dialect"),
             optional(row, "tools"),
+            optional(row, "options"),
             optional(row, "bad"),
             optional(row, "good"),
         )
@@ -226,6 +228,27 @@ fn dialects(dir: &Path, code: &mut String) {
             writeln!(code, "], what: {:?}, errors: {}, source: {:?} }},", or_empty(c, "what"), list(c, "errors"), or_empty(c, "source")).expect("string");
         }
         writeln!(code, "] }},").expect("string");
+    }
+    writeln!(code, "];").expect("string");
+}
+
+fn targets(dir: &Path, code: &mut String) {
+    writeln!(code, "pub(crate) static TARGETS: &[crate::TargetDef] = &[").expect("string");
+    for (path, t) in tables(dir) {
+        let at = path.display().to_string();
+        for row in rows(&t, "target") {
+            writeln!(
+                code,
+                "crate::TargetDef {{ id: {:?}, title: {:?}, extension: {:?}, status: {:?}, options: {}, what: {:?} }},",
+                field(row, "id", &at),
+                field(row, "title", &at),
+                field(row, "extension", &at),
+                field(row, "status", &at),
+                list(row, "options"),
+                or_empty(row, "what"),
+            )
+            .expect("string");
+        }
     }
     writeln!(code, "];").expect("string");
 }

@@ -36,6 +36,9 @@ pub struct DiagnosticDef {
     pub dialect: Option<&'static str>,
     /// Tool table the examples need.
     pub tools: Option<&'static str>,
+    /// Command and options the examples are for, when it is not plain `check` (`machine check`: they are
+    /// machine files).
+    pub options: Option<&'static str>,
     /// A program that raises exactly this.
     pub bad: Option<&'static str>,
     /// The mended program, which raises nothing.
@@ -98,6 +101,34 @@ pub fn fill(template: &str, args: &[String]) -> String {
     }
     out.push_str(rest);
     out
+}
+
+/// One row of `spec/targets`: something `--target` takes.
+#[derive(Debug, PartialEq, Eq)]
+pub struct TargetDef {
+    /// `rs274ngc`
+    pub id: &'static str,
+    /// For people.
+    pub title: &'static str,
+    /// Usual extension of the written file, without dot.
+    pub extension: &'static str,
+    /// `stable`, `experimental` or `planned`.
+    pub status: &'static str,
+    /// Options of `build` that it heeds.
+    pub options: &'static [&'static str],
+    /// What it writes (Markdown).
+    pub what: &'static str,
+}
+
+impl TargetDef {
+    /// All targets.
+    pub fn all() -> &'static [TargetDef] {
+        TARGETS
+    }
+    /// By id.
+    pub fn find(id: &str) -> Option<&'static TargetDef> {
+        TARGETS.iter().find(|t| t.id == id)
+    }
 }
 
 /// Which grammar and interpretation rules a dialect follows.
