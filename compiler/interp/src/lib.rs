@@ -21,6 +21,7 @@ mod block;
 mod comp;
 mod cycles;
 mod fault;
+mod files;
 mod params;
 mod queue;
 mod rough;
@@ -32,6 +33,7 @@ mod thread;
 
 pub use block::{Block, Group};
 pub use fault::{Fault, Res};
+pub use files::*;
 pub use params::Params;
 pub use run::{Files, Interp, Place};
 pub use setup::{Budgets, Ini, Setup, Tool, ToolTable};

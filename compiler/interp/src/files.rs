@@ -1,0 +1,448 @@
+//! The files a machine is set up from: tool table (`.tbl`), stored parameters (`.var`) and INI file.
+//!
+//! Text in, tables out; what is wrong with a line becomes a diagnostic. Only [`save_parameters`] touches the
+//! disk.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use gr_text::{Diagnostic, FileId, Span, code};
+
+use crate::{Ini, Tool, ToolTable};
+
+/// Rows of a tool table, the spindle's included.
+pub const POCKETS: usize = 1001;
+/// Parameters are numbered below this.
+pub const MAX_PARAMETER: u32 = 5602;
+/// INI files may include others this deep.
+const INCLUDE_DEPTH: usize = 16;
+
+/// Lines with their place, without line ends.
+fn lines(text: &str) -> impl Iterator<Item = (u32, &str)> {
+    let mut at = 0;
+    text.split_inclusive('\n').map(move |raw| {
+        let start = at;
+        at += raw.len() as u32;
+        (start, raw.trim_end_matches(['\n', '\r']))
+    })
+}
+
+fn span_of(start: u32, part: &str) -> Span {
+    Span::new(start, start + part.len() as u32)
+}
+
+// ---- tool table ----------------------------------------------------------------------------------------
+
+/// A table without tools: only the spindle's empty row.
+pub fn no_tools() -> ToolTable {
+    ToolTable { rows: vec![empty_row()] }
+}
+
+fn empty_row() -> Tool {
+    Tool { number: -1, pocket: -1, ..Tool::default() }
+}
+
+/// Reads a tool table. Tools go into rows 1, 2, … in file order, as on a machine without a random tool
+/// changer; a tool without P goes into row 0.
+pub fn read_tools(text: &str, file: FileId) -> (ToolTable, Vec<Diagnostic>) {
+    let mut table = no_tools();
+    let mut found = Vec::new();
+    for (start, line) in lines(text) {
+        let body = line.split(';').next().unwrap_or("");
+        if line.starts_with(';') || body.trim().is_empty() {
+            continue;
+        }
+        match tool_line(line) {
+            Err((word, why)) => {
+                let at = start + (word.as_ptr() as usize - line.as_ptr() as usize) as u32;
+                found.push(Diagnostic::new(code::TOOL_TABLE_BAD_LINE, file, span_of(at, word), &[why]));
+            }
+            Ok(tool) if tool.pocket < 0 => {
+                found.push(Diagnostic::new(code::TOOL_TABLE_NO_POCKET, file, span_of(start, body.trim_end()), &[]));
+                table.rows[0] = Tool { pocket: 0, ..tool };
+            }
+            Ok(_) if table.rows.len() == POCKETS => {
+                let span = span_of(start, body.trim_end());
+                found.push(Diagnostic::new(code::TOOL_TABLE_TOO_MANY, file, span, &[(POCKETS - 1).to_string()]));
+                break;
+            }
+            Ok(tool) => table.rows.push(tool),
+        }
+    }
+    (table, found)
+}
+
+/// One line; on failure the word to blame and what is wrong with it. A tool without P has pocket −1.
+fn tool_line(line: &str) -> Result<Tool, (&str, String)> {
+    let mut tool = empty_row();
+    let (words, comment) = line.split_once(';').unwrap_or((line, ""));
+    tool.comment = comment.trim().into();
+    for word in words.split_ascii_whitespace() {
+        let mut rest = word.chars();
+        let letter = rest.next().unwrap_or(' ').to_ascii_uppercase();
+        let rest = rest.as_str();
+        let bad = || (word, format!("`{word}` has no number"));
+        let real = || scan_real(rest).map(|(v, _)| v).ok_or_else(bad);
+        let whole = || scan_int(rest).map(|(v, _)| v).ok_or_else(bad);
+        match letter {
+            'T' => tool.number = whole()?,
+            'P' => tool.pocket = whole()?.max(0),
+            'D' => tool.diameter = real()?,
+            'I' => tool.front_angle = real()?,
+            'J' => tool.back_angle = real()?,
+            'Q' => tool.orientation = whole()?,
+            _ => match "XYZABCUVW".find(letter) {
+                Some(axis) => tool.offset[axis] = real()?,
+                None => return Err((word, format!("no word of a tool table begins with `{letter}`"))),
+            },
+        }
+    }
+    Ok(tool)
+}
+
+/// The table as text that [`read_tools`] and LinuxCNC read.
+pub fn write_tools(table: &ToolTable) -> String {
+    use std::fmt::Write as _;
+    let mut out = String::new();
+    for tool in table.rows.iter().skip(1).filter(|t| t.number != -1) {
+        let mut line = format!("T{:<3} P{:<3}", tool.number, tool.pocket);
+        let offsets = "XYZABCUVW".chars().zip(tool.offset);
+        let values = [('D', tool.diameter)].into_iter().chain(offsets).chain([('I', tool.front_angle), ('J', tool.back_angle)]);
+        for (letter, value) in values.filter(|(_, v)| *v != 0.0) {
+            write!(line, " {letter}{value:+.6}").expect("a string takes everything");
+        }
+        if tool.orientation != 0 {
+            write!(line, " Q{}", tool.orientation).expect("a string takes everything");
+        }
+        writeln!(out, "{line} ;{}", tool.comment).expect("a string takes everything");
+    }
+    out
+}
+
+// ---- parameters ----------------------------------------------------------------------------------------
+
+/// Parameters that a parameter file always has: home positions, G92, work offsets with their rotation.
+pub fn required_parameters() -> impl Iterator<Item = u32> {
+    let offsets = (0..9).flat_map(|n| (5220 + 20 * n + u32::from(n > 0))..=(5230 + 20 * n));
+    (5161..=5169).chain(5181..=5189).chain(5210..=5219).chain(offsets)
+}
+
+/// Reads a parameter file. Lines that do not begin with two numbers are passed over.
+pub fn read_parameters(text: &str, file: FileId) -> Result<BTreeMap<u32, f64>, Box<Diagnostic>> {
+    let mut values = BTreeMap::new();
+    let mut last = 0;
+    for (start, line) in lines(text) {
+        let Some((number, value)) = parameter_line(line) else { continue };
+        let fault = |code, args: &[String]| Box::new(Diagnostic::new(code, file, span_of(start, line), args));
+        let number = match u32::try_from(number) {
+            Ok(n) if n > 0 && n < MAX_PARAMETER => n,
+            _ => return Err(fault(code::PARAMETER_FILE_NUMBER_RANGE, &[number.to_string()])),
+        };
+        if number <= last {
+            return Err(fault(code::PARAMETER_FILE_ORDER, &[number.to_string(), last.to_string()]));
+        }
+        last = number;
+        values.insert(number, value);
+    }
+    Ok(values)
+}
+
+fn parameter_line(line: &str) -> Option<(i32, f64)> {
+    let (number, rest) = scan_int(line)?;
+    let (value, _) = scan_real(rest)?;
+    Some((number, value))
+}
+
+/// The new text of a parameter file: every parameter that the old text has, and every required one.
+pub fn write_parameters(old: &BTreeMap<u32, f64>, value: &dyn Fn(u32) -> f64) -> String {
+    let mut out = Vec::new();
+    let numbers: std::collections::BTreeSet<u32> = old.keys().copied().chain(required_parameters()).collect();
+    for n in numbers {
+        gr_canon::push_int(&mut out, i64::from(n));
+        out.push(b'\t');
+        gr_canon::push_fixed::<6>(&mut out, value(n));
+        out.push(b'\n');
+    }
+    String::from_utf8(out).expect("only digits")
+}
+
+/// Writes the parameter file at `path` anew: complete beside it first, then the old one becomes `.bak`.
+pub fn save_parameters(path: &Path, old: &BTreeMap<u32, f64>, value: &dyn Fn(u32) -> f64) -> std::io::Result<()> {
+    let beside = |suffix: &str| {
+        let mut name = path.as_os_str().to_owned();
+        name.push(suffix);
+        std::path::PathBuf::from(name)
+    };
+    let new = beside(".new");
+    std::fs::write(&new, write_parameters(old, value))?;
+    if path.exists() {
+        let backup = beside(".bak");
+        // A missing old backup is fine, and so is a file system without links.
+        let _ = std::fs::remove_file(&backup);
+        if std::fs::hard_link(path, &backup).is_err() {
+            std::fs::copy(path, &backup)?;
+        }
+    }
+    std::fs::rename(new, path)
+}
+
+/// A whole number at the start of `text`, as C's `%d` reads it.
+fn scan_int(text: &str) -> Option<(i32, &str)> {
+    let text = text.trim_start();
+    let sign = usize::from(text.starts_with(['+', '-']));
+    let digits = text[sign..].bytes().take_while(u8::is_ascii_digit).count();
+    let (number, rest) = text.split_at(sign + digits);
+    let value: i64 = number.parse().ok()?;
+    Some((value.clamp(i64::from(i32::MIN), i64::from(i32::MAX)) as i32, rest))
+}
+
+/// A number at the start of `text`, as C's `%lf` reads it (decimal ones).
+fn scan_real(text: &str) -> Option<(f64, &str)> {
+    let text = text.trim_start();
+    let bytes = text.as_bytes();
+    let digits = |from: usize| bytes[from.min(bytes.len())..].iter().take_while(|b| b.is_ascii_digit()).count();
+    let mut end = usize::from(text.starts_with(['+', '-']));
+    let whole = digits(end);
+    end += whole;
+    let mut fraction = 0;
+    if bytes.get(end) == Some(&b'.') {
+        fraction = digits(end + 1);
+        end += 1 + fraction;
+    }
+    if whole + fraction == 0 {
+        return None;
+    }
+    if matches!(bytes.get(end), Some(b'e' | b'E')) {
+        let sign = usize::from(matches!(bytes.get(end + 1), Some(b'+' | b'-')));
+        let exponent = digits(end + 1 + sign);
+        if exponent > 0 {
+            end += 1 + sign + exponent;
+        }
+    }
+    let (number, rest) = text.split_at(end);
+    number.parse().ok().map(|v| (v, rest))
+}
+
+// ---- INI -----------------------------------------------------------------------------------------------
+
+/// Gives the text of an included file.
+pub type Loader<'a> = &'a mut dyn FnMut(&Path) -> Option<String>;
+
+/// Reads an INI file. `load` gives included files; without it `#INCLUDE` lines are remarks, as they are for
+/// the real `rs274`.
+pub fn read_ini(text: &str, file: FileId, folder: Option<&Path>, load: Option<Loader<'_>>) -> (Ini, Vec<Diagnostic>) {
+    let mut reader = IniReader {
+        ini: Ini { values: BTreeMap::new(), folder: folder.map(Path::to_path_buf) },
+        section: String::new(),
+        found: Vec::new(),
+        file,
+        load,
+    };
+    reader.text(text, 0, None);
+    (reader.ini, reader.found)
+}
+
+struct IniReader<'a> {
+    ini: Ini,
+    section: String,
+    found: Vec<Diagnostic>,
+    file: FileId,
+    load: Option<Loader<'a>>,
+}
+
+impl IniReader<'_> {
+    /// Reads a file; `blame` is the line of the main file that included it.
+    fn text(&mut self, text: &str, depth: usize, blame: Option<Span>) {
+        let mut lines = lines(text);
+        while let Some((start, first)) = lines.next() {
+            let mut line = first.to_string();
+            let mut end = start + first.len() as u32;
+            // A backslash at the end of a line joins the next one to it.
+            while line.ends_with('\\') && !line.trim_start().starts_with(['#', ';']) {
+                line.pop();
+                let Some((next_start, next)) = lines.next() else { break };
+                line.push_str(next.trim_start());
+                end = next_start + next.len() as u32;
+            }
+            self.line(line.trim(), blame.unwrap_or(Span::new(start, end)), depth, blame);
+        }
+    }
+
+    fn line(&mut self, line: &str, span: Span, depth: usize, blame: Option<Span>) {
+        if let Some(name) = included(line) {
+            self.include(name, span, depth);
+        } else if line.is_empty() || line.starts_with(['#', ';']) {
+        } else if let Some(rest) = line.strip_prefix('[')
+            && let Some((name, _)) = rest.split_once(']')
+        {
+            self.section = name.trim().to_ascii_lowercase();
+        } else if let Some((key, value)) = line.split_once('=')
+            && !key.trim().is_empty()
+        {
+            let key = (self.section.clone(), key.trim().to_ascii_lowercase());
+            self.ini.values.entry(key).or_default().push(value.trim().to_string());
+        } else {
+            self.found.push(Diagnostic::new(code::INI_BAD_LINE, self.file, blame.unwrap_or(span), &[]));
+        }
+    }
+
+    fn include(&mut self, name: &str, span: Span, depth: usize) {
+        let path = self.ini.folder.as_deref().unwrap_or(Path::new("")).join(name);
+        let Some(load) = &mut self.load else { return };
+        let text = if depth < INCLUDE_DEPTH { load(&path) } else { None };
+        match text {
+            Some(text) => self.text(&text, depth + 1, Some(span)),
+            None => self.found.push(Diagnostic::new(code::INI_INCLUDE, self.file, span, &[name.to_string()])),
+        }
+    }
+}
+
+/// `#INCLUDE name`
+fn included(line: &str) -> Option<&str> {
+    let rest = line.strip_prefix('#')?.trim_start();
+    let (word, name) = rest.split_at_checked(7)?;
+    let name = name.strip_prefix([' ', '\t'])?.trim();
+    (word.eq_ignore_ascii_case("INCLUDE") && !name.is_empty()).then_some(name)
+}
+
+impl Ini {
+    /// First value of a key, whatever the case of section and key.
+    pub fn get(&self, section: &str, key: &str) -> Option<&str> {
+        self.all(section, key).first().map(String::as_str)
+    }
+    /// All values of a key, in file order.
+    pub fn all(&self, section: &str, key: &str) -> &[String] {
+        self.values.get(&(section.to_ascii_lowercase(), key.to_ascii_lowercase())).map_or(&[], Vec::as_slice)
+    }
+    /// First value of a key as a number.
+    pub fn number(&self, section: &str, key: &str) -> Option<f64> {
+        scan_real(self.get(section, key)?).map(|(v, _)| v)
+    }
+    /// `[TRAJ] LINEAR_UNITS`, in any of the spellings that the controller knows.
+    pub fn machine_units(&self) -> Option<gr_canon::Units> {
+        use gr_canon::Units::{Inch, Mm};
+        let text = self.get("TRAJ", "LINEAR_UNITS")?.to_ascii_lowercase();
+        match text.as_str() {
+            "mm" | "metric" | "auto" => Some(Mm),
+            "in" | "inch" | "imperial" => Some(Inch),
+            other => other.parse::<f64>().ok().map(|v| if v < 0.5 { Inch } else { Mm }),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const FILE: FileId = FileId(3);
+
+    #[test]
+    fn tools_in_file_order() {
+        let text = "; header\nT1 P1 D0.125000 Z+0.511 ;1/8 end mill\n\nt7 p30 x1 y2 w-3 I95 J155 Q6\r\n";
+        let (table, found) = read_tools(text, FILE);
+        assert!(found.is_empty());
+        assert_eq!(table.rows.len(), 3);
+        assert_eq!((table.rows[0].number, table.rows[1].number, table.rows[2].pocket), (-1, 1, 30));
+        assert_eq!(table.rows[1].offset[2], 0.511);
+        assert_eq!(&*table.rows[1].comment, "1/8 end mill");
+        let t7 = &table.rows[2];
+        assert_eq!((t7.offset[8], t7.front_angle, t7.back_angle, t7.orientation), (-3.0, 95.0, 155.0, 6));
+    }
+
+    #[test]
+    fn bad_tool_lines_are_named() {
+        let (table, found) = read_tools("T1 P1\nT2 P2 K5\nT3 PX\nT4 Z1\n", FILE);
+        assert_eq!(table.rows.len(), 2);
+        assert_eq!(table.rows[0].number, 4, "no pocket: the spindle's row");
+        let seen: Vec<_> = found.iter().map(|d| (d.code, d.primary().1)).collect();
+        assert_eq!(
+            seen,
+            [
+                (code::TOOL_TABLE_BAD_LINE, Span::new(12, 14)),
+                (code::TOOL_TABLE_BAD_LINE, Span::new(18, 20)),
+                (code::TOOL_TABLE_NO_POCKET, Span::new(21, 26)),
+            ]
+        );
+    }
+
+    #[test]
+    fn full_table() {
+        let text: String = (1..=1003).map(|n| format!("T{n} P{n}\n")).collect();
+        let (table, found) = read_tools(&text, FILE);
+        assert_eq!((table.rows.len(), found.len()), (POCKETS, 1));
+    }
+
+    #[test]
+    fn tools_survive_writing() {
+        let (table, _) = read_tools("T1 P1 D6 Z-1.5 ;mill\nT20 P3 X1 I10 J-20 Q4 ;lathe\n", FILE);
+        assert_eq!(read_tools(&write_tools(&table), FILE), (table, vec![]));
+    }
+
+    #[test]
+    fn required_parameters_are_119() {
+        let all: Vec<u32> = required_parameters().collect();
+        assert_eq!(all.len(), 119);
+        assert!(all.is_sorted() && all.contains(&5220) && all.contains(&5230) && all.contains(&5241));
+        assert!(!all.contains(&5240) && *all.last().unwrap() == 5390);
+    }
+
+    #[test]
+    fn parameter_files() {
+        let values = read_parameters("junk\n5161\t1.500000\n 5220 2\n", FILE).unwrap();
+        assert_eq!(values.get(&5161), Some(&1.5));
+        let text = write_parameters(&values, &|n| if n == 5162 { -0.5 } else { values.get(&n).copied().unwrap_or(0.0) });
+        assert!(text.starts_with("5161\t1.500000\n5162\t-0.500000\n5163\t0.000000\n"));
+        assert_eq!(text.lines().count(), 119);
+        let with_more = write_parameters(&read_parameters("31 7\n", FILE).unwrap(), &|_| 0.0);
+        assert!(with_more.starts_with("31\t0.000000\n5161"));
+        assert_eq!(read_parameters("9 1\n5602 0\n", FILE).unwrap_err().code, code::PARAMETER_FILE_NUMBER_RANGE);
+        assert_eq!(read_parameters("-3 1\n", FILE).unwrap_err().code, code::PARAMETER_FILE_NUMBER_RANGE);
+        let twice = read_parameters("9 1\n9 2\n", FILE).unwrap_err();
+        assert_eq!((twice.code, twice.primary().1), (code::PARAMETER_FILE_ORDER, Span::new(4, 7)));
+    }
+
+    #[test]
+    fn parameter_file_on_disk() {
+        let folder = std::env::temp_dir().join(format!("gcc-robot-var-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let path = folder.join("p.var");
+        save_parameters(&path, &BTreeMap::new(), &|_| 0.0).unwrap();
+        assert!(!folder.join("p.var.bak").exists());
+        save_parameters(&path, &BTreeMap::new(), &|_| 1.0).unwrap();
+        assert!(std::fs::read_to_string(&path).unwrap().starts_with("5161\t1.000000\n"));
+        assert!(std::fs::read_to_string(folder.join("p.var.bak")).unwrap().starts_with("5161\t0.000000\n"));
+        std::fs::remove_dir_all(folder).unwrap();
+    }
+
+    #[test]
+    fn ini_files() {
+        let text = "# remark\n[RS274NGC]\nREMAP = M400 modalgroup=10 ngc=a\nremap= G88.1 modalgroup=1 ngc=b\n\
+                    SUBROUTINE_PATH = a:\\\n  b\n; x\n[TRAJ]\nLINEAR_UNITS = mm\nnonsense\n";
+        let (ini, found) = read_ini(text, FILE, None, None);
+        assert_eq!(ini.all("rs274ngc", "Remap"), ["M400 modalgroup=10 ngc=a", "G88.1 modalgroup=1 ngc=b"]);
+        assert_eq!(ini.get("RS274NGC", "SUBROUTINE_PATH"), Some("a:b"));
+        assert_eq!(ini.machine_units(), Some(gr_canon::Units::Mm));
+        assert_eq!(found.len(), 1);
+        assert_eq!(&text[found[0].primary().1.range()], "nonsense");
+    }
+
+    #[test]
+    fn ini_includes() {
+        let mut load = |path: &Path| (path == Path::new("d/x.inc")).then(|| "[A]\nB=2\n#INCLUDE x.inc\n".to_string());
+        let (ini, found) = read_ini("#INCLUDE x.inc\nC=3\n", FILE, Some(Path::new("d")), Some(&mut load));
+        assert_eq!((ini.all("a", "b").len(), ini.get("a", "c")), (16, Some("3")));
+        assert_eq!((found.len(), found[0].code), (1, code::INI_INCLUDE), "a file that includes itself ends");
+        let (ini, found) = read_ini("#INCLUDE x.inc\nC=3\n", FILE, None, None);
+        assert_eq!((found.len(), ini.get("", "C")), (0, Some("3")));
+    }
+
+    proptest! {
+        #[test]
+        fn any_text_is_read(text in "[ -~\t\r\n]{0,200}|\\PC{0,60}") {
+            let _ = read_tools(&text, FILE);
+            let _ = read_parameters(&text, FILE);
+            let _ = read_ini(&text, FILE, None, None);
+        }
+    }
+}
