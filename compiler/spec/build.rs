@@ -227,9 +227,94 @@ fn dialects(dir: &Path, code: &mut String) {
             }
             writeln!(code, "], what: {:?}, errors: {}, source: {:?} }},", or_empty(c, "what"), list(c, "errors"), or_empty(c, "source")).expect("string");
         }
+        writeln!(code, "], facts: &[").expect("string");
+        for f in rows(&t, "fact") {
+            let key = field(f, "key", &at);
+            writeln!(
+                code,
+                "crate::FactDef {{ key: {key:?}, title: {:?}, value: {:?}, what: {:?}, source: {:?} }},",
+                field(f, "title", &at),
+                field(f, "value", &at),
+                field(f, "what", &at),
+                field(f, "source", &at),
+            )
+            .expect("string");
+        }
         writeln!(code, "] }},").expect("string");
     }
     writeln!(code, "];").expect("string");
+    for (path, t) in tables(dir).into_iter().filter(|(_, t)| !t.contains_key("id")) {
+        let at = path.display().to_string();
+        match path.file_stem().and_then(|s| s.to_str()) {
+            Some("groups") => groups(&t, &at, code),
+            Some("parameters") => parameters(&t, &at, code),
+            _ => panic!("{at}: a dialect has an `id`"),
+        }
+    }
+}
+
+fn groups(t: &toml::Table, at: &str, code: &mut String) {
+    writeln!(code, "pub(crate) static GROUPS: &[crate::GroupDef] = &[").expect("string");
+    for g in rows(t, "group") {
+        let number = g.get("number").and_then(|v| v.as_integer()).unwrap_or(-1);
+        let (slug, title) = (field(g, "slug", at), field(g, "title", at));
+        writeln!(code, "crate::GroupDef {{ slug: {slug:?}, number: {number}, title: {title:?} }},").expect("string");
+    }
+    writeln!(code, "];").expect("string");
+}
+
+fn parameters(t: &toml::Table, at: &str, code: &mut String) {
+    writeln!(code, "pub(crate) static PARAMETERS: &[crate::ParameterDef] = &[").expect("string");
+    let integer = |r: &toml::Table, key: &str| {
+        r.get(key).and_then(|v| v.as_integer()).unwrap_or_else(|| panic!("{at}: `{key}` is missing"))
+    };
+    for r in rows(t, "number") {
+        writeln!(
+            code,
+            "crate::ParameterDef {{ name: \"\", first: {}, last: {}, title: {:?}, unit: {:?}, persistent: {}, what: {:?}, source: {:?} }},",
+            integer(r, "first"),
+            integer(r, "last"),
+            field(r, "title", at),
+            field(r, "unit", at),
+            flag(r, "persistent"),
+            field(r, "what", at),
+            field(r, "source", at),
+        )
+        .expect("string");
+    }
+    for r in rows(t, "name") {
+        writeln!(
+            code,
+            "crate::ParameterDef {{ name: {:?}, first: 0, last: 0, title: \"\", unit: {:?}, persistent: false, what: {:?}, source: {:?} }},",
+            field(r, "name", at),
+            field(r, "unit", at),
+            field(r, "what", at),
+            field(r, "source", at),
+        )
+        .expect("string");
+    }
+    writeln!(code, "];").expect("string");
+    for (list, key, table) in [
+        ("function", "name", "FUNCTIONS"),
+        ("operator", "symbol", "OPERATORS"),
+        ("control", "word", "CONTROLS"),
+        ("comment", "word", "COMMENTS"),
+    ] {
+        writeln!(code, "pub(crate) static {table}: &[crate::WordingDef] = &[").expect("string");
+        for r in rows(t, list) {
+            let name = field(r, key, at);
+            let form = r.get("form").and_then(|v| v.as_str()).unwrap_or(name);
+            let precedence = r.get("precedence").and_then(|v| v.as_integer()).unwrap_or(0);
+            writeln!(
+                code,
+                "crate::WordingDef {{ name: {name:?}, form: {form:?}, precedence: {precedence}, what: {:?}, source: {:?} }},",
+                field(r, "what", at),
+                field(r, "source", at),
+            )
+            .expect("string");
+        }
+        writeln!(code, "];").expect("string");
+    }
 }
 
 fn targets(dir: &Path, code: &mut String) {

@@ -168,6 +168,108 @@ pub struct Dialect {
     pub words: &'static [WordDef],
     /// G, M and other codes.
     pub codes: &'static [CodeDef],
+    /// Behaviour that differs between versions.
+    pub facts: &'static [FactDef],
+}
+
+/// A behaviour of a dialect that another version of it has differently.
+#[derive(Debug)]
+pub struct FactDef {
+    /// Stable name, `peck-clearance`.
+    pub key: &'static str,
+    /// For people.
+    pub title: &'static str,
+    /// The value, as people write it.
+    pub value: &'static str,
+    /// In a sentence.
+    pub what: &'static str,
+    /// Where the row comes from.
+    pub source: &'static str,
+}
+
+/// A modal group.
+#[derive(Debug)]
+pub struct GroupDef {
+    /// Name used by [`CodeDef::group`].
+    pub slug: &'static str,
+    /// Number in RS274NGC, or −1.
+    pub number: i8,
+    /// For people.
+    pub title: &'static str,
+}
+
+/// A predefined parameter: one name, or a range of numbers.
+#[derive(Debug)]
+pub struct ParameterDef {
+    /// `_x`; empty for numbered ones.
+    pub name: &'static str,
+    /// First number; 0 for named ones.
+    pub first: u32,
+    /// Last number.
+    pub last: u32,
+    /// Short name of a numbered one.
+    pub title: &'static str,
+    /// Unit slug.
+    pub unit: &'static str,
+    /// Kept in the parameter file.
+    pub persistent: bool,
+    /// What it holds.
+    pub what: &'static str,
+    /// Where the row comes from.
+    pub source: &'static str,
+}
+
+/// A function, operator, control word or special comment.
+#[derive(Debug)]
+pub struct WordingDef {
+    /// Upper case for functions, operators and comments, lower case for control words.
+    pub name: &'static str,
+    /// How it is written.
+    pub form: &'static str,
+    /// Of an operator: higher binds tighter. 0 otherwise.
+    pub precedence: u8,
+    /// What it does.
+    pub what: &'static str,
+    /// Where the row comes from.
+    pub source: &'static str,
+}
+
+/// All modal groups.
+pub fn groups() -> &'static [GroupDef] {
+    GROUPS
+}
+
+/// All predefined parameters of RS274NGC.
+pub fn parameters() -> &'static [ParameterDef] {
+    PARAMETERS
+}
+
+/// The predefined parameter `5063` or `_x` (any case, without `#` and angle brackets).
+pub fn parameter(name: &str) -> Option<&'static ParameterDef> {
+    let number = name.parse::<u32>().unwrap_or(0);
+    PARAMETERS.iter().find(|p| {
+        if p.name.is_empty() { (p.first..=p.last).contains(&number) } else { p.name.eq_ignore_ascii_case(name) }
+    })
+}
+
+/// Unary functions.
+pub fn functions() -> &'static [WordingDef] {
+    FUNCTIONS
+}
+
+/// Binary operators.
+pub fn operators() -> &'static [WordingDef] {
+    OPERATORS
+}
+
+/// Words of control lines (`o1 while`).
+pub fn controls() -> &'static [WordingDef] {
+    CONTROLS
+}
+
+/// Words that make a comment active (`(MSG, …)`).
+pub fn comments() -> &'static [WordingDef] {
+    COMMENTS
 }
 
 /// A word letter of a dialect.
@@ -228,8 +330,25 @@ impl Dialect {
     pub fn linuxcnc() -> &'static Dialect {
         Self::find("linuxcnc-2.9").expect("the table has it")
     }
-    /// The row of a code such as `G83`.
+    /// The row of a code such as `G83`; `M142` finds the row `M100-M199`.
     pub fn code(&self, code: &str) -> Option<&'static CodeDef> {
-        self.codes.iter().find(|c| c.code == code)
+        self.codes.iter().find(|c| c.code == code).or_else(|| {
+            let number: u32 = code.get(1..)?.parse().ok()?;
+            self.codes.iter().find(|c| match c.code.split_once('-') {
+                Some((a, b)) => {
+                    let of = |s: &str| s.get(1..).and_then(|n| n.parse::<u32>().ok());
+                    code.starts_with(&c.code[..1]) && of(a).is_some_and(|a| a <= number) && of(b).is_some_and(|b| number <= b)
+                }
+                None => false,
+            })
+        })
+    }
+    /// The row of a word letter, upper case.
+    pub fn word(&self, letter: char) -> Option<&'static WordDef> {
+        self.words.iter().find(|w| w.letter == letter)
+    }
+    /// A behaviour that differs between versions.
+    pub fn fact(&self, key: &str) -> Option<&'static FactDef> {
+        self.facts.iter().find(|f| f.key == key)
     }
 }
