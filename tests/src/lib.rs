@@ -1,3 +1,7 @@
 //! Helpers that the tests of the whole share.
 
 pub mod generate;
+pub mod matrix;
+pub mod oracle;
+pub mod process;
+pub mod programs;

@@ -1,0 +1,81 @@
+//! Child processes with a time limit: what they wrote and how they ended.
+
+use std::io::Read;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+/// How a child ended.
+#[derive(Clone, Debug, Default)]
+pub struct Ended {
+    /// Exit status; none when a signal or the time limit ended it.
+    pub status: Option<i32>,
+    /// The time limit ended it.
+    pub timed_out: bool,
+    /// Standard output.
+    pub stdout: Vec<u8>,
+    /// Standard error.
+    pub stderr: Vec<u8>,
+}
+
+impl Ended {
+    /// Standard error as text.
+    pub fn errors(&self) -> String {
+        String::from_utf8_lossy(&self.stderr).into_owned()
+    }
+    /// Standard output as text.
+    pub fn output(&self) -> String {
+        String::from_utf8_lossy(&self.stdout).into_owned()
+    }
+    /// For messages of tests.
+    pub fn how(&self) -> String {
+        match (self.timed_out, self.status) {
+            (true, _) => "ran into the time limit".into(),
+            (false, Some(s)) => format!("exit status {s}"),
+            (false, None) => "was killed by a signal".into(),
+        }
+    }
+}
+
+fn reader(from: Option<impl Read + Send + 'static>) -> std::thread::JoinHandle<Vec<u8>> {
+    std::thread::spawn(move || {
+        let mut bytes = Vec::new();
+        if let Some(mut from) = from {
+            let _ = from.read_to_end(&mut bytes);
+        }
+        bytes
+    })
+}
+
+fn wait(child: &mut Child, limit: Duration) -> (Option<i32>, bool) {
+    let start = Instant::now();
+    let mut nap = Duration::from_micros(500);
+    loop {
+        match child.try_wait() {
+            Ok(Some(status)) => return (status.code(), false),
+            Ok(None) if start.elapsed() < limit => {
+                std::thread::sleep(nap);
+                nap = (nap * 2).min(Duration::from_millis(10));
+            }
+            _ => {
+                let _ = child.kill();
+                let _ = child.wait();
+                return (None, true);
+            }
+        }
+    }
+}
+
+/// Runs `command` without input and gathers what it writes.
+pub fn run(command: &mut Command, limit: Duration) -> std::io::Result<Ended> {
+    let mut child = command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn()?;
+    let stdout = reader(child.stdout.take());
+    let stderr = reader(child.stderr.take());
+    let (status, timed_out) = wait(&mut child, limit);
+    if timed_out {
+        // Grandchildren may still hold the pipes; their output does not matter any more.
+        return Ok(Ended { status, timed_out, ..Ended::default() });
+    }
+    let stdout = stdout.join().unwrap_or_default();
+    let stderr = stderr.join().unwrap_or_default();
+    Ok(Ended { status, timed_out, stdout, stderr })
+}
