@@ -1,9 +1,17 @@
-//! The growing tables.
+//! The growing tables, and the way from a parsed line into them.
 
+use std::collections::HashMap;
+
+use gr_spec::{Family, code, rs274};
 use gr_text::Span;
 
-use crate::fast::Rules;
+use crate::fast::{ABSOLUTE_LIMIT, Rules, once_bit};
+use crate::grammar::{self, Block, Expr, Flaw, Item, Kind, Name, Problem};
+use crate::lex::{self, CommentFault, Token};
 use crate::model::*;
+
+/// Deepest nesting of brackets, signs and `#`; the grammar recurses that far.
+pub(crate) const MAX_DEPTH: usize = 64;
 
 /// [`Scan`] under construction.
 #[derive(Default)]
@@ -16,7 +24,11 @@ pub(crate) struct Tables {
     controls: Vec<Control>,
     args: Vec<ExprId>,
     names: Vec<Box<str>>,
+    name_ids: HashMap<Box<str>, u32>,
     faults: Vec<Fault>,
+    line: lex::Line,
+    /// Words seen in the current block.
+    seen: u32,
 }
 
 impl Tables {
@@ -44,7 +56,8 @@ impl Tables {
     }
 
     /// Reads the line at `at` by the grammar; gives the first byte of the next line.
-    pub fn structured_line(&mut self, text: &str, at: usize, _rules: &Rules) -> usize {
+    #[cold]
+    pub fn structured_line(&mut self, text: &str, at: usize, rules: &Rules) -> usize {
         let bytes = text.as_bytes();
         let end = memchr::memchr2(b'\n', b'\r', &bytes[at..]).map_or(bytes.len(), |n| at + n);
         let next = match bytes.get(end) {
@@ -52,21 +65,340 @@ impl Tables {
             Some(b'\r') if bytes.get(end + 1) == Some(&b'\n') => end + 2,
             Some(_) => end + 1,
         };
-        let percent = text[at..end].trim() == "%";
+        let first_word = self.words.len();
+        let first_fault = self.faults.len();
         self.lines.push(Line {
             start: at as u32,
-            first_word: self.words.len() as u32,
-            kind: if percent { LineKind::Percent } else { LineKind::Structured },
+            first_word: first_word as u32,
+            kind: LineKind::Blank,
             deleted: false,
             faulty: false,
         });
-        self.words.push(Word {
-            value: 0.0,
-            start: at as u32,
-            len: (end - at).min(0xffff) as u16,
-            letter: if percent { b'%' } else { b'?' },
-            form: if percent { Form::Comment } else { Form::Bad },
-        });
+        if next - at > rules.longest {
+            let most = if rules.limit == 0 { ABSOLUTE_LIMIT } else { rules.longest };
+            let args = [(next - at).to_string(), most.to_string()];
+            self.fault(Span::new(at as u32, end as u32), code::TEXT_LINE_TOO_LONG, rs274::COMMAND_TOO_LONG, &args);
+        }
+        if next - at > ABSOLUTE_LIMIT {
+            self.word(Span::new(at as u32, end as u32), b'?', Form::Bad, 0.0);
+        } else {
+            self.read_line(text, at, end, rules);
+        }
+        let kind = kind_of(&self.words[first_word..]);
+        if let Some(line) = self.lines.last_mut() {
+            line.kind = kind;
+            line.faulty = self.faults.len() > first_fault;
+        }
         next
     }
+
+    fn read_line(&mut self, text: &str, start: usize, end: usize, rules: &Rules) {
+        let nul = memchr::memchr(0, &text.as_bytes()[start..end]).map(|n| start + n);
+        let stop = nul.unwrap_or(end);
+        let mut line = std::mem::take(&mut self.line);
+        match line.read(text, start, stop, rules) {
+            Some(CommentFault::Nested(at)) => self.fault(at, code::COMMENT_NESTED, rs274::NESTED_COMMENT, &[]),
+            Some(CommentFault::Unclosed(at)) => self.fault(at, code::COMMENT_UNCLOSED, rs274::UNCLOSED_COMMENT, &[]),
+            None => {}
+        }
+        self.read_tokens(&line, text, rules);
+        self.line = line;
+        if let Some(nul) = nul {
+            let rest = Span::new(nul as u32, end as u32);
+            self.word(rest, b';', Form::Comment, 0.0);
+            self.fault(Span::new(rest.start, rest.start + 1), code::TEXT_NUL_BYTE, rs274::SILENT, &[]);
+        }
+    }
+
+    fn read_tokens(&mut self, line: &lex::Line, text: &str, rules: &Rules) {
+        if line.closed == "%" {
+            self.word(line.span(0, 1), b'%', Form::Comment, 0.0);
+            return;
+        }
+        let whole = line.span(0, line.tokens.len());
+        if depth(&line.tokens) > MAX_DEPTH {
+            self.word(whole, b'?', Form::Bad, 0.0);
+            self.fault(whole, code::EXPRESSION_TOO_DEEP, rs274::SILENT, &[MAX_DEPTH.to_string()]);
+            return;
+        }
+        if rules.family == Family::Grbl && line.closed.starts_with('$') {
+            self.word(whole, b'?', Form::Bad, 0.0);
+            self.fault(whole, code::SYNTAX_NOT_IN_DIALECT, rs274::SILENT, &["`$` commands in programs".to_string()]);
+            return;
+        }
+        let (block, flaws) = grammar::parse(&line.tokens, rules.family);
+        if let Some(last) = self.lines.last_mut() {
+            last.deleted = block.deleted;
+        }
+        let own = self.faults.len();
+        self.block(line, text, &block, rules);
+        let silenced: Vec<Span> = self.faults[own..].iter().map(|f| f.span).collect();
+        for flaw in &flaws {
+            let span = line.span(flaw.at.start, flaw.at.end);
+            if !silenced.iter().any(|s| s.start <= span.start && span.end <= s.end) {
+                self.flaw(line, text, flaw, span);
+            }
+        }
+        self.faults[own..].sort_by_key(|f| f.span.start);
+        if matches!(block.items.iter().find(|i| !is_line_number(i)), Some(Item::Control { .. } | Item::Bad { letter: b'o', .. })) {
+            // What follows a damaged statement is not worth a fault of its own.
+            self.faults.truncate(own + 1);
+        }
+    }
+
+    fn fault(&mut self, span: Span, code: gr_spec::Code, rs: gr_spec::Rs274, args: &[String]) {
+        let line = self.lines.len() as u32 - 1;
+        self.faults.push(Fault { line, span, code, rs, args: args.into() });
+    }
+
+    fn word(&mut self, span: Span, letter: u8, form: Form, value: f64) {
+        let len = (span.end - span.start).min(0xffff) as u16;
+        self.words.push(Word { value, start: span.start, len, letter, form });
+    }
+
+    fn block(&mut self, line: &lex::Line, text: &str, block: &Block, rules: &Rules) {
+        self.seen = 0;
+        for item in &block.items {
+            self.item(line, text, item, rules);
+        }
+    }
+
+    fn item(&mut self, line: &lex::Line, text: &str, item: &Item, rules: &Rules) {
+        let span = |at: &grammar::Range| line.span(at.start, at.end);
+        match item {
+            Item::Comment { at } => {
+                let first = text.as_bytes()[span(at).start as usize];
+                if line.tokens[at.start] == Token::Semicolon && rules.family == Family::Fanuc {
+                    self.seen = 0;
+                }
+                self.word(span(at), first, Form::Comment, 0.0);
+            }
+            Item::BadComment { at } => self.word(span(at), b'(', Form::Bad, 0.0),
+            Item::Bad { letter, at } => self.word(span(at), *letter, Form::Bad, 0.0),
+            Item::Word { letter, value, at } => self.letter_word(line, *letter, value, span(at), rules),
+            Item::Setting { at, .. } | Item::Control { at, .. } if plain_only(rules.family) => {
+                let what = if matches!(item, Item::Setting { .. }) { "parameters" } else { "control statements" };
+                let letter = if matches!(item, Item::Setting { .. }) { b'#' } else { b'o' };
+                self.word(span(at), letter, Form::Bad, 0.0);
+                self.not_in_dialect(span(at), what);
+            }
+            Item::Setting { target, value, at } => {
+                let target = match target {
+                    Name::Number(number) => Target::Number(self.expr(line, number)),
+                    Name::Named(token) => Target::Named(self.name(line, *token)),
+                };
+                let value = self.expr(line, value);
+                let index = Word::pack(self.settings.len());
+                self.settings.push(Setting { target, value, span: span(at) });
+                self.word(span(at), b'#', Form::Setting, index);
+            }
+            Item::Control { keyword, label, label_at, args, comments, at } => {
+                let label = match label {
+                    Some(Name::Number(number)) => OLabel::Number(self.expr(line, number)),
+                    Some(Name::Named(token)) => OLabel::Named(self.name(line, *token)),
+                    None => OLabel::None,
+                };
+                let args: Vec<ExprId> = args.iter().map(|arg| self.expr(line, arg)).collect();
+                let first_arg = self.args.len() as u32;
+                let arg_count = args.len() as u32;
+                self.args.extend(args);
+                let (span, label_span) = (span(at), span(label_at));
+                let index = Word::pack(self.controls.len());
+                self.controls.push(Control { keyword: *keyword, label, first_arg, arg_count, span, label_span });
+                self.word(span, b'o', Form::Control, index);
+                for comment in comments {
+                    self.word(line.span(comment.start, comment.end), b'(', Form::Comment, 0.0);
+                }
+            }
+        }
+    }
+
+    fn letter_word(&mut self, line: &lex::Line, letter: u8, value: &Expr, span: Span, rules: &Rules) {
+        let bit = once_bit(letter, rules.family);
+        if letter != b'n' && self.seen & bit != 0 {
+            let (rs, ours) = repeated_names(letter);
+            self.word(span, letter, Form::Bad, 0.0);
+            self.fault(span, code::WORD_REPEATED, rs274::MULTIPLE_WORDS, &[rs, ours]);
+            return;
+        }
+        // A P or Q at or below -1 looks to the controller as if there were none yet; what an expression
+        // gives, only the interpreter knows.
+        let counts = !matches!(letter, b'p' | b'q') || matches!(value.kind, Kind::Number(v) if v > -1.0);
+        if letter != b'n' && counts {
+            self.seen |= bit;
+        }
+        match value.kind {
+            Kind::Number(number) if line.tokens[value.at.start] != Token::Mark(b'[') => {
+                self.word(span, letter, Form::Literal, number);
+            }
+            Kind::Bad => self.word(span, letter, Form::Bad, 0.0),
+            _ if plain_only(rules.family) => {
+                let what = if line.text(value.at.start, value.at.end).contains('#') { "parameters" } else { "expressions" };
+                self.word(span, letter, Form::Bad, 0.0);
+                self.not_in_dialect(span, what);
+            }
+            _ => {
+                let id = self.expr(line, value);
+                self.word(span, letter, Form::Expr, Word::pack(id.0 as usize));
+            }
+        }
+    }
+
+    fn not_in_dialect(&mut self, span: Span, what: &str) {
+        self.fault(span, code::SYNTAX_NOT_IN_DIALECT, rs274::SILENT, &[what.to_string()]);
+    }
+
+    fn name(&mut self, line: &lex::Line, token: usize) -> u32 {
+        let name = line.text(token, token + 1).trim_start_matches('<').trim_end_matches('>');
+        if let Some(id) = self.name_ids.get(name) {
+            return *id;
+        }
+        let id = self.names.len() as u32;
+        self.names.push(name.into());
+        self.name_ids.insert(name.into(), id);
+        id
+    }
+
+    fn expr(&mut self, line: &lex::Line, expr: &Expr) -> ExprId {
+        let node = match &expr.kind {
+            Kind::Number(value) => Node::Number(*value),
+            Kind::Param(number) => Node::Param(self.expr(line, number)),
+            Kind::Named(token) => Node::Named(self.name(line, *token)),
+            Kind::Unary(function, value) => Node::Unary(*function, self.expr(line, value)),
+            Kind::Atan(y, x) => {
+                let y = self.expr(line, y);
+                Node::Atan(y, self.expr(line, x))
+            }
+            Kind::ExistsNamed(token) => Node::ExistsNamed(self.name(line, *token)),
+            Kind::ExistsParam(number) => Node::ExistsParam(self.expr(line, number)),
+            Kind::Binary(operator, left, right) => {
+                let left = self.expr(line, left);
+                Node::Binary(*operator, left, self.expr(line, right))
+            }
+            Kind::Bad => Node::Bad,
+        };
+        self.nodes.push(node);
+        self.node_spans.push(line.span(expr.at.start, expr.at.end));
+        ExprId(self.nodes.len() as u32 - 1)
+    }
+
+    fn flaw(&mut self, line: &lex::Line, text: &str, flaw: &Flaw, span: Span) {
+        let (from, to) = (flaw.at.start, flaw.at.end);
+        let seen = line.text(from, to).to_string();
+        // For people: what stands there as they wrote it, or what comes next.
+        let shown = match &text[span.range()] {
+            "" => match line.text(from, from + 1) {
+                "" => "the end of the line".to_string(),
+                next => next.to_string(),
+            },
+            there => there.to_string(),
+        };
+        let letter = |l: u8| char::from(l).to_string();
+        let (code, rs, args): (_, _, Vec<String>) = match flaw.what {
+            Problem::Unexpected | Problem::BadCharacter => {
+                let first = seen.bytes().next().unwrap_or(b'?');
+                let there = shown.chars().next().map(String::from).unwrap_or_default();
+                if (b' '..=b'z').contains(&first) {
+                    (code::SYNTAX_BAD_CHARACTER, rs274::BAD_CHARACTER, vec![letter(first), there])
+                } else {
+                    (code::SYNTAX_BAD_CHARACTER, rs274::BAD_CHARACTER_CODE, vec![format!("{first:03o}"), there])
+                }
+            }
+            Problem::NoValue => (code::WORD_NO_VALUE, rs274::NO_CHARACTERS, vec![]),
+            Problem::NotANumber { trailing: true } => {
+                (code::NUMBER_MALFORMED, rs274::NUMBER_TRAILING_CHARACTERS, vec![seen, shown])
+            }
+            Problem::NotANumber { trailing: false } => {
+                (code::NUMBER_MALFORMED, rs274::NUMBER_CONVERSION_FAILED, vec![seen, shown])
+            }
+            Problem::UnclosedExpression => (code::EXPRESSION_UNCLOSED, rs274::UNCLOSED_EXPRESSION, vec![]),
+            Problem::UnknownOperation => {
+                (code::EXPRESSION_UNKNOWN_OPERATOR, rs274::UNKNOWN_OPERATION, vec![seen, shown])
+            }
+            Problem::UnknownOperationName(l) => {
+                (code::EXPRESSION_UNKNOWN_OPERATOR, rs274::UNKNOWN_OPERATION_NAME, vec![letter(l), shown])
+            }
+            Problem::UnknownWord(l) => {
+                (code::EXPRESSION_UNKNOWN_FUNCTION, rs274::UNKNOWN_WORD, vec![letter(l), shown])
+            }
+            Problem::UnknownUnary => (code::EXPRESSION_UNKNOWN_FUNCTION, rs274::UNKNOWN_UNARY, vec![seen, shown]),
+            Problem::NoBracketAfterFunction(name) => (
+                code::EXPRESSION_FUNCTION_WITHOUT_BRACKET,
+                rs274::LEFT_BRACKET_AFTER_UNARY,
+                vec![name.to_ascii_uppercase()],
+            ),
+            Problem::AtanSlash => (code::EXPRESSION_ATAN_ARGUMENTS, rs274::SLASH_MISSING_ATAN, vec![]),
+            Problem::AtanBracket => (code::EXPRESSION_ATAN_ARGUMENTS, rs274::LEFT_BRACKET_ATAN, vec![]),
+            Problem::OpenName => (code::PARAMETER_NAME_UNTERMINATED, rs274::NAME_NOT_TERMINATED, vec![]),
+            Problem::NoEqualSign => (code::PARAMETER_NO_EQUAL_SIGN, rs274::EQUAL_SIGN_MISSING, vec![]),
+            Problem::ExistsParameter => (code::EXPRESSION_EXISTS_ARGUMENT, rs274::EXISTS_NUMBER_SIGN, vec![]),
+            Problem::ExistsBracket => (code::EXPRESSION_EXISTS_ARGUMENT, rs274::EXISTS_BRACKET, vec![]),
+            Problem::UnknownKeyword => (code::OWORD_UNKNOWN_KEYWORD, rs274::UNKNOWN_O_COMMAND, vec![seen, shown]),
+            Problem::AfterOWord => (code::OWORD_TRAILING_TEXT, rs274::AFTER_O_WORD, vec![]),
+            Problem::NoCondition(name) => {
+                (code::OWORD_NO_CONDITION, rs274::LEFT_BRACKET_AFTER_KEYWORD, vec![name.to_string()])
+            }
+            Problem::TooManyArguments => {
+                (code::OWORD_TOO_MANY_ARGUMENTS, rs274::TOO_MANY_SUB_PARAMETERS, vec![])
+            }
+            Problem::BadLineNumber => (code::BLOCK_BAD_LINE_NUMBER, rs274::BAD_FORMAT_UNSIGNED_INTEGER, vec![]),
+            Problem::Macro(name, form) => {
+                (code::MACRO_MALFORMED, rs274::SILENT, vec![name.to_string(), form.to_string()])
+            }
+        };
+        self.fault(span, code, rs, &args);
+    }
+}
+
+/// Dialects without parameters and expressions.
+fn plain_only(family: Family) -> bool {
+    matches!(family, Family::Grbl | Family::Ufmg2008)
+}
+
+fn is_line_number(item: &Item) -> bool {
+    matches!(item, Item::Word { letter: b'n', .. } | Item::Bad { letter: b'n', .. })
+}
+
+/// How the controller's message and ours name a repeated word.
+fn repeated_names(letter: u8) -> (String, String) {
+    let upper = char::from(letter.to_ascii_uppercase()).to_string();
+    let theirs = match letter {
+        b'$' => "spindle choice ($)".to_string(),
+        b'u' | b'v' | b'w' => upper.clone(),
+        _ => char::from(letter).to_string(),
+    };
+    (theirs, upper)
+}
+
+fn kind_of(words: &[Word]) -> LineKind {
+    let mut kind = LineKind::Blank;
+    for word in words {
+        match word.form {
+            Form::Comment if word.letter == b'%' => return LineKind::Percent,
+            Form::Comment => {}
+            Form::Literal => kind = LineKind::Plain,
+            _ => return LineKind::Structured,
+        }
+    }
+    kind
+}
+
+/// How far the grammar would recurse.
+fn depth(tokens: &[Token]) -> usize {
+    let (mut deepest, mut prefixes) = (0, 0);
+    let mut open: Vec<usize> = Vec::new();
+    for token in tokens {
+        match token {
+            Token::Mark(b'[') => {
+                open.push(prefixes);
+                prefixes += 1;
+            }
+            Token::Mark(b']') => prefixes = open.pop().unwrap_or(0),
+            Token::Mark(b'#' | b'-' | b'+') => prefixes += 1,
+            Token::Letter(_) => {}
+            _ => prefixes = open.last().map_or(0, |p| p + 1),
+        }
+        deepest = deepest.max(prefixes);
+    }
+    deepest
 }

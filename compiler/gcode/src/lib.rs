@@ -8,9 +8,14 @@
 mod build;
 mod chunks;
 mod fast;
+mod grammar;
+mod lex;
 mod model;
 mod number;
+mod print;
 mod scan;
+#[cfg(test)]
+mod tests;
 
 pub use chunks::split_chunks;
 pub use model::*;
