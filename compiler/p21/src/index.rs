@@ -1,0 +1,150 @@
+use memchr::{memchr, memchr2};
+
+/// Where the instances of a file are.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Index {
+    /// In file order.
+    pub entries: Vec<Entry>,
+}
+
+/// One instance.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Entry {
+    /// Number after `#` (modulo 2^64).
+    pub id: u64,
+    /// Byte of the `#`.
+    pub start: u32,
+    /// One past the `;`.
+    pub end: u32,
+    /// Byte of the keyword, or of the `(` of a complex instance.
+    pub keyword: u32,
+}
+
+/// Finds `#id=…;` statements, skipping strings and comments, and reads nothing else. On damaged files it
+/// resumes at the next line that begins with `#id=`; use [`crate::parse`] to hear what is wrong.
+pub fn index(text: &[u8]) -> Index {
+    let mut entries = Vec::with_capacity(text.len() / 96 + 4);
+    let mut at = 0;
+    while at < text.len() {
+        at = skip_blank(text, at);
+        if at >= text.len() {
+            break;
+        }
+        if text[at] != b'#' {
+            at = statement_end(text, at);
+            continue;
+        }
+        let start = at;
+        let (id, after) = number(text, at + 1);
+        let mut p = skip_blank(text, after);
+        if after == at + 1 || text.get(p) != Some(&b'=') {
+            at = statement_end(text, at + 1);
+            continue;
+        }
+        p = skip_blank(text, p + 1);
+        let end = statement_end(text, p);
+        entries.push(Entry { id, start: start as u32, end: end as u32, keyword: p as u32 });
+        at = end;
+    }
+    Index { entries }
+}
+
+fn number(text: &[u8], mut at: usize) -> (u64, usize) {
+    let mut id = 0u64;
+    while let Some(b) = text.get(at) {
+        match b {
+            b'0'..=b'9' => id = id.wrapping_mul(10).wrapping_add(u64::from(b - b'0')),
+            0..=0x1F => {}
+            _ => break,
+        }
+        at += 1;
+    }
+    (id, at)
+}
+
+/// Past blanks, ignored bytes and comments.
+pub(crate) fn skip_blank(text: &[u8], mut at: usize) -> usize {
+    while let Some(b) = text.get(at) {
+        match b {
+            0..=0x20 => at += 1,
+            b'/' if text.get(at + 1) == Some(&b'*') => match memchr::memmem::find(&text[at + 2..], b"*/") {
+                Some(n) => at += n + 4,
+                None => return text.len(),
+            },
+            _ => break,
+        }
+    }
+    at
+}
+
+/// One past the `;` that ends the statement around `at`.
+fn statement_end(text: &[u8], mut at: usize) -> usize {
+    loop {
+        let Some(n) = memchr::memchr3(b';', b'\'', b'/', &text[at..]) else { return text.len() };
+        at += n;
+        match text[at] {
+            b';' => return at + 1,
+            b'\'' => match memchr(b'\'', &text[at + 1..]) {
+                // A string that swallows the start of another statement was never closed.
+                Some(m) if m < 5 || !swallows(&text[at + 1..at + 1 + m]) => at += m + 2,
+                _ => {
+                    at += 1;
+                    match memchr2(b'\n', b'\r', &text[at..]) {
+                        Some(m) => return at + m + 1,
+                        None => return text.len(),
+                    }
+                }
+            },
+            _ if text.get(at + 1) == Some(&b'*') => match memchr::memmem::find(&text[at + 2..], b"*/") {
+                Some(m) => at += m + 4,
+                None => return text.len(),
+            },
+            _ => at += 1,
+        }
+    }
+}
+
+/// Whether the inside of a string holds `;` and then `#id=`: the start of another statement.
+pub(crate) fn swallows(inside: &[u8]) -> bool {
+    first_statement(inside).is_some()
+}
+
+/// Byte of the first `#id=` that follows a `;` or a line end in `inside`.
+pub(crate) fn first_statement(inside: &[u8]) -> Option<usize> {
+    let mut at = 0;
+    loop {
+        at += memchr(b'#', &inside[at..])?;
+        let before = inside[..at].iter().rev().find(|b| **b != b' ');
+        let (_, after) = number(inside, at + 1);
+        let p = skip_blank(inside, after);
+        let q = skip_blank(inside, p + 1);
+        let head = matches!(before, Some(b';' | b'\n' | b'\r'));
+        if head && after > at + 1 && inside.get(p) == Some(&b'=') && inside.get(q).is_none_or(|b| b.is_ascii_alphabetic() || matches!(b, b'(' | b'!')) {
+            return Some(at);
+        }
+        at += 1;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::index;
+
+    #[test]
+    fn strings_and_comments_hide_semicolons() {
+        let text = b"DATA;\n#1=A('x;y''#2=B();');/* #9=C(); */\n#2 =\nB(\n)\n;#99999999999=(A()B());ENDSEC;";
+        let entries = index(text).entries;
+        let found: Vec<(u64, &[u8])> = entries.iter().map(|e| (e.id, &text[e.start as usize..e.end as usize])).collect();
+        assert_eq!(found[0], (1, &b"#1=A('x;y''#2=B();');"[..]));
+        assert_eq!(found[1].0, 2);
+        assert_eq!(found[2].0, 99_999_999_999);
+        assert_eq!(found.len(), 3);
+    }
+
+    #[test]
+    fn unclosed_string_costs_one_instance() {
+        let text = b"#1=A('open);\n#2=B('x');\n#3=C();\n";
+        let ids: Vec<u64> = index(text).entries.iter().map(|e| e.id).collect();
+        assert_eq!(ids, [1, 2, 3]);
+    }
+}

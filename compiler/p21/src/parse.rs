@@ -1,0 +1,755 @@
+//! Text → flat tables, with recovery at the next statement.
+
+use gr_spec::{Code, code};
+use gr_text::Span;
+use rustc_hash::FxHashMap;
+
+use crate::index::{first_statement, skip_blank};
+use crate::lex::{self, DIGIT, LOWER, UPPER, is, peek, run};
+use crate::model::{Exchange, Fault, Ids, Instance, Kind, Section, Value};
+
+/// Deeper lists are refused; real files have a depth of four.
+const DEPTH: usize = 10_000;
+
+/// Reads a whole file.
+pub fn parse(text: &[u8]) -> Exchange {
+    let mut p = Parser {
+        text,
+        at: 0,
+        out: Exchange::default(),
+        names: FxHashMap::default(),
+        recent: [(0, 0, u32::MAX); 64],
+        open: Vec::new(),
+        last_id: 0,
+        sorted: true,
+        spoiled: false,
+        section: None,
+    };
+    p.out.instances.reserve(text.len() / 88 + 4);
+    p.out.values.reserve(text.len() / 18 + 16);
+    p.file();
+    p.finish()
+}
+
+struct Parser<'t> {
+    text: &'t [u8],
+    at: usize,
+    out: Exchange,
+    names: FxHashMap<Box<[u8]>, u32>,
+    /// Keywords seen lately: first eight bytes, length, number. Spares the hash table.
+    recent: [(u64, usize, u32); 64],
+    open: Vec<u32>,
+    last_id: u64,
+    sorted: bool,
+    /// The current statement has had its message.
+    spoiled: bool,
+    section: Option<usize>,
+}
+
+/// The statement can't be read on.
+struct Lost;
+
+impl Parser<'_> {
+    fn finish(mut self) -> Exchange {
+        self.close_section(self.text.len());
+        if !self.sorted {
+            self.map_ids();
+        }
+        self.out.faults.sort_by_key(|f| f.span.start);
+        self.out.instances.shrink_to_fit();
+        self.out.values.shrink_to_fit();
+        self.out
+    }
+
+    fn map_ids(&mut self) {
+        let mut map = FxHashMap::default();
+        map.reserve(self.out.instances.len());
+        for i in 0..self.out.instances.len() {
+            let instance = self.out.instances[i];
+            if instance.id == 0 && self.text.get(instance.start as usize) != Some(&b'#') {
+                continue;
+            }
+            match map.entry(instance.id) {
+                std::collections::hash_map::Entry::Vacant(v) => {
+                    v.insert(i as u32);
+                }
+                std::collections::hash_map::Entry::Occupied(first) => {
+                    let head = |n: u32| {
+                        let start = self.out.instances[n as usize].start;
+                        Span::new(start, run(self.text, start as usize + 1, DIGIT) as u32)
+                    };
+                    self.out.faults.push(Fault {
+                        code: code::P21_DUPLICATE_ID,
+                        span: head(i as u32),
+                        args: vec![instance.id.to_string()],
+                        related: Some((head(*first.get()), "first used here")),
+                    });
+                }
+            }
+        }
+        self.out.ids = Ids::Map(map);
+    }
+
+    fn byte(&self) -> u8 {
+        self.text.get(self.at).copied().unwrap_or(0)
+    }
+
+    fn blank(&mut self) {
+        if self.at < self.text.len() && (self.text[self.at] <= b' ' || self.text[self.at] == b'/') {
+            self.blank_slow();
+        }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn unclosed_comment(&mut self, at: usize) {
+        self.fault(code::P21_UNTERMINATED_COMMENT, at, at + 2, vec![]);
+    }
+
+    fn blank_slow(&mut self) {
+        let from = self.at;
+        self.at = skip_blank(self.text, self.at);
+        if self.at == self.text.len() {
+            // Either the end, or a comment that never closes.
+            if let Some(n) = memchr::memmem::rfind(&self.text[from..], b"/*")
+                && memchr::memmem::find(&self.text[from + n + 2..], b"*/").is_none()
+            {
+                self.unclosed_comment(from + n);
+            }
+        }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn fault(&mut self, code: Code, start: usize, end: usize, args: Vec<String>) {
+        if !self.spoiled {
+            self.out.faults.push(Fault { code, span: Span::new(start as u32, end as u32), args, related: None });
+            self.spoiled = true;
+        }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn unexpected(&mut self, expected: &str) -> Lost {
+        let at = self.at;
+        if at >= self.text.len() {
+            self.fault(code::P21_ENDS_EARLY, at, at, vec![expected.into()]);
+        } else {
+            let end = self.shown_end(at);
+            let found = String::from_utf8_lossy(&self.text[at..end]).into_owned();
+            self.fault(code::P21_UNEXPECTED, at, end, vec![found, expected.into()]);
+        }
+        Lost
+    }
+
+    /// How much of what stands at `at` a message shows.
+    fn shown_end(&self, at: usize) -> usize {
+        let b = self.text[at];
+        if is(b, DIGIT | UPPER | LOWER) {
+            return run(self.text, at, DIGIT | UPPER | LOWER);
+        }
+        let mut end = at + 1;
+        while end < self.text.len() && self.text[end] & 0xC0 == 0x80 {
+            end += 1;
+        }
+        end
+    }
+
+    fn file(&mut self) {
+        loop {
+            self.spoiled = false;
+            self.blank();
+            if self.at >= self.text.len() {
+                return;
+            }
+            let from = self.at;
+            let lost = match self.byte() {
+                b'#' => self.instance().is_err(),
+                b'@' | b'<' => self.anchor().is_err(),
+                b if is(b, UPPER | LOWER) || b == b'!' => self.word().is_err(),
+                b';' => {
+                    self.at += 1;
+                    false
+                }
+                _ => {
+                    self.unexpected("an instance (#n=…;) or a section keyword");
+                    true
+                }
+            };
+            if lost {
+                self.recover(from);
+            }
+        }
+    }
+
+    /// Resumes at the next statement after a fault.
+    #[cold]
+    #[inline(never)]
+    fn recover(&mut self, from: usize) {
+        let mut at = self.at.max(from + 1).min(self.text.len());
+        let end = loop {
+            let Some(n) = memchr::memchr3(b';', b'\n', b'\r', &self.text[at..]) else { break self.text.len() };
+            at += n;
+            let next = skip_blank(self.text, at + 1);
+            let starts = next >= self.text.len() || self.starts_statement(next, self.text[at] == b';');
+            if starts {
+                break if self.text[at] == b';' { at + 1 } else { next };
+            }
+            at += 1;
+        };
+        self.at = end.max(from + 1).min(self.text.len());
+    }
+
+    fn starts_statement(&self, at: usize, after_semicolon: bool) -> bool {
+        match self.text[at] {
+            b'#' => {
+                let digits = run(self.text, at + 1, DIGIT);
+                digits > at + 1 && self.text.get(skip_blank(self.text, digits)) == Some(&b'=')
+            }
+            b if is(b, UPPER | LOWER) => {
+                let word = &self.text[at..run(self.text, at, UPPER | LOWER | DIGIT)];
+                matches!(word, b"ENDSEC" | b"DATA" | b"HEADER" | b"END") || after_semicolon
+            }
+            b'@' | b'<' => after_semicolon,
+            _ => false,
+        }
+    }
+
+    fn keyword(&mut self, start: usize, end: usize) -> u32 {
+        let word = &self.text[start..end];
+        let mut head = [0; 8];
+        let n = word.len().min(8);
+        head[..n].copy_from_slice(&word[..n]);
+        let tail = if word.len() > 8 { u64::from(word[word.len() - 1]) << 8 | u64::from(word[word.len() - 4]) } else { 0 };
+        let head = u64::from_le_bytes(head);
+        let slot = ((head ^ tail ^ word.len() as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 58) as usize;
+        let (h, len, name) = self.recent[slot];
+        if h == head && len == word.len() && name != u32::MAX && self.out.keywords[name as usize].as_bytes() == word {
+            return name;
+        }
+        let clean: Vec<u8> = word.iter().filter(|b| **b >= 0x20).map(u8::to_ascii_uppercase).collect();
+        let name = match self.names.get(&clean[..]) {
+            Some(n) => *n,
+            None => {
+                let n = self.out.keywords.len() as u32;
+                self.out.keywords.push(String::from_utf8_lossy(&clean).into());
+                self.names.insert(clean.into(), n);
+                n
+            }
+        };
+        self.recent[slot] = (head, word.len(), name);
+        name
+    }
+
+    /// A keyword: `NAME`, `!NAME`. Returns its end.
+    #[inline(always)]
+    fn name(&mut self, expected: &str) -> Result<(usize, usize), Lost> {
+        let start = self.at;
+        let first = if self.byte() == b'!' { peek(self.text, start + 1).1 } else { start };
+        if first >= self.text.len() || !is(self.text[first], UPPER | LOWER) {
+            return Err(self.unexpected(expected));
+        }
+        let end = run(self.text, first, UPPER | DIGIT);
+        if self.text.get(end).is_some_and(|b| is(*b, LOWER)) {
+            let end = run(self.text, first, UPPER | LOWER | DIGIT);
+            let word = String::from_utf8_lossy(&self.text[start..end]).into_owned();
+            self.fault(code::P21_LOWER_CASE, start, end, vec![word.clone(), word.to_ascii_uppercase()]);
+            self.at = end;
+            return Ok((start, end));
+        }
+        self.at = end;
+        Ok((start, end))
+    }
+
+    fn instance(&mut self) -> Result<(), Lost> {
+        let start = self.at;
+        let digits = peek(self.text, start + 1).1;
+        let end = run(self.text, digits, DIGIT);
+        if end == digits {
+            self.at = digits;
+            return Err(self.unexpected("the number of an instance"));
+        }
+        let mut id = 0u64;
+        for b in &self.text[digits..end] {
+            if *b >= b'0' {
+                id = id.wrapping_mul(10).wrapping_add(u64::from(*b - b'0'));
+            }
+        }
+        self.at = end;
+        self.blank();
+        if self.byte() != b'=' {
+            return Err(self.unexpected("`=`"));
+        }
+        self.at += 1;
+        self.blank();
+        if id <= self.last_id {
+            self.sorted = false;
+        }
+        self.last_id = id;
+        let n = self.begin(id, start);
+        let body = self.body(n);
+        self.end(n, body.is_err());
+        body
+    }
+
+    fn begin(&mut self, id: u64, start: usize) -> usize {
+        let nameless = self.keyword(start, start);
+        self.out.instances.push(Instance {
+            id,
+            start: start as u32,
+            end: start as u32,
+            keyword: nameless,
+            first_value: self.out.values.len() as u32,
+            value_count: 0,
+            complex: false,
+            damaged: false,
+        });
+        self.out.instances.len() - 1
+    }
+
+    fn end(&mut self, n: usize, damaged: bool) {
+        for open in self.open.drain(..) {
+            // Lists that a fault cut short: what was read so far stays readable.
+            let inside = self.out.values.len() as u32 - open - 1;
+            let v = &mut self.out.values[open as usize];
+            *v = Value::new(v.kind(), v.start, inside);
+        }
+        let i = &mut self.out.instances[n];
+        i.value_count = self.out.values.len() as u32 - i.first_value;
+        i.end = self.at as u32;
+        i.damaged = damaged;
+    }
+
+    fn body(&mut self, n: usize) -> Result<(), Lost> {
+        if self.byte() == b'(' {
+            self.out.instances[n].complex = true;
+            self.at += 1;
+            let mut first = true;
+            loop {
+                self.blank();
+                if self.byte() == b')' && !first {
+                    self.at += 1;
+                    break;
+                }
+                let (s, e) = self.name("a keyword of this complex instance, or `)`")?;
+                let k = self.keyword(s, e);
+                if first {
+                    self.out.instances[n].keyword = k;
+                    first = false;
+                }
+                self.blank();
+                if self.byte() != b'(' {
+                    return Err(self.unexpected("`(`"));
+                }
+                self.at += 1;
+                self.open_list(Kind::Typed, s)?;
+                self.list()?;
+            }
+        } else if self.byte() == b'<' {
+            self.resource()?;
+        } else {
+            let (s, e) = self.name("an entity keyword, or `(`")?;
+            self.blank();
+            let e = if self.byte() == b'(' { e } else { self.joined_keyword(s, e) };
+            self.out.instances[n].keyword = self.keyword(s, e);
+            if self.byte() != b'(' {
+                return Err(self.unexpected("`(`"));
+            }
+            self.at += 1;
+            self.list()?;
+        }
+        self.semicolon()
+    }
+
+    /// `MILLING TOOL DIMENSION(`: a blank where an underscore was meant. One message; the name is put together.
+    #[cold]
+    #[inline(never)]
+    fn joined_keyword(&mut self, start: usize, end: usize) -> usize {
+        let mut last = end;
+        loop {
+            let at = skip_blank(self.text, last);
+            if at >= self.text.len() || !is(self.text[at], UPPER | LOWER) {
+                break;
+            }
+            last = run(self.text, at, UPPER | LOWER | DIGIT);
+        }
+        let at = skip_blank(self.text, last);
+        if last > end && self.text.get(at) == Some(&b'(') {
+            let written = String::from_utf8_lossy(&self.text[start..last]).into_owned();
+            let meant: Vec<&str> = written.split_whitespace().collect();
+            self.fault(code::P21_BLANK_IN_KEYWORD, start, last, vec![written.clone(), meant.join("_")]);
+            self.at = at;
+            let joined = meant.join("_");
+            // The table gets the name that was meant.
+            let key: Box<[u8]> = joined.as_bytes().into();
+            if !self.names.contains_key(&key) {
+                self.out.keywords.push(joined.into());
+                self.names.insert(key, self.out.keywords.len() as u32 - 1);
+            }
+            return last;
+        }
+        end
+    }
+
+    fn semicolon(&mut self) -> Result<(), Lost> {
+        let after = self.at;
+        self.blank();
+        match self.byte() {
+            b';' => {
+                self.at += 1;
+                Ok(())
+            }
+            b':' => {
+                self.fault(code::P21_MISSING_SEMICOLON, self.at, self.at + 1, vec!["`:` stands in its place".into()]);
+                self.at += 1;
+                Ok(())
+            }
+            _ if self.at < self.text.len() && self.starts_statement(self.at, false) => {
+                self.fault(code::P21_MISSING_SEMICOLON, after, after, vec!["the next statement begins".into()]);
+                Ok(())
+            }
+            _ => Err(self.unexpected("`;`")),
+        }
+    }
+
+    #[inline(always)]
+    fn open_list(&mut self, kind: Kind, start: usize) -> Result<(), Lost> {
+        if self.open.len() >= DEPTH {
+            self.fault(code::P21_TOO_DEEP, start, start + 1, vec![DEPTH.to_string()]);
+            return Err(Lost);
+        }
+        self.open.push(self.out.values.len() as u32);
+        self.out.values.push(Value::new(kind, start as u32, 0));
+        Ok(())
+    }
+
+    fn close_list(&mut self) {
+        if let Some(open) = self.open.pop() {
+            let inside = self.out.values.len() as u32 - open - 1;
+            let v = &mut self.out.values[open as usize];
+            *v = Value::new(v.kind(), v.start, inside);
+        }
+    }
+
+    /// Parameters up to the `)` that closes what was open when it began. `self.at` is behind the `(`.
+    fn list(&mut self) -> Result<(), Lost> {
+        let floor = self.open.len();
+        // An entity's own parameter list is not a value, so it leaves nothing open.
+        let own = floor == 0;
+        let floor = if own { 0 } else { floor - 1 };
+        self.blank();
+        if self.byte() == b')' {
+            self.at += 1;
+            if !own {
+                self.close_list();
+            }
+            if self.open.len() <= floor {
+                return Ok(());
+            }
+        }
+        loop {
+            // One value.
+            self.blank();
+            let start = self.at;
+            match self.byte() {
+                b'#' => {
+                    let digits = peek(self.text, start + 1).1;
+                    let end = run(self.text, digits, DIGIT);
+                    if end == digits {
+                        self.at = digits;
+                        return Err(self.unexpected("the number of an instance"));
+                    }
+                    self.push(Kind::Reference, start, end);
+                }
+                b'0'..=b'9' | b'+' | b'-' => match lex::number(self.text, start) {
+                    Some((real, end)) if !self.text.get(end).is_some_and(|b| is(*b, UPPER | LOWER | DIGIT) || *b == b'.') => {
+                        self.push(if real { Kind::Real } else { Kind::Integer }, start, end);
+                    }
+                    _ => self.bad_number(start),
+                },
+                b'\'' => self.string(start)?,
+                b'$' => self.push(Kind::Unset, start, start + 1),
+                b'*' => self.push(Kind::Derived, start, start + 1),
+                b'.' => self.enumeration(start)?,
+                b'(' => {
+                    self.open_list(Kind::List, start)?;
+                    self.at += 1;
+                    self.blank();
+                    if self.byte() != b')' {
+                        continue;
+                    }
+                }
+                b'"' => self.binary(start)?,
+                b'<' | b'@' => self.resource()?,
+                b',' | b')' => {
+                    let before = if self.byte() == b',' { "`,`" } else { "`)`" };
+                    self.fault(code::P21_EMPTY_PARAMETER, start, start + 1, vec![before.into()]);
+                    self.out.values.push(Value::new(Kind::Bad, start as u32, 0));
+                }
+                b if is(b, UPPER | LOWER) || b == b'!' => {
+                    let (s, e) = self.name("a value")?;
+                    self.blank();
+                    if self.byte() != b'(' {
+                        let word = String::from_utf8_lossy(&self.text[s..e]).into_owned();
+                        self.fault(code::P21_BARE_WORD, s, e, vec![word]);
+                        self.push(Kind::Bad, s, e);
+                    } else {
+                        self.open_list(Kind::Typed, s)?;
+                        self.at += 1;
+                        self.blank();
+                        if self.byte() != b')' {
+                            continue;
+                        }
+                    }
+                }
+                _ => return Err(self.unexpected("a value")),
+            }
+            // What follows it.
+            loop {
+                self.blank();
+                match self.byte() {
+                    b',' => {
+                        self.at += 1;
+                        break;
+                    }
+                    b')' => {
+                        self.at += 1;
+                        if self.open.len() <= floor + usize::from(!own) {
+                            if !own {
+                                self.close_list();
+                            }
+                            return Ok(());
+                        }
+                        self.close_list();
+                    }
+                    _ => return Err(self.unexpected("`,` or `)`")),
+                }
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn push(&mut self, kind: Kind, start: usize, end: usize) {
+        self.out.values.push(Value::new(kind, start as u32, (end - start) as u32));
+        self.at = end;
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn bad_number(&mut self, start: usize) {
+        let mut end = start + 1;
+        while end < self.text.len() && (is(self.text[end], DIGIT | UPPER | LOWER) || matches!(self.text[end], b'.' | b'+' | b'-')) {
+            end += 1;
+        }
+        let written = String::from_utf8_lossy(&self.text[start..end]).into_owned();
+        self.fault(code::P21_BAD_NUMBER, start, end, vec![written]);
+        self.push(Kind::Bad, start, end);
+    }
+
+    #[inline(always)]
+    fn string(&mut self, start: usize) -> Result<(), Lost> {
+        match lex::string(self.text, start) {
+            Some(end) if end - start < 7 || first_statement(&self.text[start + 1..end]).is_none() => {
+                if let Err((at, what)) = crate::text::check(&self.text[start + 1..end - 1]) {
+                    let from = start + 1 + at;
+                    self.fault(code::P21_BAD_ESCAPE, from, (from + 1).min(end), vec![what.into()]);
+                }
+                self.push(Kind::String, start, end);
+                Ok(())
+            }
+            _ => {
+                self.fault(code::P21_UNTERMINATED_STRING, start, start + 1, vec![]);
+                self.at = start + 1;
+                Err(Lost)
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn enumeration(&mut self, start: usize) -> Result<(), Lost> {
+        let first = peek(self.text, start + 1).1;
+        let end = run(self.text, first, UPPER | DIGIT);
+        let (dot, p) = peek(self.text, end);
+        if end > first && dot == b'.' && !is(self.text[first], DIGIT) {
+            self.push(Kind::Enumeration, start, p + 1);
+            return Ok(());
+        }
+        self.bad_enumeration(start)
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn bad_enumeration(&mut self, start: usize) -> Result<(), Lost> {
+        let end = run(self.text, start + 1, UPPER | LOWER | DIGIT);
+        let close = usize::from(self.text.get(end) == Some(&b'.'));
+        let written = String::from_utf8_lossy(&self.text[start..end + close]).into_owned();
+        if end > start + 1 && is(self.text[start + 1], DIGIT) {
+            self.fault(code::P21_BAD_NUMBER, start, end + close, vec![written]);
+        } else if close == 1 && end > start + 1 {
+            self.fault(code::P21_LOWER_CASE, start, end + 1, vec![written.clone(), written.to_ascii_uppercase()]);
+            self.push(Kind::Enumeration, start, end + 1);
+            return Ok(());
+        } else {
+            self.fault(code::P21_BAD_ENUMERATION, start, end, vec![written]);
+        }
+        self.push(Kind::Bad, start, end + close);
+        Ok(())
+    }
+
+    fn binary(&mut self, start: usize) -> Result<(), Lost> {
+        let mut at = start + 1;
+        while at < self.text.len() && (self.text[at].is_ascii_hexdigit() && !self.text[at].is_ascii_lowercase() || self.text[at] < 0x20) {
+            at += 1;
+        }
+        let digits = self.text[start + 1..at].iter().filter(|b| **b >= 0x20).count();
+        let first = self.text[start + 1..at].iter().find(|b| **b >= 0x20);
+        if self.text.get(at) == Some(&b'"') && digits > 0 && matches!(first, Some(b'0'..=b'3')) {
+            self.push(Kind::Binary, start, at + 1);
+            return Ok(());
+        }
+        if self.text.get(at) == Some(&b'"') {
+            self.fault(code::P21_BAD_BINARY, start, at + 1, vec![]);
+            self.push(Kind::Bad, start, at + 1);
+            return Ok(());
+        }
+        // Two apostrophes read as one quotation mark, as scanned listings have it.
+        self.fault(code::P21_STRAY_QUOTE, start, start + 1, vec![]);
+        self.push(Kind::Bad, start, start + 1);
+        Ok(())
+    }
+
+    /// `<uri>`, `@name`.
+    fn resource(&mut self) -> Result<(), Lost> {
+        let start = self.at;
+        let end = if self.byte() == b'<' {
+            match memchr::memchr2(b'>', b';', &self.text[start..]) {
+                Some(n) if self.text[start + n] == b'>' => start + n + 1,
+                _ => return Err(self.unexpected("a resource <…> that closes")),
+            }
+        } else {
+            run(self.text, start + 1, DIGIT | UPPER | LOWER)
+        };
+        self.push(Kind::Resource, start, end);
+        Ok(())
+    }
+
+    /// `<name>=value;` in ANCHOR, `@1=<uri>;` in REFERENCE.
+    fn anchor(&mut self) -> Result<(), Lost> {
+        let start = self.at;
+        let n = self.begin(0, start);
+        let mut body = || -> Result<(), Lost> {
+            self.resource()?;
+            self.blank();
+            if self.byte() != b'=' {
+                return Err(self.unexpected("`=`"));
+            }
+            self.at += 1;
+            // The value, and tags in braces, are read as they stand.
+            match memchr::memchr(b';', &self.text[self.at..]) {
+                Some(n) => {
+                    let (s, e) = (skip_blank(self.text, self.at), self.at + n);
+                    self.push(Kind::Resource, s.min(e), e);
+                    self.at = e + 1;
+                    Ok(())
+                }
+                None => {
+                    self.at = self.text.len();
+                    Err(self.unexpected("`;`"))
+                }
+            }
+        };
+        let result = body();
+        self.end(n, result.is_err());
+        result
+    }
+
+    fn close_section(&mut self, end: usize) {
+        if let Some(s) = self.section.take() {
+            let count = self.out.instances.len() as u32;
+            let section = &mut self.out.sections[s];
+            section.span.end = end as u32;
+            section.instances.end = count;
+        }
+    }
+
+    fn word(&mut self) -> Result<(), Lost> {
+        let start = self.at;
+        let end = run(self.text, start, UPPER | LOWER | DIGIT);
+        let clean: Vec<u8> = self.text[start..end].iter().filter(|b| **b >= 0x20).map(u8::to_ascii_uppercase).collect();
+        let name = match &clean[..] {
+            b"HEADER" => "HEADER",
+            b"DATA" => "DATA",
+            b"ANCHOR" => "ANCHOR",
+            b"REFERENCE" => "REFERENCE",
+            b"SIGNATURE" => "SIGNATURE",
+            b"ISO" | b"END" => {
+                let end = memchr::memchr(b';', &self.text[start..]).map_or(self.text.len(), |n| start + n).min(start + 64);
+                let line: Vec<u8> = self.text[start..end].iter().copied().filter(|b| *b > 0x20).collect();
+                if line.starts_with(b"ISO-10303-21") || line.starts_with(b"END-ISO-10303-21") {
+                    self.at = start + self.text[start..end].iter().rposition(|b| *b == b'1').map_or(0, |n| n + 1);
+                    return self.semicolon();
+                }
+                ""
+            }
+            b"ENDSEC" => {
+                self.at = end;
+                let result = self.semicolon();
+                self.close_section(self.at);
+                return result;
+            }
+            _ => "",
+        };
+        let (next, _) = peek(self.text, skip_blank(self.text, end));
+        if name.is_empty() || (name == "DATA" && next != b';' && next != b'(' && next != b':') {
+            return self.header_entity();
+        }
+        if let Some(open) = self.section {
+            let opened = self.out.sections[open].span.start as usize;
+            let what = self.out.sections[open].name;
+            self.fault(code::P21_MISSING_ENDSEC, start, end, vec![what.into()]);
+            if let Some(f) = self.out.faults.last_mut() {
+                f.related = Some((Span::new(opened as u32, (opened + what.len()) as u32), "this section is still open"));
+            }
+            self.close_section(start);
+            self.spoiled = false;
+        }
+        self.section = Some(self.out.sections.len());
+        let count = self.out.instances.len() as u32;
+        self.out.sections.push(Section { name, span: Span::new(start as u32, start as u32), instances: count..count });
+        self.at = end;
+        self.blank();
+        if self.byte() == b'(' {
+            self.at += 1;
+            let n = self.begin(0, start);
+            self.out.instances[n].keyword = self.keyword(start, end);
+            let result = self.list();
+            self.end(n, result.is_err());
+            result?;
+        }
+        self.semicolon()?;
+        if name == "SIGNATURE" {
+            // Encoded bytes up to the end of the section.
+            match memchr::memmem::find(&self.text[self.at..], b"ENDSEC") {
+                Some(n) => self.at += n,
+                None => self.at = self.text.len(),
+            }
+        }
+        Ok(())
+    }
+
+    fn header_entity(&mut self) -> Result<(), Lost> {
+        let start = self.at;
+        let (s, e) = self.name("a section keyword or a header entity")?;
+        self.blank();
+        if self.byte() != b'(' {
+            return Err(self.unexpected("`(`"));
+        }
+        self.at += 1;
+        let n = self.begin(0, start);
+        self.out.instances[n].keyword = self.keyword(s, e);
+        let body = self.list();
+        let body = body.and_then(|()| self.semicolon());
+        self.end(n, body.is_err());
+        body
+    }
+}
