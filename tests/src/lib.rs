@@ -1,6 +1,7 @@
 //! Helpers that the tests of the whole share.
 
 pub mod generate;
+pub mod linuxcnc;
 pub mod matrix;
 pub mod oracle;
 pub mod process;

@@ -100,14 +100,14 @@ const BODIES: &[(&str, Body)] = &[
         let w = p.by([Some(20.0), Some(0.0), None]);
         p.line(&format!("G5{w} I{i} J{j} P{q} Q{j}"));
         let w = p.by([Some(20.0), Some(5.0), None]);
-        p.line(&format!("{} P{q} Q{i}", w.trim_start()));
+        p.line(&format!("G5{w} P{q} Q{i}"));
     }),
     ("G5.1", |p| {
         let (i, j) = (p.len(5.0), p.len(6.0));
         let w = p.by([Some(20.0), Some(0.0), None]);
         p.line(&format!("G5.1{w} I{i} J{j}"));
         let w = p.by([Some(10.0), Some(5.0), None]);
-        p.line(&format!("G5.1{w} J{j}"));
+        p.line(&format!("G5.1{w} I{i} J{j}"));
     }),
     ("G5.2", |p| {
         let w = p.by([Some(0.0), Some(10.0), None]);
@@ -160,7 +160,6 @@ const BODIES: &[(&str, Body)] = &[
         p.line("G56");
         p.go("G1", 1.0, 1.0);
     }),
-    ("G10-L0", |p| p.line("G10 L0")),
     ("G17", |p| {
         p.line("G17");
         p.line("G18");
@@ -169,7 +168,6 @@ const BODIES: &[(&str, Body)] = &[
     }),
     ("G17.1", |p| {
         p.line("G17.1");
-        p.line("G0 U1 V2 W3");
         p.line("G18.1");
         p.line("G19.1");
     }),
@@ -230,9 +228,6 @@ const BODIES: &[(&str, Body)] = &[
     ("G43.2", |p| {
         p.line("G43.2 H2");
         p.go("G1", 10.0, 0.0);
-        let z = p.len(1.5);
-        p.line(&format!("G43.2 Z{z}"));
-        p.go("G1", 10.0, 0.0);
     }),
     ("G52", |p| {
         let (x, z) = (p.len(5.0), p.len(1.5));
@@ -272,6 +267,14 @@ const BODIES: &[(&str, Body)] = &[
         p.line("M4");
         cycle(p, "G74", " P0.5");
     }),
+    ("G74-plain", |p| {
+        p.line("M4");
+        let [x, _, z] = p.letters();
+        let (r, depth) = if p.modes.incremental { (p.len(-3.0), p.len(-8.0)) } else { (p.len(2.0), p.len(-6.0)) };
+        let q = p.len(7.5);
+        p.line(&format!("G74 {x}{q} {z}{depth} R{r}"));
+        p.line("G80");
+    }),
     ("G81", |p| cycle(p, "G81", "")),
     ("G81-G99", |p| cycle(p, "G99 G81", "")),
     ("G82", |p| cycle(p, "G82", " P0.5")),
@@ -285,8 +288,7 @@ const BODIES: &[(&str, Body)] = &[
     ("G89", |p| cycle(p, "G89", " P0.5")),
     ("G76", |p| {
         let (pitch, i, j, k, z) = (p.len(1.5), p.len(-1.0), p.len(0.2), p.len(1.0), p.len(-20.0));
-        let x = if p.modes.incremental { "" } else { "" };
-        p.line(&format!("G76 P{pitch} Z{z} I{i} J{j} K{k}{x} Q29.5 R1.5 H2"));
+        p.line(&format!("G76 P{pitch} Z{z} I{i} J{j} K{k} Q29.5 R1.5 H2"));
         let e = p.len(2.0);
         p.line(&format!("G76 P{pitch} Z{z} I{i} J{j} K{k} L3 E{e}"));
     }),
@@ -329,7 +331,6 @@ const BODIES: &[(&str, Body)] = &[
         let w = p.by([Some(10.0), None, None]);
         p.line(&format!("G1{w} A30 B-15 C45"));
         p.line("G1 A90");
-        p.line("G0 U1 V2 W3");
     }),
     ("polar", |p| {
         let r = p.len(20.0);
@@ -403,11 +404,11 @@ const BODIES: &[(&str, Body)] = &[
     }),
     ("M30", |p| p.line("M30")),
     ("M98", |p| {
-        p.line("O100 sub");
-        p.go("G1", 10.0, 1.0);
-        p.line("O100 endsub");
         p.line("M98 P100 L2");
-        p.line("O100 call");
+        p.line("M2");
+        p.line("O100");
+        p.go("G1", 10.0, 1.0);
+        p.line("M99");
     }),
     ("O-words", |p| {
         p.line("#1=0");
