@@ -5,14 +5,18 @@
 //! are in the work frame of the moment; [`State::machine`] takes them to the machine frame. The reference
 //! of operations and text form is `spec/ir/motion.md`.
 
+pub mod diff;
+pub mod geometry;
 mod lower;
+pub mod measure;
 mod op;
 mod state;
 mod store;
+pub mod text;
 
 pub use gr_canon::{Axes, FrameId, Plane, Units};
 pub use gr_text::FileId;
 pub use lower::Lowering;
 pub use op::{Arc, ArcPlane, FeedMode, Marker, Note, Op, Override, PathMode, Pose, Source, Stop, Turn};
-pub use state::{Spindle, State, Sync};
+pub use state::{Spindle, State, Sync, plane_axes};
 pub use store::{Builder, Cursor, Frame, Frames, Program, Step, View};

@@ -246,7 +246,7 @@ impl State {
 
 /// The axes of a plane: first, second, and the one along its normal (indices into X Y Z). The planes of
 /// U V W are taken as those of X Y Z.
-pub(crate) fn plane_axes(plane: Plane) -> (usize, usize, usize) {
+pub fn plane_axes(plane: Plane) -> (usize, usize, usize) {
     match plane {
         Plane::Xy | Plane::Uv => (0, 1, 2),
         Plane::Xz | Plane::Uw => (2, 0, 1),

@@ -393,7 +393,6 @@ const SPIN_GONE: u16 = 1 << 12;
 #[derive(Clone, Debug, Default)]
 pub struct Builder {
     program: Program,
-    place: Place,
     pose: Pose,
     state: State,
     source: Source,
@@ -409,11 +408,16 @@ impl Builder {
         let program = Program { start: pose, start_state: state, ..Program::default() };
         Builder { program, pose, state, ..Builder::default() }
     }
+    /// Sets what the program starts from, keeping files and frames. Only before the first operation.
+    pub(crate) fn restart(&mut self, pose: Pose, state: State) {
+        (self.program.start, self.program.start_state) = (pose, state);
+        (self.pose, self.state) = (pose, state);
+    }
     /// Goes on with a program.
     pub fn resume(program: Program) -> Builder {
         let cursor = program.cursor_at(program.len());
-        let (place, pose, state, source) = (cursor.at, cursor.end, cursor.state, cursor.source);
-        Builder { program, place, pose, state, source }
+        let (pose, state, source) = (cursor.end, cursor.state, cursor.source);
+        Builder { program, pose, state, source }
     }
     /// The pose so far.
     pub fn pose(&self) -> &Pose {
@@ -489,7 +493,6 @@ impl Builder {
             text: p.text.len(),
             jump: p.jumps.len(),
         };
-        self.place = place;
         let checkpoint = Checkpoint { place, pose: self.pose, state: self.state, source: self.source };
         self.program.checkpoints.push(checkpoint);
     }

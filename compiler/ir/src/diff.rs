@@ -1,0 +1,429 @@
+//! Two programs compared as motion: where the tool goes in the machine, with which tool, how fast, and
+//! what else happens on the way. Not text, not the way a path is cut into blocks.
+
+use crate::geometry::{ArcShape, nurbs_point};
+use crate::measure::{Rates, Totals, measure};
+use crate::{Axes, Cursor, FeedMode, Op, Pose, Program, Source, Spindle, State, Stop, Turn, View};
+
+mod walk;
+
+/// What counts as equal.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Tolerance {
+    /// Paths, mm.
+    pub length: f64,
+    /// Rotary axes, rad.
+    pub angle: f64,
+    /// Feeds, speeds and times, as a share of the larger one.
+    pub rate: f64,
+    /// Differences listed at most.
+    pub limit: usize,
+    /// Compare in the work frame instead of the machine frame (for programs made for other offsets).
+    pub work_frame: bool,
+}
+
+impl Default for Tolerance {
+    fn default() -> Tolerance {
+        Tolerance { length: 1e-6, angle: 1e-8, rate: 1e-6, limit: 20, work_frame: false }
+    }
+}
+
+/// What differs.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, PartialOrd, Ord)]
+pub enum Aspect {
+    /// Where the tool goes.
+    Path,
+    /// Which tool.
+    Tool,
+    /// How fast.
+    Feed,
+    /// Spindle speed or direction.
+    Spindle,
+    /// Coolant.
+    Coolant,
+    /// Dwells, stops, inputs, outputs, user M codes.
+    Event,
+    /// Total time.
+    Time,
+}
+
+/// One side of a difference: operation number and its source.
+pub type Spot = Option<(usize, Source)>;
+
+/// One difference.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Difference {
+    /// What.
+    pub aspect: Aspect,
+    /// Where in the first program.
+    pub a: Spot,
+    /// Where in the second.
+    pub b: Spot,
+    /// In plain words.
+    pub message: String,
+}
+
+/// The result.
+#[derive(Clone, PartialEq, Debug, Default)]
+pub struct Diff {
+    /// The first differences.
+    pub differences: Vec<Difference>,
+    /// How many there are in all up to where comparing stopped.
+    pub count: usize,
+    /// The paths are equal but cut into moves differently.
+    pub resegmented: bool,
+    /// Largest distance seen between equal paths, mm.
+    pub deviation: f64,
+    /// Sums of the first program.
+    pub totals_a: Totals,
+    /// Sums of the second.
+    pub totals_b: Totals,
+}
+
+impl Diff {
+    /// Whether the programs make the same motion.
+    pub fn is_empty(&self) -> bool {
+        self.count == 0
+    }
+    /// Whether this aspect differs.
+    pub fn differs(&self, aspect: Aspect) -> bool {
+        self.differences.iter().any(|d| d.aspect == aspect)
+    }
+    fn note(&mut self, limit: usize, aspect: Aspect, a: Spot, b: Spot, message: String) {
+        self.count += 1;
+        if self.differences.len() < limit {
+            self.differences.push(Difference { aspect, a, b, message });
+        }
+    }
+}
+
+/// Compares two programs: operation by operation first, and where the operations do not match, by the
+/// shape of the path alone.
+pub fn diff(a: &Program, b: &Program, tolerance: &Tolerance) -> Diff {
+    let mut out = by_operation(a, b, tolerance);
+    if out.differs(Aspect::Path) {
+        let mut shape = walk::by_shape(a, b, tolerance);
+        shape.resegmented = !shape.differs(Aspect::Path);
+        out = shape;
+    }
+    (out.totals_a, out.totals_b) = (totals(a), totals(b));
+    let (s, t) = (out.totals_a.seconds(), out.totals_b.seconds());
+    // Rounded feeds and lengths add up; a tenth of a percent is not worth a line of its own.
+    if out.count == 0 && !close(s, t, tolerance.rate.max(1e-3)) {
+        out.note(tolerance.limit, Aspect::Time, None, None, format!("takes {s:.3} s, the other {t:.3} s"));
+    }
+    out
+}
+
+fn totals(program: &Program) -> Totals {
+    let mut sum = Totals::default();
+    let rates = Rates::default();
+    let mut cursor = program.cursor();
+    while let Some(view) = cursor.next() {
+        sum.add(&measure(&view, &rates));
+    }
+    sum
+}
+
+fn close(a: f64, b: f64, share: f64) -> bool {
+    a == b || (a - b).abs() <= share * a.abs().max(b.abs())
+}
+
+/// What a move is, whatever its shape.
+#[derive(Clone, Copy, PartialEq, Debug)]
+enum Class {
+    Rapid,
+    Feed,
+    Probe(u8),
+    Sync,
+    Tap,
+}
+
+impl Class {
+    fn name(self) -> &'static str {
+        match self {
+            Class::Rapid => "a rapid",
+            Class::Feed => "a feed move",
+            Class::Probe(_) => "a probe move",
+            Class::Sync => "a move in step with the spindle",
+            Class::Tap => "a rigid tap",
+        }
+    }
+}
+
+/// What holds during a move.
+#[derive(Clone, Copy, PartialEq, Debug)]
+struct Conditions {
+    class: Class,
+    tool: i32,
+    mode: FeedMode,
+    feed: f64,
+    spindles: [Spindle; 8],
+    coolant: (bool, bool),
+}
+
+impl Conditions {
+    fn of(view: &View<'_, '_>) -> Conditions {
+        let state = view.state;
+        let sync = state.sync.filter(|s| !s.velocity);
+        let class = match view.op {
+            Op::Rapid => Class::Rapid,
+            Op::Probe(kind) => Class::Probe(kind),
+            Op::RigidTap { .. } => Class::Tap,
+            _ if sync.is_some() => Class::Sync,
+            _ => Class::Feed,
+        };
+        let feed = match sync {
+            Some(s) => s.per_rev,
+            None if rotary_only(view) => state.feed_angular,
+            None => state.feed,
+        };
+        let coolant = (state.flood, state.mist);
+        Conditions { class, tool: state.tool, mode: state.feed_mode, feed, spindles: state.spindles, coolant }
+    }
+}
+
+fn rotary_only(view: &View<'_, '_>) -> bool {
+    let same = |i: usize| view.start.axes[i] == view.end.axes[i];
+    view.op == Op::Linear && [0, 1, 2, 6, 7, 8].into_iter().all(same)
+}
+
+/// Something that happens at a place.
+#[derive(Clone, Copy, PartialEq, Debug)]
+enum Event {
+    Dwell(f64),
+    ToolChange(i32),
+    Stop(Stop),
+    Digital(i32, bool, bool),
+    Analog(i32, f64, bool),
+    Input(i32, bool, i32),
+    UserM(i32, f64, f64),
+    Orient(i32, f64),
+}
+
+impl Event {
+    fn of(view: &View<'_, '_>) -> Option<Event> {
+        Some(match view.op {
+            Op::Dwell(s) => Event::Dwell(s),
+            Op::ToolChange(_) | Op::ToolNumber(_) => Event::ToolChange(view.state.tool),
+            Op::Stop(stop) => Event::Stop(stop),
+            Op::DigitalOut { index, on, synced } => Event::Digital(index, on, synced),
+            Op::AnalogOut { index, value, synced } => Event::Analog(index, value, synced),
+            Op::InputWait { index, digital, wait, .. } => Event::Input(index, digital, wait),
+            Op::UserM { code, p, q } => Event::UserM(code, p, q),
+            Op::SpindleOrient { spindle, angle, .. } => Event::Orient(spindle, angle),
+            _ => return None,
+        })
+    }
+    fn same(&self, other: &Event, rate: f64) -> bool {
+        match (self, other) {
+            (Event::Dwell(a), Event::Dwell(b)) => close(*a, *b, rate),
+            (Event::Analog(i, a, s), Event::Analog(j, b, t)) => i == j && s == t && close(*a, *b, rate),
+            (Event::Orient(i, a), Event::Orient(j, b)) => i == j && close(*a, *b, rate),
+            (Event::UserM(i, p, q), Event::UserM(j, r, s)) => i == j && close(*p, *r, rate) && close(*q, *s, rate),
+            (a, b) => a == b,
+        }
+    }
+    fn aspect(&self) -> Aspect {
+        if matches!(self, Event::ToolChange(_)) { Aspect::Tool } else { Aspect::Event }
+    }
+    fn text(&self) -> String {
+        match self {
+            Event::Dwell(s) => format!("waits {s} s"),
+            Event::ToolChange(tool) => format!("changes to tool {tool}"),
+            Event::Stop(stop) => format!("stops ({})", format!("{stop:?}").to_lowercase()),
+            Event::Digital(index, on, _) => {
+                format!("switches output {index} {}", if *on { "on" } else { "off" })
+            }
+            Event::Analog(index, value, _) => format!("sets analog output {index} to {value}"),
+            Event::Input(index, ..) => format!("waits for input {index}"),
+            Event::UserM(code, ..) => format!("runs M{code}"),
+            Event::Orient(spindle, angle) => {
+                format!("turns spindle {spindle} to {:.4}°", angle.to_degrees())
+            }
+        }
+    }
+}
+
+/// What matters of an operation.
+#[derive(Clone, Copy, Debug)]
+enum Item {
+    Move { conditions: Conditions, end: Axes, middle: Option<[f64; 3]> },
+    Event(Event),
+    End,
+}
+
+fn place(state: &State, axes: &Axes, tolerance: &Tolerance) -> Axes {
+    if tolerance.work_frame { *axes } else { state.machine(axes) }
+}
+
+/// A point inside a curve, so that two curves with the same ends can be told apart.
+fn middle(op: &Op<'_>, start: &Pose, end: &Pose) -> Option<[f64; 3]> {
+    match op {
+        Op::Arc(arc) => Some(ArcShape::new(arc, start, end).point(1.0 / 3.0)),
+        Op::Nurbs { order, points } => nurbs_point(*order, points, 1.0 / 3.0).map(|[x, y]| [x, y, start.axes[2]]),
+        Op::RigidTap { bottom, .. } => Some(*bottom),
+        _ => None,
+    }
+}
+
+fn item(view: &View<'_, '_>, tolerance: &Tolerance) -> Option<Item> {
+    if let Some(event) = Event::of(view) {
+        return Some(Item::Event(event));
+    }
+    let tap = matches!(view.op, Op::RigidTap { .. });
+    if !view.op.moves() && !tap {
+        return None;
+    }
+    if !tap && !matches!(view.op, Op::Arc(_)) && view.start.axes == view.end.axes {
+        return None;
+    }
+    let inner = middle(&view.op, view.start, view.end).map(|p| {
+        let mut axes = view.end.axes;
+        axes[..3].copy_from_slice(&p);
+        let m = place(view.state, &axes, tolerance);
+        [m[0], m[1], m[2]]
+    });
+    let end = place(view.state, &view.end.axes, tolerance);
+    Some(Item::Move { conditions: Conditions::of(view), end, middle: inner })
+}
+
+fn next_item(cursor: &mut Cursor<'_>, tolerance: &Tolerance) -> (Item, Spot) {
+    while let Some(view) = cursor.next() {
+        if let Some(item) = item(&view, tolerance) {
+            return (item, Some((view.index, view.source)));
+        }
+    }
+    (Item::End, None)
+}
+
+fn by_operation(a: &Program, b: &Program, tolerance: &Tolerance) -> Diff {
+    let mut out = Diff::default();
+    let (mut ca, mut cb) = (a.cursor(), b.cursor());
+    let mut last = None;
+    loop {
+        let ((x, sa), (y, sb)) = (next_item(&mut ca, tolerance), next_item(&mut cb, tolerance));
+        if matches!((&x, &y), (Item::End, Item::End)) {
+            return out;
+        }
+        if !same_item(&mut out, &x, &y, sa, sb, &mut last, tolerance) {
+            out.note(usize::MAX, Aspect::Path, sa, sb, String::new());
+            return out;
+        }
+    }
+}
+
+/// False when the two cannot be laid side by side.
+fn same_item(
+    out: &mut Diff,
+    x: &Item,
+    y: &Item,
+    sa: Spot,
+    sb: Spot,
+    last: &mut Option<(Conditions, Conditions)>,
+    tolerance: &Tolerance,
+) -> bool {
+    match (x, y) {
+        (Item::Move { conditions: c, end, middle }, Item::Move { conditions: d, end: e, middle: m }) => {
+            let far = distance(end, e).max(match (middle, m) {
+                (Some(p), Some(q)) => libm::hypot(libm::hypot(p[0] - q[0], p[1] - q[1]), p[2] - q[2]),
+                (None, None) => 0.0,
+                _ => f64::INFINITY,
+            });
+            if !(far <= tolerance.length) || turned(end, e) > tolerance.angle || c.class != d.class {
+                return false;
+            }
+            out.deviation = out.deviation.max(far);
+            compare_conditions(out, c, d, sa, sb, last, tolerance);
+            true
+        }
+        (Item::Event(p), Item::Event(q)) => {
+            if !p.same(q, tolerance.rate) {
+                let message = format!("{}, the other {}", p.text(), q.text());
+                out.note(tolerance.limit, p.aspect(), sa, sb, message);
+            }
+            true
+        }
+        _ => false,
+    }
+}
+
+fn distance(a: &Axes, b: &Axes) -> f64 {
+    let sum: f64 = [0, 1, 2, 6, 7, 8].into_iter().map(|i: usize| (a[i] - b[i]) * (a[i] - b[i])).sum();
+    libm::sqrt(sum)
+}
+
+fn turned(a: &Axes, b: &Axes) -> f64 {
+    (3..6).map(|i| (a[i] - b[i]).abs()).fold(0.0, f64::max)
+}
+
+/// Notes differences in what holds during a move, once per change.
+fn compare_conditions(
+    out: &mut Diff,
+    c: &Conditions,
+    d: &Conditions,
+    a: Spot,
+    b: Spot,
+    last: &mut Option<(Conditions, Conditions)>,
+    tolerance: &Tolerance,
+) {
+    if c == d || *last == Some((*c, *d)) {
+        return;
+    }
+    let before = last.replace((*c, *d));
+    let fresh = |f: &dyn Fn(&Conditions, &Conditions) -> bool| {
+        f(c, d) && !before.is_some_and(|(p, q)| f(&p, &q))
+    };
+    let mut note = |aspect, message| out.note(tolerance.limit, aspect, a, b, message);
+    if fresh(&|c, d| c.tool != d.tool) {
+        note(Aspect::Tool, format!("works with tool {}, the other with tool {}", c.tool, d.tool));
+    }
+    let feeds = !matches!(c.class, Class::Rapid | Class::Tap);
+    if feeds && (c.mode != d.mode || !close(c.feed, d.feed, tolerance.rate)) {
+        note(Aspect::Feed, format!("feeds {}, the other {}", feed_text(c), feed_text(d)));
+    }
+    if c.class != Class::Rapid && fresh(&|c, d| !same_spindles(c, d, tolerance.rate)) {
+        note(Aspect::Spindle, format!("spindle {}, the other {}", spindle_text(c), spindle_text(d)));
+    }
+    if c.class != Class::Rapid && fresh(&|c, d| c.coolant != d.coolant) {
+        note(Aspect::Coolant, format!("coolant {}, the other {}", coolant_text(c), coolant_text(d)));
+    }
+}
+
+fn same_spindles(c: &Conditions, d: &Conditions, rate: f64) -> bool {
+    c.spindles.iter().zip(&d.spindles).all(|(s, t)| {
+        let off = s.turn == Turn::Stop && t.turn == Turn::Stop;
+        off || (s.turn == t.turn && s.surface.is_some() == t.surface.is_some() && close(s.speed, t.speed, rate))
+    })
+}
+
+fn feed_text(c: &Conditions) -> String {
+    match (c.class, c.mode) {
+        (Class::Sync, _) | (_, FeedMode::PerRev) => format!("{} mm/rev", c.feed),
+        (_, FeedMode::PerTime) => format!("{} mm/min", round(c.feed * 60.0)),
+        (_, FeedMode::Inverse) => format!("{} 1/min", round(c.feed * 60.0)),
+    }
+}
+
+/// For people: without the last bits of a conversion.
+fn round(v: f64) -> f64 {
+    libm::round(v * 1e9) / 1e9
+}
+
+fn spindle_text(c: &Conditions) -> String {
+    let on = c.spindles.iter().find(|s| s.turn != Turn::Stop);
+    on.map_or("stopped".into(), |s| {
+        let unit = if s.surface.is_some() { "mm/s" } else { "rpm" };
+        let turn = if s.turn == Turn::Cw { "clockwise" } else { "counter-clockwise" };
+        format!("{turn} at {} {unit}", s.speed)
+    })
+}
+
+fn coolant_text(c: &Conditions) -> &'static str {
+    match c.coolant {
+        (false, false) => "off",
+        (true, false) => "flood",
+        (false, true) => "mist",
+        (true, true) => "flood and mist",
+    }
+}
