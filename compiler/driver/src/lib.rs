@@ -1,2 +1,20 @@
-//! (in work)
+//! Salsa database and the queries that every front door calls: open, edit, check, stream.
+//!
+//! One [`Session`] owns the database. A file is a row of chunks of whole lines; a keystroke touches one or two
+//! of them. Each chunk is scanned on its own, and interpreted on its own when it has no control flow; results
+//! are remembered by chunk and entry state. Whatever the chunk size and the order of edits, the answers are
+//! those of a fresh session over the same text.
+
+mod check;
+mod db;
+mod disk;
+mod engine;
+mod lints;
+mod session;
 mod store;
+mod timeline;
+
+pub use check::{Check, MOST_OF_A_KIND};
+pub use db::Executed;
+pub use lints::{Level, Rules};
+pub use session::{Cancelled, Options, Session, Snapshot};

@@ -148,7 +148,7 @@ fn feeds(text: &str) -> u32 {
 }
 
 /// Cuts after every `k`-th line feed; at least one part.
-fn split(text: &str, k: usize) -> Vec<&str> {
+pub(crate) fn split(text: &str, k: usize) -> Vec<&str> {
     let mut parts = Vec::new();
     let mut start = 0;
     for (n, at) in memchr::memchr_iter(b'\n', text.as_bytes()).enumerate() {

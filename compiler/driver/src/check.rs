@@ -1,0 +1,266 @@
+//! From findings to diagnostics: whole-file byte positions, labels, the way execution took, one message for one
+//! mistake.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
+use std::sync::Arc;
+
+use gr_canon::{CallFrame, FrameId};
+use gr_gcode::{Chunk, File, Scan};
+use gr_spec::{Code, Severity, code};
+use gr_text::{Diagnostic, FileId, Frame, Span};
+
+use crate::db::{Database, Db, Document, scanned, shape};
+use crate::engine::End;
+use crate::lints::Found;
+use crate::timeline::{Group, Timeline, timeline, timeline_to};
+
+/// What a check gives.
+#[derive(Clone, PartialEq, Debug, Default)]
+pub struct Check {
+    /// In file order.
+    pub diagnostics: Vec<Diagnostic>,
+    /// Diagnostics beyond the limit of [`MOST_OF_A_KIND`] for each code, not listed.
+    pub more: usize,
+}
+
+impl Check {
+    /// Number of diagnostics of a severity.
+    pub fn count(&self, severity: Severity) -> usize {
+        self.diagnostics.iter().filter(|d| d.severity == severity).count()
+    }
+}
+
+/// Diagnostics of one code that are listed.
+pub const MOST_OF_A_KIND: usize = 1000;
+
+/// Everything that is to be said about a file.
+pub(crate) fn check(db: &Database, document: Document) -> Check {
+    Assembly::new(db, document, timeline(db, document)).finish(None)
+}
+
+/// What is to be said about some lines, as far as the blocks up to their end tell it.
+pub(crate) fn check_range(db: &Database, document: Document, lines: Range<u32>) -> Vec<Diagnostic> {
+    let last = lines.end.saturating_sub(1).max(lines.start);
+    Assembly::new(db, document, timeline_to(db, document, last)).finish(Some(lines)).diagnostics
+}
+
+struct Assembly<'a> {
+    db: &'a dyn Db,
+    document: Document,
+    id: FileId,
+    timeline: &'a Timeline<'a>,
+    /// The same finding in every pass of a loop is one diagnostic.
+    seen: BTreeMap<(FileId, u32, Code, Option<u8>, Option<(u32, u32)>), usize>,
+    /// Lines of this file with a diagnostic.
+    told: BTreeSet<u32>,
+    per_code: BTreeMap<Code, usize>,
+    out: Vec<Diagnostic>,
+    passes: Vec<usize>,
+    more: usize,
+}
+
+impl<'a> Assembly<'a> {
+    fn new(db: &'a dyn Db, document: Document, timeline: &'a Timeline<'a>) -> Self {
+        let id = FileId(document.id(db));
+        Assembly {
+            db,
+            document,
+            id,
+            timeline,
+            seen: BTreeMap::new(),
+            told: BTreeSet::new(),
+            per_code: BTreeMap::new(),
+            out: Vec::new(),
+            passes: Vec::new(),
+            more: 0,
+        }
+    }
+
+    fn finish(mut self, lines: Option<Range<u32>>) -> Check {
+        let timeline = self.timeline;
+        for group in &timeline.groups {
+            for found in group.found.iter() {
+                self.add(found, group, lines.as_ref());
+            }
+        }
+        self.never_run(lines.as_ref());
+        for (d, passes) in self.out.iter_mut().zip(&self.passes) {
+            if *passes > 1 {
+                d.notes.push(format!("found in {passes} passes; the first is shown"));
+            }
+        }
+        self.out.sort_by_key(|d| (d.primary().0, d.primary().1.start, d.severity, d.code));
+        Check { diagnostics: self.out, more: self.more }
+    }
+
+    fn add(&mut self, found: &Found, group: &Group, lines: Option<&Range<u32>>) {
+        let line = found.place.line.wrapping_add(group.first_line);
+        let own = group.frames.is_none() || found.place.file == self.id;
+        let file = if own { self.id } else { found.place.file };
+        if let Some(lines) = lines
+            && (!own || !lines.contains(&line))
+        {
+            return;
+        }
+        let key = (file, line, found.code, found.letter, found.span.map(|s| (s.start, s.end)));
+        if let Some(at) = self.seen.get(&key) {
+            self.passes[*at] += 1;
+            return;
+        }
+        let count = self.per_code.entry(found.code).or_default();
+        *count += 1;
+        if *count > MOST_OF_A_KIND {
+            self.more += 1;
+            return;
+        }
+        let mut d = match self.source(file, line) {
+            Some(source) => source.diagnostic(found, file),
+            None => Diagnostic::new(found.code, file, Span::default(), &found.args),
+        };
+        d.severity = found.severity;
+        if let Some(frames) = &group.frames {
+            d.trace = self.trace(found.place.frame, frames);
+        }
+        if own {
+            self.told.insert(line);
+        }
+        self.seen.insert(key, self.out.len());
+        self.out.push(d);
+        self.passes.push(1);
+    }
+
+    /// The chunk a line is in.
+    fn source(&self, file: FileId, line: u32) -> Option<Source> {
+        if file != self.id {
+            let contents = self.db.disk().contents(file)?;
+            let (chunk, line) = contents.locate(line)?;
+            return Some(Source::of(&contents, chunk, line));
+        }
+        let starts = &self.timeline.starts;
+        let last = starts.len().checked_sub(2)?;
+        let at = starts.partition_point(|s| s.0 <= line).saturating_sub(1).min(last);
+        let chunk = *self.document.chunks(self.db).get(at)?;
+        let run = self.document.run(self.db);
+        let text = chunk.text(self.db).clone();
+        let scan = scanned(self.db, chunk, run);
+        Some(Source { chunk: Chunk { text, scan }, start: starts[at].1, line: line - starts[at].0 })
+    }
+
+    fn trace(&self, innermost: FrameId, frames: &Arc<[(FrameId, CallFrame)]>) -> Vec<Frame> {
+        let mut trace = Vec::new();
+        let mut at = innermost;
+        while at != FrameId::MAIN && trace.len() < 32 {
+            let Some((_, frame)) = frames.iter().find(|(id, _)| *id == at) else { break };
+            let name = if frame.pass > 0 { format!("{} (pass {})", frame.name, frame.pass) } else { frame.name.to_string() };
+            let span = self.source(frame.file, frame.line).map_or(Span::default(), |s| s.line_span());
+            trace.push(Frame { file: frame.file, span, name });
+            at = frame.parent;
+        }
+        trace
+    }
+
+    /// Damaged lines that execution never came to: hints, when the program ran to its end.
+    fn never_run(&mut self, lines: Option<&Range<u32>>) {
+        if !self.timeline.complete || matches!(self.timeline.end, Some(End { stopped: true, .. })) {
+            return;
+        }
+        let run = self.document.run(self.db);
+        if run.options(self.db).rules.severity(code::LINE_NEVER_RUN).is_none() {
+            return;
+        }
+        for (at, chunk) in self.document.chunks(self.db).iter().enumerate() {
+            if !shape(self.db, *chunk, run).damaged {
+                continue;
+            }
+            let (first_line, start) = self.timeline.starts[at];
+            let scan = scanned(self.db, *chunk, run);
+            let mut last = u32::MAX;
+            for fault in scan.faults.iter() {
+                let line = first_line + fault.line;
+                let told = self.told.contains(&line);
+                if line == last || told || lines.is_some_and(|l| !l.contains(&line)) {
+                    continue;
+                }
+                last = line;
+                let d = Diagnostic::new(code::LINE_NEVER_RUN, self.id, fault.span.shifted(start), &[]);
+                self.out.push(d.note(gr_spec::fill(fault.code.def().message, &fault.args)));
+                self.passes.push(1);
+            }
+        }
+    }
+}
+
+/// A line in its chunk.
+struct Source {
+    chunk: Chunk,
+    /// First byte of the chunk in the file.
+    start: u32,
+    line: u32,
+}
+
+impl Source {
+    fn of(file: &File, chunk: usize, line: u32) -> Source {
+        Source { chunk: file.chunks[chunk].clone(), start: file.starts[chunk], line }
+    }
+    fn scan(&self) -> &Scan {
+        &self.chunk.scan
+    }
+    /// Whether the chunk has the line: the last chunk may be empty, or the finding stand behind the last line.
+    fn exists(&self) -> bool {
+        (self.line as usize) < self.scan().lines.len()
+    }
+    /// First byte of the line in the file.
+    fn line_start(&self) -> u32 {
+        let in_chunk = self.scan().lines.get(self.line as usize).map_or(self.chunk.text.len() as u32, |l| l.start);
+        self.start + in_chunk
+    }
+    /// The block without blanks around it.
+    fn line_span(&self) -> Span {
+        if !self.exists() {
+            let end = self.start + self.chunk.text.len() as u32;
+            return Span::new(end, end);
+        }
+        let span = self.scan().line_span(&self.chunk.text, self.line);
+        let text = self.chunk.text.get(span.range()).unwrap_or("");
+        let before = (text.len() - text.trim_start().len()) as u32;
+        let after = (text.len() - text.trim_end().len()) as u32;
+        if before as usize == text.len() {
+            return span.shifted(self.start);
+        }
+        Span::new(span.start + before, span.end - after).shifted(self.start)
+    }
+    fn word(&self, letter: u8) -> Option<Span> {
+        if !self.exists() {
+            return None;
+        }
+        let word = self.scan().words(self.line).iter().find(|w| w.letter == letter)?;
+        let span = self.scan().word_span(&self.chunk.text, self.line, word);
+        let text = self.chunk.text.get(span.range()).unwrap_or("");
+        let blank = (text.len() - text.trim_end().len()) as u32;
+        Some(Span::new(span.start, span.end - blank).shifted(self.start))
+    }
+    fn diagnostic(&self, found: &Found, file: FileId) -> Diagnostic {
+        let exact = found.span.map(|s| s.shifted(self.line_start()));
+        let span = exact.or_else(|| self.word(found.letter?)).unwrap_or_else(|| self.line_span());
+        let mut d = Diagnostic::new(found.code, file, span, &found.args);
+        for (letters, text) in remarks(found.code) {
+            let spans: Vec<Span> = letters.iter().filter_map(|l| self.word(*l)).collect();
+            let (Some(from), Some(to)) = (spans.iter().map(|s| s.start).min(), spans.iter().map(|s| s.end).max()) else { continue };
+            let place = Span::new(from, to);
+            if place.end <= span.start || place.start >= span.end {
+                d = d.label(file, place, *text);
+            }
+        }
+        d
+    }
+}
+
+/// Words that also have to do with a mistake, and what they are.
+fn remarks(code: Code) -> &'static [(&'static [u8], &'static str)] {
+    match code {
+        code::ARC_RADIUS_MISMATCH => &[(b"xyz", "the end point"), (b"ijk", "the centre, from the start point")],
+        code::ARC_RADIUS_TOO_SMALL => &[(b"xyz", "the end point"), (b"r", "the radius")],
+        _ => &[],
+    }
+}

@@ -1,0 +1,275 @@
+//! The salsa database: inputs and the queries about one chunk that need no interpretation.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use gr_gcode::{Form, Keyword, LineKind, Node, OLabel, Scan};
+use gr_spec::Dialect;
+
+/// Which query ran: for the tests and benchmarks that count re-executed queries.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Counted {
+    Scan,
+    Step,
+    Flow,
+    Timeline,
+}
+
+/// How often each kind of query was executed (not answered from memory).
+#[derive(Debug, Default)]
+pub(crate) struct Counters([AtomicU64; 4]);
+
+/// Number of executions of each kind of query since the session began.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct Executed {
+    /// Chunks scanned.
+    pub scans: u64,
+    /// Chunks interpreted.
+    pub steps: u64,
+    /// Stretches with control flow run.
+    pub flows: u64,
+    /// Files put together.
+    pub timelines: u64,
+}
+
+impl Counters {
+    pub(crate) fn get(&self) -> Executed {
+        let [scans, steps, flows, timelines] = [0, 1, 2, 3].map(|i: usize| self.0[i].load(Ordering::Relaxed));
+        Executed { scans, steps, flows, timelines }
+    }
+}
+
+/// What every query may ask of the database.
+#[salsa::db]
+pub(crate) trait Db: salsa::Database {
+    /// Notes that a query is executed.
+    fn count(&self, what: Counted);
+    /// Files found along the search path.
+    fn disk(&self) -> &crate::disk::Disk;
+}
+
+/// The database.
+#[salsa::db]
+#[derive(Clone, Default)]
+pub(crate) struct Database {
+    storage: salsa::Storage<Self>,
+    counters: Arc<Counters>,
+    disk: Arc<crate::disk::Disk>,
+}
+
+#[salsa::db]
+impl salsa::Database for Database {}
+
+#[salsa::db]
+impl Db for Database {
+    fn count(&self, what: Counted) {
+        self.counters.0[what as usize].fetch_add(1, Ordering::Relaxed);
+    }
+    fn disk(&self) -> &crate::disk::Disk {
+        &self.disk
+    }
+}
+
+impl Database {
+    pub(crate) fn executed(&self) -> Executed {
+        self.counters.get()
+    }
+}
+
+/// A chunk's text.
+#[salsa::input]
+pub(crate) struct ChunkText {
+    #[returns(ref)]
+    pub(crate) text: Arc<str>,
+}
+
+/// An open file.
+#[salsa::input]
+pub(crate) struct Document {
+    /// Its chunks in order.
+    #[returns(ref)]
+    pub(crate) chunks: Arc<[ChunkText]>,
+    /// What it is run with.
+    #[returns(copy)]
+    pub(crate) run: RunOptions,
+    /// Number of the file in the session.
+    #[returns(copy)]
+    pub(crate) id: u32,
+}
+
+/// What programs are run with.
+#[salsa::input]
+pub(crate) struct RunOptions {
+    /// Dialect, tools, parameters, INI file, budgets; and lint rules.
+    #[returns(ref)]
+    pub(crate) options: Arc<crate::Options>,
+    /// Raised when files on disk may have changed.
+    #[returns(copy)]
+    pub(crate) disk_revision: u64,
+}
+
+/// A dialect as a query argument.
+#[derive(Clone, Copy)]
+pub(crate) struct DialectKey(pub(crate) &'static Dialect);
+
+/// Tables of a chunk.
+#[salsa::tracked(returns(clone), no_eq)]
+pub(crate) fn scanned(db: &dyn Db, chunk: ChunkText, run: RunOptions) -> Arc<Scan> {
+    db.count(Counted::Scan);
+    Arc::new(gr_gcode::scan(chunk.text(db), run.options(db).setup.dialect))
+}
+
+/// What a chunk holds that matters to more than itself.
+#[derive(Clone, PartialEq, Eq, Debug, Default)]
+pub(crate) struct Shape {
+    /// Lines.
+    pub(crate) lines: u32,
+    /// Bytes.
+    pub(crate) bytes: u32,
+    /// Whether the first line that is not blank is `%`; none = all lines are blank.
+    pub(crate) first_text: Option<bool>,
+    /// The first line with words defines a subroutine.
+    pub(crate) begins_with_sub: bool,
+    /// Has words outside of subroutine definitions that begin and end in this chunk.
+    pub(crate) main_motion: bool,
+    /// Has a line that could not be read.
+    pub(crate) damaged: bool,
+    /// Something that may send execution elsewhere: the chunk can't be run alone.
+    pub(crate) control: bool,
+    /// Reads or writes parameters or the tool table, or may.
+    pub(crate) environment: bool,
+    /// Labels of subroutines defined and called, and N numbers that jumps could go to.
+    pub(crate) labels: Box<[Label]>,
+    /// A label that is computed.
+    pub(crate) computed: bool,
+    /// Has a jump to an N number.
+    pub(crate) jumps: bool,
+}
+
+/// A label of a chunk.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub(crate) struct Label {
+    pub(crate) name: Box<str>,
+    /// Line of the chunk.
+    pub(crate) line: u32,
+    pub(crate) kind: LabelKind,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum LabelKind {
+    Sub,
+    Call,
+    Number,
+}
+
+/// Shape of a chunk. Most edits leave it as it is.
+#[salsa::tracked(returns(ref))]
+pub(crate) fn shape(db: &dyn Db, chunk: ChunkText, run: RunOptions) -> Shape {
+    let scan = scanned(db, chunk, run);
+    shape_of(&scan, chunk.text(db), run.options(db).setup.dialect)
+}
+
+/// G-codes (times ten) that touch neither parameters nor the tool table.
+const PURE_G: &[i64] = &[
+    0, 10, 20, 30, 40, 170, 180, 190, 171, 181, 191, 200, 210, 400, 490, 610, 611, 640, 70, 80, 800, 810, 820, 830, 840, 850,
+    860, 890, 730, 740, 900, 910, 901, 911, 930, 940, 950, 960, 970, 980, 990, 531, 50, 51,
+];
+/// M-codes that touch neither.
+const PURE_M: &[i64] = &[0, 1, 3, 4, 5, 7, 8, 9, 48, 49, 50, 51, 52, 53];
+
+/// Whether running these words needs parameters or the tool table.
+fn word_is_pure(word: &gr_gcode::Word) -> bool {
+    if word.form == Form::Bad {
+        return true; // never carried out
+    }
+    match word.letter {
+        b'g' => word.form == Form::Literal && PURE_G.contains(&((word.value * 10.0).round() as i64)),
+        b'm' => word.form == Form::Literal && PURE_M.contains(&(word.value.round() as i64)),
+        b'(' | b';' | b'#' | b'o' => false,
+        _ => word.form == Form::Literal,
+    }
+}
+
+/// Whether a comment does more than comment.
+fn comment_acts(text: &str) -> bool {
+    let text = text.trim_start_matches(['(', ';', ' ', '\t']);
+    let word: String = text.chars().filter(|c| !c.is_whitespace()).take(9).collect::<String>().to_ascii_lowercase();
+    ["print", "debug", "log", "abort", "py", "probe"].iter().any(|w| word.starts_with(w))
+}
+
+pub(crate) fn shape_of(scan: &Scan, text: &str, dialect: &'static Dialect) -> Shape {
+    let mut shape = Shape { lines: scan.lines.len() as u32, bytes: text.len() as u32, damaged: !scan.faults.is_empty(), ..Shape::default() };
+    let mut labels = Vec::new();
+    let (mut depth, mut first_words) = (0, true);
+    let macros = dialect.family == gr_spec::Family::Fanuc;
+    for (n, line) in scan.lines.iter().enumerate() {
+        let n = n as u32;
+        if shape.first_text.is_none() && !text.get(scan.line_span(text, n).range()).unwrap_or("").trim().is_empty() {
+            shape.first_text = Some(line.kind == LineKind::Percent);
+        }
+        if line.kind == LineKind::Blank && scan.words(n).is_empty() {
+            continue;
+        }
+        let words = scan.words(n);
+        let keyword = words.iter().find(|w| w.form == Form::Control).and_then(|w| scan.controls.get(w.index())).map(|c| c.keyword);
+        let is_sub = keyword == Some(Keyword::Sub);
+        depth += i32::from(is_sub) - i32::from(keyword == Some(Keyword::Endsub));
+        let speaks = words.iter().any(|w| w.form != Form::Comment);
+        if speaks && first_words {
+            (shape.begins_with_sub, first_words) = (is_sub, false);
+        }
+        shape.main_motion |= speaks && depth == 0 && keyword.is_none();
+        for word in words {
+            match word.letter {
+                b'o' if word.form == Form::Control => {
+                    shape.control = true;
+                    shape.environment = true;
+                    control_label(scan, n, word, &mut shape, &mut labels);
+                }
+                b'm' if word.form != Form::Literal || matches!(word.value as i64, 98 | 99) => {
+                    shape.control = true;
+                    if let Some(p) = scan.words(n).iter().find(|w| w.letter == b'p' && w.form == Form::Literal) {
+                        let name = (p.value as i64).to_string().into();
+                        labels.push(Label { name, line: n, kind: LabelKind::Call });
+                        shape.jumps |= word.value as i64 == 99;
+                    }
+                }
+                b'n' if macros && word.form == Form::Literal => {
+                    labels.push(Label { name: word.value.to_string().into(), line: n, kind: LabelKind::Number });
+                }
+                b'(' | b';' => {
+                    let span = scan.word_span(text, n, word);
+                    shape.environment |= comment_acts(text.get(span.range()).unwrap_or(""));
+                }
+                _ => {}
+            }
+            if !matches!(word.letter, b'(' | b';') && !word_is_pure(word) {
+                shape.environment = true;
+            }
+        }
+    }
+    shape.labels = labels.into();
+    shape
+}
+
+fn control_label(scan: &Scan, line: u32, word: &gr_gcode::Word, shape: &mut Shape, labels: &mut Vec<Label>) {
+    let Some(control) = scan.controls.get(word.index()) else { return };
+    shape.jumps |= matches!(control.keyword, Keyword::MacroGoto | Keyword::MacroIfGoto);
+    let name: Box<str> = match control.label {
+        OLabel::Named(i) => scan.names.get(i as usize).cloned().unwrap_or_default(),
+        OLabel::Number(id) => match scan.nodes.get(id.0 as usize) {
+            Some(Node::Number(v)) => v.to_string().into(),
+            _ => {
+                shape.computed = true;
+                return;
+            }
+        },
+        OLabel::None => return,
+    };
+    let kind = match control.keyword {
+        Keyword::Sub => LabelKind::Sub,
+        Keyword::Call => LabelKind::Call,
+        _ => return,
+    };
+    labels.push(Label { name, line, kind });
+}

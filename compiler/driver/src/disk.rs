@@ -1,0 +1,94 @@
+//! Files that programs pull in by themselves: external subroutines, found along the search path.
+
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use gr_canon::FileId;
+use gr_gcode::{Chunk, File};
+use gr_spec::Dialect;
+
+/// Every file of a session by number: open ones and those found on disk.
+#[derive(Debug, Default)]
+pub(crate) struct Disk {
+    files: Mutex<Vec<Known>>,
+}
+
+#[derive(Clone, Debug)]
+struct Known {
+    path: Box<str>,
+    /// The contents, when the file was read from disk and is not open.
+    contents: Option<Arc<File>>,
+}
+
+/// Lines in a chunk of a subroutine file.
+const CHUNK: usize = 1024;
+
+impl Disk {
+    fn lock(&self) -> std::sync::MutexGuard<'_, Vec<Known>> {
+        self.files.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+    /// A number for an open file.
+    pub(crate) fn register(&self, path: &str) -> FileId {
+        let mut files = self.lock();
+        if let Some(at) = files.iter().position(|k| &*k.path == path) {
+            files[at].contents = None;
+            return FileId(at as u32);
+        }
+        files.push(Known { path: path.into(), contents: None });
+        FileId(files.len() as u32 - 1)
+    }
+    /// Path of a file as given.
+    pub(crate) fn path(&self, id: FileId) -> Option<Box<str>> {
+        self.lock().get(id.0 as usize).map(|k| k.path.clone())
+    }
+    /// Contents of a file read from disk.
+    pub(crate) fn contents(&self, id: FileId) -> Option<Arc<File>> {
+        self.lock().get(id.0 as usize)?.contents.clone()
+    }
+    /// The first of `candidates` that can be read.
+    pub(crate) fn find(&self, candidates: &[PathBuf], dialect: &'static Dialect) -> Option<(FileId, Arc<File>)> {
+        candidates.iter().find_map(|path| self.load(path, dialect))
+    }
+    fn load(&self, path: &Path, dialect: &'static Dialect) -> Option<(FileId, Arc<File>)> {
+        let name = path.to_string_lossy();
+        let known = self.lock().iter().position(|k| *k.path == *name);
+        if let Some(at) = known
+            && let Some(file) = self.contents(FileId(at as u32))
+        {
+            return Some((FileId(at as u32), file));
+        }
+        if !path.is_file() {
+            return None;
+        }
+        let text = gr_text::decode(std::fs::read(path).ok()?).text;
+        let file = Arc::new(file_of(&name, &text, CHUNK, dialect));
+        let mut files = self.lock();
+        let at = known.unwrap_or(files.len());
+        let entry = Known { path: (*name).into(), contents: Some(file.clone()) };
+        if at == files.len() {
+            files.push(entry);
+        } else {
+            files[at] = entry;
+        }
+        Some((FileId(at as u32), file))
+    }
+    /// Forgets what was read from disk; the numbers stay.
+    pub(crate) fn forget(&self) {
+        self.lock().iter_mut().for_each(|k| k.contents = None);
+    }
+}
+
+/// Scans a whole text.
+pub(crate) fn file_of(path: &str, text: &str, lines_per_chunk: usize, dialect: &'static Dialect) -> File {
+    let chunks = crate::store::split(text, lines_per_chunk)
+        .into_iter()
+        .map(|part| Chunk { text: part.into(), scan: Arc::new(gr_gcode::scan(part, dialect)) })
+        .collect();
+    File::new(path, chunks)
+}
+
+/// Where an external subroutine may be: beside the main program, and along `[RS274NGC] SUBROUTINE_PATH`.
+pub(crate) fn candidates(setup: &gr_interp::Setup, main: &str, name: &str) -> Vec<PathBuf> {
+    let file = format!("{name}.ngc");
+    gr_interp::subroutine_paths(setup, Path::new(main)).into_iter().map(|folder| folder.join(&file)).collect()
+}

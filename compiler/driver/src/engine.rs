@@ -1,0 +1,415 @@
+//! The interpreter as the queries use it: one chunk, or the program from a chunk on.
+
+use std::hash::{Hash, Hasher};
+use std::sync::Arc;
+
+use gr_canon::{At, Call, CallFrame, Discard, FileId, FrameId, Mark, Sink};
+use gr_gcode::{Chunk, File, LineKind};
+use gr_interp::{Files, Finding, Interp, Modal, Params, State, run_chunk};
+use gr_spec::code;
+
+use crate::Options;
+use crate::db::{Db, Shape};
+use crate::lints::{Flags, Found, Lints, Summary, Where, left_on};
+
+/// State between two chunks: the interpreter's, and what lints remember.
+#[derive(Clone, Debug)]
+pub(crate) struct Boundary {
+    state: Arc<State>,
+    pub(crate) flags: Flags,
+    /// The opening `%` is still to come.
+    opening: bool,
+    key: Box<[u8]>,
+}
+
+impl Boundary {
+    fn new(mut state: State, flags: Flags, opening: bool) -> Boundary {
+        // The N number of the last block is of no use to the next one.
+        state.modal.n_number = -1;
+        let key = state.key_bytes().into();
+        Boundary { state: Arc::new(state), flags, opening, key }
+    }
+    pub(crate) fn modal(&self) -> &Modal {
+        &self.state.modal
+    }
+}
+
+impl PartialEq for Boundary {
+    fn eq(&self, other: &Boundary) -> bool {
+        self.flags == other.flags
+            && self.opening == other.opening
+            && self.key == other.key
+            && self.state.queue == other.state.queue
+    }
+}
+
+impl Eq for Boundary {}
+
+impl Hash for Boundary {
+    fn hash<H: Hasher>(&self, h: &mut H) {
+        // Position, feed and spindle come first in the key; a part of it tells most states apart.
+        let mut hasher = rustc_hash::FxHasher::default();
+        self.key.hash(&mut hasher);
+        h.write_u64(hasher.finish());
+        self.flags.hash(h);
+    }
+}
+
+/// Parameters between two chunks.
+#[derive(Clone, Debug)]
+pub(crate) struct Environment {
+    params: Params,
+}
+
+impl PartialEq for Environment {
+    fn eq(&self, other: &Environment) -> bool {
+        self.params == other.params
+    }
+}
+
+impl Eq for Environment {}
+
+impl Hash for Environment {
+    fn hash<H: Hasher>(&self, h: &mut H) {
+        h.write_u64(self.params.content_hash());
+    }
+}
+
+/// How a program ended.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) struct End {
+    /// Line of the block.
+    pub(crate) line: u32,
+    /// A fault stopped it.
+    pub(crate) stopped: bool,
+    /// It was M2 or M30.
+    pub(crate) program: bool,
+}
+
+impl End {
+    pub(crate) fn shifted(self, by: u32) -> End {
+        End { line: self.line + by, ..self }
+    }
+    fn of(end: gr_interp::End, line: u32) -> Option<End> {
+        Some(match end {
+            gr_interp::End::Chunk => return None,
+            gr_interp::End::Fault => End { line, stopped: true, program: false },
+            gr_interp::End::Program => End { line, stopped: false, program: true },
+            gr_interp::End::Percent => End { line, stopped: false, program: false },
+        })
+    }
+}
+
+/// What a chunk gave.
+pub(crate) struct StepOutcome {
+    pub(crate) boundary: Boundary,
+    pub(crate) environment: Option<Environment>,
+    pub(crate) found: Vec<Found>,
+    pub(crate) summary: Summary,
+    pub(crate) end: Option<End>,
+    /// Parameters were touched although none were given: the step has to be done again with them.
+    pub(crate) impure: bool,
+}
+
+/// Remembers which line spoke last.
+struct LastLine<S> {
+    inner: S,
+    line: u32,
+}
+
+impl<S: Sink> Sink for LastLine<S> {
+    #[inline]
+    fn call(&mut self, at: &At<'_>, call: &Call) {
+        self.line = at.line;
+        self.inner.call(at, call);
+    }
+    fn frame(&mut self, id: FrameId, frame: &CallFrame) {
+        self.inner.frame(id, frame);
+    }
+    fn mark(&mut self, at: &At<'_>, mark: &Mark) {
+        self.inner.mark(at, mark);
+    }
+    fn print(&mut self, text: &str) {
+        self.inner.print(text);
+    }
+}
+
+/// State before the first block of a program that begins with `%` or not.
+pub(crate) fn start(options: &Options, percent: bool) -> (Boundary, Environment) {
+    let text = if percent { "%\n" } else { "(x)\n" };
+    let mut files = Single::new(crate::disk::file_of("", text, 1, options.setup.dialect));
+    let mut interp = Interp::new(&mut files, &options.setup, Discard);
+    interp.init();
+    // It can't fail: the text has a line.
+    let _ = interp.open(FileId(0));
+    let state = interp.state();
+    let params = interp.params().clone();
+    (Boundary::new(state, Flags::default(), percent), Environment { params })
+}
+
+/// One file that calls nothing.
+struct Single(File);
+
+impl Single {
+    fn new(file: File) -> Single {
+        Single(file)
+    }
+}
+
+impl Files for Single {
+    fn file(&self, _id: FileId) -> &File {
+        &self.0
+    }
+    fn find_sub(&mut self, _name: &str) -> Option<FileId> {
+        None
+    }
+}
+
+/// The chunk without its opening `%`, and whether the opening is still to come after it.
+fn opened(chunk: &Chunk) -> (Chunk, bool) {
+    let mut scan = (*chunk.scan).clone();
+    match scan.lines.iter_mut().find(|l| l.kind == LineKind::Percent) {
+        Some(line) => line.kind = LineKind::Blank,
+        None => return (chunk.clone(), true),
+    }
+    (Chunk { text: chunk.text.clone(), scan: Arc::new(scan) }, false)
+}
+
+/// Interprets a chunk that has no control flow.
+pub(crate) fn step(chunk: &Chunk, entry: &Boundary, env: Option<&Environment>, options: &Options) -> StepOutcome {
+    let (chunk, opening) = if entry.opening { opened(chunk) } else { (chunk.clone(), false) };
+    let mut lints = LastLine { inner: Lints::new(&options.rules, &entry.state.modal, entry.flags), line: 0 };
+    let nothing = Params::default();
+    let params = env.map_or(&nothing, |e| &e.params);
+    let exit = run_chunk(&chunk, &entry.state, params, &options.setup, &mut lints);
+    let touched = exit.open_ended || !exit.reads.is_empty() || !exit.writes.is_empty();
+    let mut found: Vec<Found> = exit.findings.iter().filter_map(|f| of_finding(f, options)).collect();
+    let fault_line = exit.findings.last().map_or(0, |f| f.line);
+    let line = match exit.end {
+        gr_interp::End::Fault => fault_line,
+        gr_interp::End::Percent => percent_line(&chunk),
+        _ => lints.line,
+    };
+    found.extend(lints.inner.found);
+    found.sort_by_key(|f| f.place.line);
+    StepOutcome {
+        boundary: Boundary::new(exit.state, lints.inner.flags, opening),
+        environment: env.filter(|_| touched).map(|_| Environment { params: exit.params }),
+        found,
+        summary: lints.inner.summary,
+        end: End::of(exit.end, line),
+        impure: env.is_none() && touched,
+    }
+}
+
+fn percent_line(chunk: &Chunk) -> u32 {
+    chunk.scan.lines.iter().position(|l| l.kind == LineKind::Percent).unwrap_or(0) as u32
+}
+
+fn of_finding(f: &Finding, options: &Options) -> Option<Found> {
+    let code = f.fault.code;
+    let severity = match options.rules.severity(code) {
+        None if !code.def().lint => code.def().severity,
+        severity => severity?,
+    };
+    Some(Found {
+        code,
+        severity,
+        place: Where { file: f.file, line: f.line, frame: f.frame },
+        letter: f.fault.letter,
+        span: f.span,
+        args: f.fault.message_args().to_vec(),
+    })
+}
+
+/// What a stretch with control flow gave.
+pub(crate) struct FlowOutcome {
+    pub(crate) boundary: Boundary,
+    pub(crate) environment: Environment,
+    pub(crate) found: Vec<Found>,
+    pub(crate) frames: Vec<(FrameId, CallFrame)>,
+    pub(crate) summary: Summary,
+    pub(crate) end: Option<End>,
+    pub(crate) resume: Option<u32>,
+}
+
+/// Where a run with control flow begins.
+pub(crate) struct Stretch<'a> {
+    pub(crate) db: &'a dyn Db,
+    pub(crate) main: FileId,
+    pub(crate) file: Arc<File>,
+    /// First chunk.
+    pub(crate) chunk: usize,
+    /// Chunks that can be run alone.
+    pub(crate) alone: &'a [bool],
+    pub(crate) entry: &'a Boundary,
+    pub(crate) env: &'a Environment,
+    pub(crate) options: &'a Options,
+}
+
+/// The files a run may need: the main one, and others as they are called.
+pub(crate) struct Library<'a> {
+    db: &'a dyn Db,
+    options: &'a Options,
+    main: FileId,
+    file: Arc<File>,
+    found: Vec<(FileId, Arc<File>)>,
+    empty: File,
+}
+
+impl<'a> Library<'a> {
+    pub(crate) fn new(db: &'a dyn Db, options: &'a Options, main: FileId, file: Arc<File>) -> Library<'a> {
+        Library { db, options, main, file, found: Vec::new(), empty: File::default() }
+    }
+}
+
+impl Files for Library<'_> {
+    fn file(&self, id: FileId) -> &File {
+        if id == self.main {
+            return &self.file;
+        }
+        self.found.iter().find(|(i, _)| *i == id).map_or(&self.empty, |(_, f)| f)
+    }
+    fn find_sub(&mut self, name: &str) -> Option<FileId> {
+        let main = self.db.disk().path(self.main).unwrap_or_default();
+        let candidates = crate::disk::candidates(&self.options.setup, &main, name);
+        let (id, file) = self.db.disk().find(&candidates, self.options.setup.dialect)?;
+        if id != self.main && !self.found.iter().any(|(i, _)| *i == id) {
+            self.found.push((id, file));
+        }
+        Some(id)
+    }
+}
+
+/// Keeps the call tree, and gives way when the work is cancelled.
+struct Watch<'a, S> {
+    inner: S,
+    db: &'a dyn Db,
+    frames: Vec<(FrameId, CallFrame)>,
+    calls: u32,
+}
+
+/// Frames that are kept: enough for every finding that is shown.
+const MOST_FRAMES: usize = 100_000;
+
+impl<S: Sink> Sink for Watch<'_, S> {
+    #[inline]
+    fn call(&mut self, at: &At<'_>, call: &Call) {
+        self.calls += 1;
+        if self.calls % 4096 == 0 {
+            self.db.unwind_if_revision_cancelled();
+        }
+        self.inner.call(at, call);
+    }
+    fn frame(&mut self, id: FrameId, frame: &CallFrame) {
+        if self.frames.len() < MOST_FRAMES {
+            self.frames.push((id, frame.clone()));
+        }
+    }
+}
+
+/// Runs the program from the start of a chunk until it may be taken chunk by chunk again.
+pub(crate) fn flow(stretch: &Stretch<'_>) -> FlowOutcome {
+    let Stretch { db, main, file, chunk, alone, entry, env, options } = stretch;
+    let mut file = file.clone();
+    if entry.opening {
+        file = Arc::new(without_opening(&file));
+    }
+    let first_lines = file.first_lines.clone();
+    let mut library = Library::new(*db, options, *main, file);
+    let lints = Lints::new(&options.rules, &entry.state.modal, entry.flags);
+    let watch = Watch { inner: LastLine { inner: lints, line: 0 }, db: *db, frames: Vec::new(), calls: 0 };
+    let state = (*entry.state).clone();
+    let mut interp = Interp::resume(&mut library, &options.setup, watch, state, env.params.clone(), *main, first_lines[*chunk]);
+    let (mut end, mut resume) = (None, None);
+    while end.is_none() {
+        end = interp.run_to_border();
+        let border = interp.next_line();
+        if end.is_none()
+            && interp.is_outside()
+            && let Ok(next) = first_lines.binary_search(&border)
+            && next > *chunk
+            && alone.get(next) == Some(&true)
+        {
+            resume = Some(next as u32);
+            break;
+        }
+    }
+    let state = interp.state();
+    let params = interp.params().clone();
+    let findings = interp.take_findings();
+    let watch = interp.into_sink();
+    let LastLine { inner: lints, line } = watch.inner;
+    let mut found: Vec<Found> = findings.iter().filter_map(|f| of_finding(f, options)).collect();
+    found.extend(lints.found);
+    let line = if end == Some(gr_interp::End::Fault) { findings.last().map_or(line, |f| f.line) } else { line };
+    FlowOutcome {
+        boundary: Boundary::new(state, lints.flags, false),
+        environment: Environment { params },
+        found,
+        frames: watch.frames,
+        summary: lints.summary,
+        end: end.and_then(|e| End::of(e, line)),
+        resume,
+    }
+}
+
+fn without_opening(file: &File) -> File {
+    let mut file = file.clone();
+    for chunk in &mut file.chunks {
+        let (blanked, still) = opened(chunk);
+        *chunk = blanked;
+        if !still {
+            break;
+        }
+    }
+    file
+}
+
+/// What is known when every chunk was looked at.
+pub(crate) struct Finish<'a> {
+    pub(crate) shapes: &'a [&'a Shape],
+    pub(crate) starts: &'a [(u32, u32)],
+    pub(crate) options: &'a Options,
+    pub(crate) modal: &'a Modal,
+    pub(crate) end: Option<End>,
+}
+
+/// What can be said only about a whole file: its end, and its labels.
+pub(crate) fn finish(context: &Finish<'_>) -> Vec<Found> {
+    let mut found = Vec::new();
+    let rules = &context.options.rules;
+    let last_line = context.starts.last().map_or(0, |s| s.0).saturating_sub(1);
+    match context.end {
+        Some(end) if !end.stopped && !end.program => {
+            found.extend(left_on(context.modal, place(end.line), rules));
+        }
+        Some(_) => {}
+        None => {
+            found.extend(left_on(context.modal, place(last_line), rules));
+            found.extend(no_end(context, last_line));
+        }
+    }
+    crate::lints::labels(context.shapes, context.starts, context.options, &mut found);
+    found
+}
+
+fn place(line: u32) -> Where {
+    Where { file: FileId::default(), line, frame: FrameId::MAIN }
+}
+
+/// The file ended without M2, M30 or `%`.
+fn no_end(context: &Finish<'_>, line: u32) -> Option<Found> {
+    let strict = context.options.setup.dialect.needs_end && !only_subs(context.shapes);
+    let code = if strict { code::PROGRAM_ENDS_EARLY } else { code::PROGRAM_END_MISSING };
+    let severity = match context.options.rules.severity(code) {
+        None if strict => code.def().severity,
+        severity => severity?,
+    };
+    Some(Found { code, severity, place: place(line), letter: None, span: None, args: Vec::new() })
+}
+
+/// A file of subroutines: it begins with one.
+fn only_subs(shapes: &[&Shape]) -> bool {
+    shapes.iter().find(|s| s.first_text.is_some()).is_some_and(|s| s.begins_with_sub)
+}

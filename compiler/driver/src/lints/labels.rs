@@ -1,0 +1,57 @@
+//! Labels of the whole file: N numbers used twice where jumps look for them, subroutines that nobody calls.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use gr_spec::{Code, Family, code};
+
+use super::{Found, Where};
+use crate::Options;
+use crate::db::{Label, LabelKind, Shape};
+
+/// Looks through the labels of all chunks.
+pub(crate) fn labels(shapes: &[&Shape], starts: &[(u32, u32)], options: &Options, found: &mut Vec<Found>) {
+    if shapes.iter().all(|s| s.labels.is_empty()) {
+        return;
+    }
+    let all = || shapes.iter().zip(starts).flat_map(|(s, start)| s.labels.iter().map(|l| (l, start.0 + l.line)));
+    let mut report = |code: Code, line: u32, letter: u8, name: &str| {
+        if let Some(severity) = options.rules.severity(code) {
+            let place = Where { line, ..Where::default() };
+            found.push(Found { code, severity, place, letter: Some(letter), span: None, args: vec![name.to_string()] });
+        }
+    };
+    if options.setup.dialect.family == Family::Fanuc && shapes.iter().any(|s| s.jumps) {
+        let mut seen = BTreeSet::new();
+        for (label, line) in all().filter(|(l, _)| l.kind == LabelKind::Number) {
+            if !seen.insert(&label.name) {
+                report(code::BLOCK_DUPLICATE_NUMBER, line, b'n', &label.name);
+            }
+        }
+    }
+    unused_subs(all(), shapes, &mut report);
+}
+
+fn unused_subs<'a>(
+    all: impl Iterator<Item = (&'a Label, u32)>,
+    shapes: &[&Shape],
+    report: &mut impl FnMut(Code, u32, u8, &str),
+) {
+    let mut subs = BTreeMap::new();
+    let mut calls = BTreeSet::new();
+    for (label, line) in all {
+        match label.kind {
+            LabelKind::Sub => _ = subs.entry(&label.name).or_insert(line),
+            LabelKind::Call => _ = calls.insert(&label.name),
+            LabelKind::Number => {}
+        }
+    }
+    // A library of subroutines is called from elsewhere, and a computed label may be any.
+    if shapes.iter().any(|s| s.computed) || !shapes.iter().any(|s| s.main_motion) {
+        return;
+    }
+    let mut unused: Vec<_> = subs.into_iter().filter(|(name, _)| !calls.contains(name)).collect();
+    unused.sort_by_key(|(_, line)| *line);
+    for (name, line) in unused {
+        report(code::SUB_UNUSED, line, b'o', &format!("o{name}"));
+    }
+}

@@ -1,0 +1,318 @@
+//! Machinist's lints: what the controller accepts and someone should look at.
+//!
+//! They read the canonical stream, like every back end. What a lint remembers from block to block is either
+//! in the interpreter's modal state already (spindle, coolant, offsets) or one bit of [`Flags`], so that the
+//! state between two chunks converges quickly after an edit. Lints that compare distant parts of a program
+//! (a rapid against everything cut before it) leave a [`Summary`] of each chunk and are decided when the
+//! chunks are put together. One file per lint; each is a row of `spec/diagnostics/e02-lints.toml`.
+
+mod coolant;
+mod cut;
+mod end;
+mod feed;
+mod labels;
+mod path;
+mod rules;
+mod spindle;
+mod stock;
+mod tool;
+mod travel;
+mod units;
+
+use gr_canon::{At, Call, FileId, FrameId, Mark, Plane, Sink, Units};
+use gr_interp::Modal;
+use gr_spec::{Code, Severity};
+
+pub(crate) use end::left_on;
+pub(crate) use labels::labels;
+pub use rules::{Level, Rules};
+pub(crate) use stock::{Cuts, Dive};
+pub(crate) use travel::Limits;
+
+/// What lints remember from chunk to chunk.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Default)]
+pub(crate) struct Flags(u32);
+
+impl Flags {
+    /// The program has used the spindle.
+    pub(crate) const SPINDLE_USED: u32 = 1;
+    /// Cutting with a stopped spindle was reported; until it starts.
+    pub(crate) const STOPPED_TOLD: u32 = 1 << 1;
+    /// The tool was changed and its length not applied yet.
+    pub(crate) const LENGTH_OPEN: u32 = 1 << 2;
+    /// G20 or G21 was there, or its absence was reported.
+    pub(crate) const UNITS_DONE: u32 = 1 << 3;
+    /// Dry cutting was reported; until the tool is changed.
+    pub(crate) const DRY_TOLD: u32 = 1 << 4;
+    /// A cut before the first use of the spindle was seen.
+    pub(crate) const BARE_CUT: u32 = 1 << 5;
+    /// A feed per revolution too large was reported; until F or the mode changes.
+    pub(crate) const REVOLUTION_TOLD: u32 = 1 << 6;
+    /// First bit of the six that say: beyond the low/high limit of X, Y, Z was reported.
+    pub(crate) const BEYOND: u32 = 1 << 8;
+
+    pub(crate) fn has(self, bit: u32) -> bool {
+        self.0 & bit != 0
+    }
+    pub(crate) fn set(&mut self, bit: u32, on: bool) {
+        if on {
+            self.0 |= bit;
+        } else {
+            self.0 &= !bit;
+        }
+    }
+}
+
+/// A finding of a lint or of the interpreter.
+#[derive(Clone, PartialEq, Debug)]
+pub(crate) struct Found {
+    pub(crate) code: Code,
+    pub(crate) severity: Severity,
+    pub(crate) place: Where,
+    /// Word to underline, none = the whole block.
+    pub(crate) letter: Option<u8>,
+    /// Exact place, relative to the chunk.
+    pub(crate) span: Option<gr_text::Span>,
+    pub(crate) args: Vec<String>,
+}
+
+/// Where a call came from.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub(crate) struct Where {
+    pub(crate) file: FileId,
+    pub(crate) line: u32,
+    pub(crate) frame: FrameId,
+}
+
+impl From<&At<'_>> for Where {
+    fn from(at: &At<'_>) -> Where {
+        Where { file: at.file, line: at.line, frame: at.frame }
+    }
+}
+
+/// What a chunk leaves for lints that compare distant parts of a program.
+#[derive(Clone, PartialEq, Debug, Default)]
+pub(crate) struct Summary {
+    /// The first cut while the spindle was not used yet.
+    pub(crate) bare_cut: Option<Where>,
+    /// The spindle is started in this chunk.
+    pub(crate) spindle_starts: bool,
+    /// What was cut since the last change of frame in this chunk.
+    pub(crate) cuts: Cuts,
+    /// The frame changed in this chunk.
+    pub(crate) new_frame: bool,
+    /// Rapids that go deeper than what this chunk cut before them.
+    pub(crate) dives: Vec<Dive>,
+}
+
+/// The sink that the lints watch the stream through.
+pub(crate) struct Lints<'a> {
+    pub(crate) rules: &'a Rules,
+    pub(crate) flags: Flags,
+    pub(crate) found: Vec<Found>,
+    pub(crate) summary: Summary,
+    /// Position in the active work frame and program units.
+    position: [f64; 3],
+    /// G5x, G92 and tool offsets, summed when needed.
+    origin: [f64; 3],
+    g92: [f64; 3],
+    tool_offset: [f64; 3],
+    rotation: f64,
+    turning: u8,
+    /// Line of the last spindle stop, and whether a spindle turned then.
+    last_stop: Option<(u32, bool)>,
+    compensation: bool,
+    mist: bool,
+    flood: bool,
+    feed_per_revolution: bool,
+    feed: f64,
+    units: Units,
+    plane: Plane,
+    tool: i32,
+}
+
+fn xyz(axes: &[f64]) -> [f64; 3] {
+    [axes[0], axes[1], axes[2]]
+}
+
+impl<'a> Lints<'a> {
+    /// Starts from the state before a block.
+    pub(crate) fn new(rules: &'a Rules, state: &Modal, flags: Flags) -> Lints<'a> {
+        Lints {
+            rules,
+            flags,
+            found: Vec::new(),
+            summary: Summary::default(),
+            position: xyz(&state.current),
+            origin: xyz(&state.origin),
+            g92: xyz(&state.g92),
+            tool_offset: xyz(&state.tool_offset),
+            rotation: state.rotation,
+            turning: state.turning.iter().enumerate().fold(0, |a, (i, t)| a | (u8::from(*t != 0) << i)),
+            last_stop: None,
+            compensation: state.comp_side != 0,
+            mist: state.mist != 0,
+            flood: state.flood != 0,
+            feed_per_revolution: state.feed_mode == 2,
+            feed: state.feed,
+            units: state.units(),
+            plane: state.plane(),
+            tool: state.selected_tool,
+        }
+    }
+
+    fn report(&mut self, code: Code, at: &At<'_>, letter: Option<u8>, args: &[String]) {
+        if let Some(severity) = self.rules.severity(code) {
+            self.found.push(Found { code, severity, place: at.into(), letter, span: None, args: args.to_vec() });
+        }
+    }
+
+    /// Millimetres in one program unit.
+    fn unit(&self) -> f64 {
+        if self.units == Units::Inch { 25.4 } else { 1.0 }
+    }
+
+    /// A feed move to `end`.
+    #[inline]
+    fn cut(&mut self, at: &At<'_>, end: [f64; 3]) {
+        cut::check(self, at, end);
+        self.position = end;
+    }
+
+    fn arc_end(&self, first: f64, second: f64, axis: f64) -> [f64; 3] {
+        match self.plane {
+            Plane::Yz | Plane::Vw => [axis, first, second],
+            Plane::Xz | Plane::Uw => [second, axis, first],
+            Plane::Xy | Plane::Uv => [first, second, axis],
+        }
+    }
+
+    fn frame_changed(&mut self) {
+        self.summary.new_frame = true;
+        self.summary.cuts = Cuts::default();
+    }
+}
+
+impl Sink for Lints<'_> {
+    #[inline]
+    fn call(&mut self, at: &At<'_>, call: &Call) {
+        match call {
+            Call::StraightFeed(end) => {
+                let end = xyz(end);
+                travel::check(self, at, end);
+                self.cut(at, end);
+            }
+            Call::StraightTraverse(end) => {
+                let end = xyz(end);
+                units::check(self, at);
+                travel::check(self, at, end);
+                stock::rapid(self, at, end);
+                self.position = end;
+            }
+            other => self.rare(at, other),
+        }
+    }
+
+    fn mark(&mut self, _at: &At<'_>, _mark: &Mark) {}
+}
+
+impl Lints<'_> {
+    fn rare(&mut self, at: &At<'_>, call: &Call) {
+        match call {
+            Call::ArcFeed { first_end, second_end, first_axis, second_axis, rotation, axis_end, .. } => {
+                let end = self.arc_end(*first_end, *second_end, *axis_end);
+                travel::check_arc(self, at, end, [*first_axis, *second_axis], *rotation);
+                self.cut(at, end);
+            }
+            Call::NurbsFeed(curve) => {
+                if let Some([x, y, _]) = curve.points.last() {
+                    let end = [*x, *y, self.position[2]];
+                    self.cut(at, end);
+                }
+            }
+            Call::RigidTap(end, _) => {
+                travel::check(self, at, *end);
+                // The tap comes back to where it started.
+            }
+            Call::StraightProbe(end, _) => self.position = xyz(end),
+            Call::UseLengthUnits(units) => {
+                let factor = self.unit();
+                self.units = *units;
+                let factor = factor / self.unit();
+                for v in [&mut self.position, &mut self.origin, &mut self.g92, &mut self.tool_offset] {
+                    v.iter_mut().for_each(|x| *x *= factor);
+                }
+                self.flags.set(Flags::UNITS_DONE, true);
+                self.frame_changed();
+            }
+            Call::SelectPlane(plane) => self.plane = *plane,
+            Call::SetG5xOffset(_, offset) => {
+                let old = std::mem::replace(&mut self.origin, xyz(offset));
+                self.moved_frame(old, self.origin);
+            }
+            Call::SetG92Offset(offset) => {
+                let old = std::mem::replace(&mut self.g92, xyz(offset));
+                self.moved_frame(old, self.g92);
+            }
+            Call::UseToolLengthOffset(offset) => {
+                let new = xyz(offset);
+                for (position, (old, new)) in self.position.iter_mut().zip(self.tool_offset.iter().zip(new)) {
+                    *position += old - new;
+                }
+                self.tool_offset = new;
+                self.flags.set(Flags::LENGTH_OPEN, false);
+            }
+            Call::SetXyRotation(angle) => {
+                if *angle != self.rotation {
+                    self.rotation = *angle;
+                    self.frame_changed();
+                }
+            }
+            Call::SetFeedMode(_, mode) => {
+                self.feed_per_revolution = *mode == 1;
+                self.flags.set(Flags::REVOLUTION_TOLD, false);
+            }
+            Call::SetFeedRate(feed) => {
+                self.feed = *feed;
+                self.flags.set(Flags::REVOLUTION_TOLD, false);
+            }
+            Call::SetMotionControlMode(mode) => path::check(self, at, *mode),
+            Call::ChangeTool(_) => tool::changed(self),
+            Call::SelectTool(tool) => self.tool = *tool,
+            Call::MistOn => self.mist = true,
+            Call::MistOff => self.mist = false,
+            Call::FloodOn => self.flood = true,
+            Call::FloodOff => self.flood = false,
+            Call::ProgramEnd => end::program_end(self, at),
+            Call::Comment(text) => self.remark(text),
+            _ => spindle::watch(self, at, call),
+        }
+    }
+
+    /// What the interpreter remarks about compensation.
+    fn remark(&mut self, text: &str) {
+        if let Some(rest) = text.strip_prefix("interpreter: cutter radius compensation ") {
+            self.compensation = !rest.starts_with("off");
+        }
+    }
+
+    fn moved_frame(&mut self, old: [f64; 3], new: [f64; 3]) {
+        if old != new {
+            for (position, (old, new)) in self.position.iter_mut().zip(old.iter().zip(new)) {
+                *position += old - new;
+            }
+            self.frame_changed();
+        }
+    }
+
+    /// Whether the stop that belongs to M2 or M30 on this line found the spindle turning.
+    fn stopped_by_end(&self, line: u32) -> bool {
+        self.last_stop == Some((line, true))
+    }
+}
+
+/// Cutting before the spindle is started for the first time.
+pub(crate) fn stopped_at(place: Where, rules: &Rules) -> Option<Found> {
+    let code = gr_spec::code::SPINDLE_STOPPED;
+    Some(Found { code, severity: rules.severity(code)?, place, letter: None, span: None, args: Vec::new() })
+}

@@ -1,0 +1,195 @@
+//! The one owner of the database: open files, edits, and what can be asked of them.
+
+use std::ops::Range;
+use std::path::Path;
+use std::sync::Arc;
+
+use gr_interp::Setup;
+use gr_text::{Diagnostic, FileId};
+use salsa::Setter as _;
+
+use crate::check::{self, Check};
+use crate::db::{ChunkText, Database, Db as _, Document, Executed, RunOptions};
+use crate::lints::{Limits, Rules};
+use crate::store::{Store, Texts, chunk_lines};
+
+/// What a file is run with.
+#[derive(Clone, Debug, Default)]
+pub struct Options {
+    /// Dialect, tools, parameters, INI file, budgets.
+    pub setup: Setup,
+    /// Which lints, how severe.
+    pub rules: Rules,
+    /// Lines in a chunk; none = by the size of the file. Results never depend on it.
+    pub chunk_lines: Option<usize>,
+}
+
+impl Options {
+    /// Options for a setup; `check` wants to find more than one error, so the run goes on after one.
+    pub fn new(setup: Setup) -> Options {
+        let mut options = Options { setup, ..Options::default() };
+        options.setup.keep_going = true;
+        options.rules.limits = Limits::of(&options.setup.ini);
+        options
+    }
+}
+
+#[derive(Clone)]
+struct Open {
+    document: Document,
+    run: RunOptions,
+    store: Store<ChunkText>,
+}
+
+/// Open files and everything that is known about them. Not shared between threads: take a [`Snapshot`].
+#[derive(Default)]
+pub struct Session {
+    db: Database,
+    files: Vec<Option<Open>>,
+}
+
+impl Texts<ChunkText> for Database {
+    fn get(&self, input: ChunkText) -> Arc<str> {
+        input.text(self).clone()
+    }
+    fn set(&mut self, input: ChunkText, text: Arc<str>) {
+        input.set_text(self).to(text);
+    }
+    fn create(&mut self, text: Arc<str>) -> ChunkText {
+        ChunkText::new(self, text)
+    }
+}
+
+impl Session {
+    /// No files.
+    pub fn new() -> Session {
+        Session::default()
+    }
+
+    /// Opens a text under a name, or gives an open file a new text and new options.
+    pub fn open(&mut self, path: &str, text: &str, options: Options) -> FileId {
+        let id = self.db.disk().register(path);
+        let lines = memchr::memchr_iter(b'\n', text.as_bytes()).count();
+        let k = options.chunk_lines.unwrap_or_else(|| chunk_lines(lines)).max(1);
+        self.close(id);
+        let store = Store::new(text, k, &mut self.db);
+        let chunks: Arc<[ChunkText]> = store.pieces.iter().map(|p| p.input).collect();
+        let index = id.0 as usize;
+        if self.files.len() <= index {
+            self.files.resize(index + 1, None);
+        }
+        let run = RunOptions::new(&self.db, Arc::new(options), 0);
+        let document = Document::new(&self.db, chunks, run, id.0);
+        self.files[index] = Some(Open { document, run, store });
+        id
+    }
+
+    /// Reads a file from disk and opens it.
+    pub fn open_path(&mut self, path: &Path, options: Options) -> std::io::Result<FileId> {
+        let text = gr_text::decode(std::fs::read(path)?).text;
+        Ok(self.open(&path.to_string_lossy(), &text, options))
+    }
+
+    /// Forgets a file's text.
+    pub fn close(&mut self, file: FileId) {
+        if let Some(open) = self.files.get_mut(file.0 as usize).and_then(Option::take) {
+            for piece in &open.store.pieces {
+                self.db.set(piece.input, "".into());
+            }
+            open.document.set_chunks(&mut self.db).to(Arc::from([]));
+        }
+    }
+
+    /// Replaces the bytes `range` of an open file.
+    pub fn edit(&mut self, file: FileId, range: Range<u32>, text: &str) {
+        let Some(Some(open)) = self.files.get_mut(file.0 as usize) else { return };
+        if open.store.edit(range, text, &mut self.db) {
+            let chunks: Arc<[ChunkText]> = open.store.pieces.iter().map(|p| p.input).collect();
+            open.document.set_chunks(&mut self.db).to(chunks);
+        }
+    }
+
+    /// New options for an open file.
+    pub fn set_options(&mut self, file: FileId, options: Options) {
+        if let Some(Some(open)) = self.files.get(file.0 as usize) {
+            open.run.set_options(&mut self.db).to(Arc::new(options));
+        }
+    }
+
+    /// Files on disk may have changed: subroutine files are read again when they are needed.
+    pub fn disk_changed(&mut self) {
+        self.db.disk().forget();
+        for open in self.files.iter().flatten() {
+            let revision = open.run.disk_revision(&self.db) + 1;
+            open.run.set_disk_revision(&mut self.db).to(revision);
+        }
+    }
+
+    /// The text of an open file.
+    pub fn text(&self, file: FileId) -> Option<String> {
+        Some(self.files.get(file.0 as usize)?.as_ref()?.store.text(&self.db))
+    }
+
+    /// Path of any file that a diagnostic names.
+    pub fn path(&self, file: FileId) -> Option<Box<str>> {
+        self.db.disk().path(file)
+    }
+
+    /// Text of any file that a diagnostic names, open or read from disk.
+    pub fn any_text(&self, file: FileId) -> Option<String> {
+        self.text(file).or_else(|| {
+            let contents = self.db.disk().contents(file)?;
+            Some(contents.chunks.iter().map(|c| &*c.text).collect())
+        })
+    }
+
+    /// Everything that is to be said about a file.
+    pub fn check(&self, file: FileId) -> Check {
+        self.document(file).map_or_else(Check::default, |d| check::check(&self.db, d))
+    }
+
+    /// What is to be said about some lines, as far as the blocks up to their end tell it.
+    pub fn check_range(&self, file: FileId, lines: Range<u32>) -> Vec<Diagnostic> {
+        self.document(file).map_or_else(Vec::new, |d| check::check_range(&self.db, d, lines))
+    }
+
+    /// A view for another thread. Edits wait until it is dropped, and cancel what it is doing.
+    pub fn snapshot(&self) -> Snapshot {
+        Snapshot { db: self.db.clone(), documents: self.files.iter().map(|f| f.as_ref().map(|o| o.document)).collect() }
+    }
+
+    /// How many queries were executed so far.
+    pub fn executed(&self) -> Executed {
+        self.db.executed()
+    }
+
+    fn document(&self, file: FileId) -> Option<Document> {
+        Some(self.files.get(file.0 as usize)?.as_ref()?.document)
+    }
+}
+
+/// A read-only view of a session, for another thread.
+pub struct Snapshot {
+    db: Database,
+    documents: Vec<Option<Document>>,
+}
+
+/// The work was cut short by an edit.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Cancelled;
+
+impl Snapshot {
+    /// Everything that is to be said about a file.
+    pub fn check(&self, file: FileId) -> Result<Check, Cancelled> {
+        self.guarded(file, check::check)
+    }
+    /// What is to be said about some lines, as far as the blocks up to their end tell it.
+    pub fn check_range(&self, file: FileId, lines: Range<u32>) -> Result<Vec<Diagnostic>, Cancelled> {
+        self.guarded(file, |db, d| check::check_range(db, d, lines.clone()))
+    }
+    fn guarded<T: Default>(&self, file: FileId, work: impl Fn(&Database, Document) -> T) -> Result<T, Cancelled> {
+        let Some(Some(document)) = self.documents.get(file.0 as usize) else { return Ok(T::default()) };
+        let work = std::panic::AssertUnwindSafe(|| work(&self.db, *document));
+        salsa::Cancelled::catch(work).map_err(|_| Cancelled)
+    }
+}
