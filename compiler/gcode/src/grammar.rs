@@ -123,7 +123,7 @@ pub(crate) fn parse(tokens: &[Token], family: Family) -> (Block, Vec<Flaw>) {
 fn line<'t>(family: Family) -> Boxed<'t, Block> {
     let value = value(family).boxed();
     let slash = deleted(family).or_not().map(|slash| slash.is_some());
-    let number = line_number().or_not();
+    let number = line_number(family).or_not();
     let rest = choice((o_word(value.clone(), family), items(value, family))).boxed();
     slash
         .then(number)
@@ -563,27 +563,20 @@ fn mended<'t>(value: Boxed<'t, Expr>, family: Family) -> Boxed<'t, Expr> {
     value.recover_with(via_parser(damage(family))).boxed()
 }
 
-fn line_number<'t>() -> Boxed<'t, Item> {
-    let number = custom(|inp: &mut Ref<'t, '_>| match inp.peek() {
-        Some(Token::Number { value, whole: true }) => {
+fn line_number<'t>(family: Family) -> Boxed<'t, Item> {
+    let number = custom(move |inp: &mut Ref<'t, '_>| {
+        if let Some(Token::Number { value, whole: true }) = inp.peek() {
             inp.skip();
-            Ok(Some(value))
+            return Ok(Some(value));
         }
-        Some(Token::Number { .. } | Token::Malformed { .. }) => {
-            let flaw = fail(inp, 1, Problem::BadLineNumber);
+        let sign = matches!(inp.peek(), Some(Token::Mark(b'-' | b'+')));
+        let number = matches!(ahead(inp, usize::from(sign)), Some(Token::Number { .. } | Token::Malformed { .. }));
+        let flaw = fail(inp, usize::from(sign) + usize::from(number), Problem::BadLineNumber);
+        while !item_starts(inp, false, family) {
             inp.skip();
-            inp.emit(flaw);
-            Ok(None)
         }
-        next => {
-            let sign = matches!(next, Some(Token::Mark(b'-' | b'+')));
-            let number = matches!(ahead(inp, 1), Some(Token::Number { .. }));
-            let length = usize::from(sign) + usize::from(sign && number);
-            let flaw = fail(inp, length, Problem::BadLineNumber);
-            skip(inp, length);
-            inp.emit(flaw);
-            Ok(None)
-        }
+        inp.emit(flaw);
+        Ok(None)
     });
     just(Token::Letter(b'n'))
         .ignore_then(number)

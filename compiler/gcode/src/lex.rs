@@ -149,11 +149,13 @@ impl Line {
                         self.closed.push('\u{1}');
                         self.map.push(i as u32);
                         // One fault is enough: what follows can't be told from comment.
-                        let rest = if found.is_some() { last } else { end };
+                        let more = found.is_none() || bytes[last..end].contains(&b'(');
+                        let rest = if more { end } else { last };
                         self.bad_comment.end = rest as u32;
-                        if rest < end {
-                            self.close_rest(text, rest, end, rules);
-                        }
+                        let damaged = self.bad_comment;
+                        // No further `(` is left, so this goes one level deep.
+                        let _ = self.close(text, rest, end, rules);
+                        self.bad_comment = damaged;
                         let whole = Span::new(i as u32, rest as u32);
                         return Some(match found {
                             Some(inner) => CommentFault::Nested(Span::new(inner as u32, inner as u32 + 1)),
@@ -179,14 +181,6 @@ impl Line {
             }
         }
         None
-    }
-
-    /// What stands behind a damaged comment; no `)` is left in it, so a further `(` hides the rest.
-    fn close_rest(&mut self, text: &str, from: usize, end: usize, rules: &Rules) {
-        let stop = text[from..end].find('(').map_or(end, |n| from + n);
-        let damaged = self.bad_comment;
-        let _ = self.close(text, from, stop, rules);
-        self.bad_comment = damaged;
     }
 
     fn copy(&mut self, text: &str, from: usize, to: usize) {

@@ -14,9 +14,11 @@ mod model;
 mod number;
 mod print;
 mod scan;
+mod symbols;
 #[cfg(test)]
 mod tests;
 
 pub use chunks::split_chunks;
 pub use model::*;
+pub use symbols::{Label, Parameter, Statement, Symbol, Symbols, symbols};
 pub use scan::{scan, scan_by_grammar};
