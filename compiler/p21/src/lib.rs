@@ -18,5 +18,5 @@ mod parse;
 mod text;
 
 pub use index::{Entry, Index, index};
-pub use model::{Exchange, Fault, Instance, Kind, Section, Value};
+pub use model::{Exchange, Fault, Instance, Kind, Section, Value, members};
 pub use parse::parse;

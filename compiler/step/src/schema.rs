@@ -1,0 +1,314 @@
+//! Entities, attributes and types, resolved from the tables.
+
+use std::sync::OnceLock;
+
+use rustc_hash::FxHashMap;
+
+/// Index into [`Schema::entities`].
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, PartialOrd, Ord)]
+pub struct EntityId(pub u16);
+
+/// Which text of a part an entity row follows.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Edition {
+    /// `10`, `11`, `12`, `111`, `121`, `10303`.
+    pub part: &'static str,
+    /// `T1-2002`, `IS-2005` …
+    pub text: &'static str,
+}
+
+/// One entity in one edition.
+#[derive(Debug)]
+pub struct Entity {
+    /// Capitals, as in files.
+    pub keyword: &'static str,
+    /// Where the row comes from.
+    pub edition: Edition,
+    /// Has no instances of its own.
+    pub is_abstract: bool,
+    /// Direct supertypes.
+    pub supertypes: Vec<&'static str>,
+    /// In Part 21 order, inherited ones first.
+    pub attributes: Vec<Attribute>,
+    /// WHERE rules as the table has them.
+    pub rules: &'static str,
+    /// Everything it is, itself included: keywords in lower case.
+    pub is_a: Vec<Name>,
+}
+
+/// A lower-case name, by number.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, PartialOrd, Ord)]
+pub struct Name(pub u16);
+
+/// One attribute.
+#[derive(Debug)]
+pub struct Attribute {
+    /// Name in the standard.
+    pub name: &'static str,
+    /// What it takes.
+    pub ty: Type,
+    /// Its type as the table writes it.
+    pub written: &'static str,
+    /// `$` is allowed.
+    pub optional: bool,
+}
+
+/// What an attribute takes.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Type {
+    /// REAL and measures; integers without a point are accepted where the standard has REAL.
+    Real,
+    /// INTEGER.
+    Integer,
+    /// STRING.
+    String,
+    /// `.T.` `.F.`
+    Boolean,
+    /// `.T.` `.F.` `.U.`
+    Logical,
+    /// One of these names.
+    Enumeration(Vec<&'static str>),
+    /// An instance that is one of these.
+    Instance(Vec<Name>),
+    /// An instance, or a typed value (`PARAMETER_VALUE(1.)`) of one of these types.
+    Select {
+        /// Instances.
+        instances: Vec<Name>,
+        /// Keywords of typed values and what is inside.
+        values: Vec<(&'static str, Type)>,
+    },
+    /// LIST, SET, BAG, ARRAY with bounds.
+    Aggregate {
+        /// Fewest members.
+        low: u32,
+        /// Most members.
+        high: u32,
+        /// Their type.
+        of: Box<Type>,
+        /// SET: no member twice.
+        unique: bool,
+    },
+    /// The table does not say.
+    Any,
+}
+
+/// All tables.
+#[derive(Debug)]
+pub struct Schema {
+    /// Rows in table order.
+    pub entities: Vec<Entity>,
+    by_keyword: FxHashMap<&'static str, Vec<EntityId>>,
+    names: FxHashMap<&'static str, Name>,
+}
+
+static ENTITIES: &str = include_str!("../../../spec/step/entities.tsv");
+static TYPES: &str = include_str!("../../../spec/step/types.tsv");
+
+/// The resolved tables; made at the first call.
+pub fn schema() -> &'static Schema {
+    static SCHEMA: OnceLock<Schema> = OnceLock::new();
+    SCHEMA.get_or_init(Schema::load)
+}
+
+impl Schema {
+    /// All editions of an entity, the usual one first.
+    pub fn find(&self, keyword: &str) -> &[EntityId] {
+        self.by_keyword.get(keyword).map_or(&[], |v| v.as_slice())
+    }
+    /// A row.
+    pub fn entity(&self, id: EntityId) -> &Entity {
+        &self.entities[id.0 as usize]
+    }
+    /// Number of a name, if any entity has it.
+    pub fn name(&self, lower: &str) -> Option<Name> {
+        self.names.get(lower).copied()
+    }
+    /// Whether some edition of `keyword` is a `supertype`.
+    pub fn is_a(&self, keyword: &str, supertype: &str) -> bool {
+        let Some(name) = self.name(&supertype.to_ascii_lowercase()) else { return false };
+        self.find(keyword).iter().any(|e| self.entity(*e).is_a.contains(&name))
+    }
+    /// Keywords closest to a misspelt one.
+    pub fn suggest(&self, keyword: &str) -> Option<&'static str> {
+        let mut best = (usize::MAX, None);
+        for e in self.entities.iter().filter(|e| !e.is_abstract) {
+            let d = distance(keyword.as_bytes(), e.keyword.as_bytes(), best.0);
+            if d < best.0 {
+                best = (d, Some(e.keyword));
+            }
+        }
+        best.1.filter(|_| best.0 <= 1 + keyword.len() / 4)
+    }
+
+    fn load() -> Schema {
+        let rows: Vec<Vec<&'static str>> =
+            ENTITIES.lines().filter(|l| !l.starts_with('#') && !l.is_empty()).map(|l| l.split('\t').collect()).collect();
+        let types: FxHashMap<&'static str, &'static str> =
+            TYPES.lines().filter(|l| !l.starts_with('#')).filter_map(|l| l.split_once('\t')).collect();
+        let lower: &'static [String] = Box::leak(rows.iter().map(|r| r[2].to_ascii_lowercase()).collect::<Vec<_>>().into_boxed_slice());
+        let mut names: FxHashMap<&'static str, Name> = FxHashMap::default();
+        for n in lower {
+            let next = Name(names.len() as u16);
+            names.entry(n.as_str()).or_insert(next);
+        }
+        let parents: FxHashMap<&str, Vec<Vec<&'static str>>> = {
+            let mut map: FxHashMap<&str, Vec<Vec<&'static str>>> = FxHashMap::default();
+            for (row, n) in rows.iter().zip(lower) {
+                map.entry(n.as_str()).or_default().push(list(row[4]));
+            }
+            map
+        };
+        let mut schema = Schema { entities: Vec::with_capacity(rows.len()), by_keyword: FxHashMap::default(), names };
+        for (i, row) in rows.iter().enumerate() {
+            let attributes = row[5].split("; ").filter(|a| !a.is_empty()).map(|a| schema.attribute(a, &types)).collect();
+            let mut is_a = Vec::new();
+            let mut todo = vec![lower[i].as_str()];
+            let mut direct = Some(list(row[4]));
+            while let Some(n) = todo.pop() {
+                if let Some(name) = schema.names.get(n) {
+                    if is_a.contains(name) {
+                        continue;
+                    }
+                    is_a.push(*name);
+                }
+                let up = match direct.take() {
+                    Some(d) => d,
+                    None => parents.get(n).into_iter().flatten().flatten().copied().collect(),
+                };
+                todo.extend(up);
+            }
+            let id = EntityId(i as u16);
+            schema.by_keyword.entry(row[2]).or_default().push(id);
+            schema.entities.push(Entity {
+                keyword: row[2],
+                edition: Edition { part: row[0], text: row[1] },
+                is_abstract: row[3] == "A",
+                supertypes: list(row[4]),
+                attributes,
+                rules: row.get(6).copied().unwrap_or(""),
+                is_a,
+            });
+        }
+        schema
+    }
+
+    fn attribute(&self, text: &'static str, types: &FxHashMap<&'static str, &'static str>) -> Attribute {
+        let (name, written) = text.split_once(':').unwrap_or((text, ""));
+        let written = written.trim();
+        Attribute {
+            name: name.trim_end_matches('?'),
+            optional: name.ends_with('?'),
+            ty: self.ty(written, types, 0),
+            written,
+        }
+    }
+
+    fn ty(&self, written: &'static str, types: &FxHashMap<&'static str, &'static str>, depth: u32) -> Type {
+        let w = written.trim();
+        if depth > 12 {
+            return Type::Any;
+        }
+        for kind in ["LIST", "SET", "BAG", "ARRAY"] {
+            let Some(rest) = w.strip_prefix(kind) else { continue };
+            let rest = rest.trim_start();
+            let (low, high, of) = match rest.strip_prefix('[').and_then(|r| r.split_once(']')) {
+                Some((bounds, of)) => {
+                    let (low, high) = bounds.split_once(':').unwrap_or((bounds, "?"));
+                    (low.trim().parse().unwrap_or(0), high.trim().parse().unwrap_or(u32::MAX), of)
+                }
+                None => (0, u32::MAX, rest),
+            };
+            let of = of.trim_start();
+            let of = of.strip_prefix("OF").or(of.strip_prefix("of")).unwrap_or(of).trim_start();
+            let of = of.strip_prefix("UNIQUE").unwrap_or(of);
+            return Type::Aggregate { low, high, of: Box::new(self.ty(of, types, depth + 1)), unique: kind == "SET" };
+        }
+        if let Some(rest) = w.strip_prefix("ENUMERATION OF") {
+            return Type::Enumeration(inner(rest));
+        }
+        if let Some(rest) = w.strip_prefix("SELECT") {
+            let (mut instances, mut values) = (Vec::new(), Vec::new());
+            for member in inner(rest) {
+                match self.ty(member, types, depth + 1) {
+                    Type::Instance(mut n) => instances.append(&mut n),
+                    Type::Select { instances: mut i, values: mut v } => {
+                        instances.append(&mut i);
+                        values.append(&mut v);
+                    }
+                    Type::Any => {}
+                    other => values.push((member, other)),
+                }
+            }
+            return if values.is_empty() { Type::Instance(instances) } else { Type::Select { instances, values } };
+        }
+        match w {
+            "REAL" | "NUMBER" => Type::Real,
+            "INTEGER" => Type::Integer,
+            "STRING" => Type::String,
+            "BOOLEAN" => Type::Boolean,
+            "LOGICAL" => Type::Logical,
+            _ => match types.get(w) {
+                Some(definition) => self.ty(definition, types, depth + 1),
+                None => self.names.get(w).map_or(Type::Any, |n| Type::Instance(vec![*n])),
+            },
+        }
+    }
+}
+
+fn list(text: &'static str) -> Vec<&'static str> {
+    text.split(',').map(str::trim).filter(|s| !s.is_empty()).collect()
+}
+
+fn inner(text: &'static str) -> Vec<&'static str> {
+    list(text.trim().trim_start_matches('(').trim_end_matches(')'))
+}
+
+/// Edit distance, given up at `limit`.
+fn distance(a: &[u8], b: &[u8], limit: usize) -> usize {
+    if a.len().abs_diff(b.len()) >= limit {
+        return limit;
+    }
+    let mut row: Vec<usize> = (0..=b.len()).collect();
+    for (i, x) in a.iter().enumerate() {
+        let mut diagonal = row[0];
+        row[0] = i + 1;
+        for (j, y) in b.iter().enumerate() {
+            let next = (diagonal + usize::from(x != y)).min(row[j] + 1).min(row[j + 1] + 1);
+            diagonal = row[j + 1];
+            row[j + 1] = next;
+        }
+    }
+    row[b.len()]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Type, schema};
+
+    #[test]
+    fn every_type_is_known() {
+        let unknown: Vec<String> = schema()
+            .entities
+            .iter()
+            .flat_map(|e| e.attributes.iter().map(move |a| (e, a)))
+            .filter(|(_, a)| a.written != "*derived*")
+            .filter(|(_, a)| {
+                let mut ty = &a.ty;
+                while let Type::Aggregate { of, .. } = ty {
+                    ty = of;
+                }
+                *ty == Type::Any
+            })
+            .map(|(e, a)| format!("{}.{}: {}", e.keyword, a.name, a.written))
+            .collect();
+        assert!(unknown.is_empty(), "{unknown:#?}");
+    }
+
+    #[test]
+    fn supertypes() {
+        assert!(schema().is_a("ROUND_HOLE", "manufacturing_feature"));
+        assert!(schema().is_a("BOTTOM_AND_SIDE_ROUGH_MILLING", "MACHINING_OPERATION"));
+        assert!(!schema().is_a("ROUND_HOLE", "machining_operation"));
+        assert_eq!(schema().suggest("CLOSED_POKET"), Some("CLOSED_POCKET"));
+    }
+}
