@@ -8,6 +8,7 @@
 mod build;
 mod chunks;
 mod fast;
+mod format;
 mod grammar;
 mod lex;
 mod model;
@@ -19,6 +20,7 @@ mod symbols;
 mod tests;
 
 pub use chunks::split_chunks;
+pub use format::{Case, FormatOptions, LeadingZeros, Renumber, format};
 pub use model::*;
 pub use symbols::{Label, Parameter, Statement, Symbol, Symbols, symbols};
 pub use scan::{scan, scan_by_grammar};

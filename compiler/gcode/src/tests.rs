@@ -279,3 +279,71 @@ proptest! {
         }
     }
 }
+
+fn options() -> impl Strategy<Value = FormatOptions> {
+    let case = || prop_oneof![Just(Case::Keep), Just(Case::Upper), Just(Case::Lower)];
+    let zeros = prop_oneof![Just(LeadingZeros::Keep), Just(LeadingZeros::Strip), Just(LeadingZeros::Pad)];
+    (case(), case(), any::<bool>(), 0usize..5, zeros).prop_map(|(case, o_word_case, spaces, indent, leading_zeros)| {
+        FormatOptions { case, o_word_case, spaces, indent, leading_zeros, renumber: None }
+    })
+}
+
+fn check_format(text: &str, dialect: &'static Dialect, options: &FormatOptions) {
+    let before = scan(text, dialect);
+    let formatted = format(text, &before, dialect, options);
+    let after = scan(&formatted, dialect);
+    assert_eq!(before.lines.len(), after.lines.len(), "{text:?} became {formatted:?}");
+    for line in 0..before.lines.len() as u32 {
+        let (a, b) = (dump_line(text, &before, line), dump_line(&formatted, &after, line));
+        assert_eq!(a, b, "{}: {text:?} became {formatted:?}", dialect.id);
+    }
+    let again = format(&formatted, &after, dialect, options);
+    assert_eq!(again, formatted, "{}: not idempotent from {text:?}", dialect.id);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 1500, ..ProptestConfig::default() })]
+
+    #[test]
+    fn format_keeps_the_reading(text in program(), options in options()) {
+        for dialect in every_dialect() {
+            check_format(&text, dialect, &options);
+        }
+    }
+}
+
+#[test]
+fn format_of_the_fixture() {
+    let text: String = fixture().map(|(line, _)| format!("{line}\n")).collect();
+    for dialect in every_dialect() {
+        for spaces in [true, false] {
+            check_format(&text, dialect, &FormatOptions { spaces, ..FormatOptions::default() });
+        }
+    }
+}
+
+#[test]
+fn formatted() {
+    let text = "%\n  g01x1.50y-2(feed)f100 ; note\no<Part A>SUB\n#1=[#<_x>+2*3.0]\no100WHILE[#1 gt 0]\n\
+        g1 x[sin[30]*2mod3**2] y-#1\n   #1=[#1-1]   (count)\no100 endwhile\no1 do\ng0 z-[1]\no1 while [exists[#<a B>]]\n\
+        o2 if[1eqabs[-1]and2]\no3 call[1](c)[atan[1]/[2]]\no2 else\n/n10 m3s100\no2 endif\no<Part A>endsub[#1]\n\n;py,x\nm2\n%\n";
+    let all = |options: FormatOptions, name: &str| {
+        let dialect = dialect(name);
+        format(text, &scan(text, dialect), dialect, &options)
+    };
+    insta::assert_snapshot!(all(FormatOptions::default(), "linuxcnc-2.9"));
+    let tight = FormatOptions { spaces: false, indent: 0, case: Case::Lower, leading_zeros: LeadingZeros::Strip, ..Default::default() };
+    insta::assert_snapshot!(all(tight, "linuxcnc-2.9"));
+}
+
+#[test]
+fn renumbered() {
+    let text = "O1000\nN1 G0 X1\nIF [#1 EQ 0] GOTO 7\nG71 P1 Q7 U1\n(note)\nN7 X2\nGOTO #3\nM99 P7\n/2 X1;\n";
+    let dialect = dialect("fanuc-turn");
+    let renumber = |all| {
+        let renumber = Some(Renumber { start: 10, step: 10, all });
+        format(text, &scan(text, dialect), dialect, &FormatOptions { renumber, ..Default::default() })
+    };
+    insta::assert_snapshot!(renumber(false));
+    insta::assert_snapshot!(renumber(true));
+}
