@@ -37,11 +37,20 @@ fn plain_whole(bencher: Bencher) {
     bencher.counter(BytesCount::of_str(&text)).bench(|| gr_gcode::scan(&text, linuxcnc()));
 }
 
-#[divan::bench(sample_count = 10)]
-fn plain_in_chunks(bencher: Bencher) {
+#[divan::bench(sample_count = 10, args = [256, 1024, 4096])]
+fn plain_in_chunks(bencher: Bencher, lines: usize) {
     let text = walk(1_000_000);
-    let chunks = gr_gcode::split_chunks(&text, 4096);
+    let chunks = gr_gcode::split_chunks(&text, lines);
     bencher.counter(BytesCount::of_str(&text)).bench(|| {
         chunks.iter().map(|chunk| gr_gcode::scan(chunk, linuxcnc()).words.len()).sum::<usize>()
     });
+}
+
+/// Expressions, O-words, settings: the grammar's way.
+#[divan::bench(sample_count = 10)]
+fn structured(bencher: Bencher) {
+    let block = "#1 = [#<width> * 2 - SIN[30]]\no100 while [#1 GT 0]\nG1 X[10.5 + #101] Y[[#<w> * 2] - SIN[30]] F[#5]\n\
+        #1 = [#1 - 1]\no100 endwhile\n";
+    let text = block.repeat(20_000);
+    bencher.counter(BytesCount::of_str(&text)).bench(|| gr_gcode::scan(&text, linuxcnc()));
 }
