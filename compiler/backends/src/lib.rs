@@ -1,8 +1,15 @@
 //! Back ends: motion IR in, texts and pictures out.
 
+pub mod dump;
+pub mod from_line;
 pub mod joint;
+pub mod plot;
+pub mod rs274ngc;
+pub mod sheet;
+mod sources;
 mod sweep;
 mod target;
 
+pub use sources::{NoSources, Sources, Texts};
 pub use sweep::Sweep;
 pub use target::{Target, targets};

@@ -190,7 +190,7 @@ impl Plan<'_> {
                 Op::Arc(arc) => {
                     let sweep = Sweep::new(view.start, view.end, &arc);
                     // Eq. 4.2 counts the circle; its length is that of a helix where there is one.
-                    self.path(view.state, sweep.length(), turned(&start, &end), source, &|share| sweep.at(share));
+                    self.path(view.state, sweep.shape.length(), turned(&start, &end), source, &|share| sweep.at(share));
                 }
                 ref op => {
                     if let Some(what) = no_joint_form(op) {

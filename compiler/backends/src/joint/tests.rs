@@ -95,7 +95,7 @@ fn the_two_arcs_of_figure_4_8() {
             gr_ir::Op::Arc(arc) => Some(crate::Sweep::new(&s.start, &s.end, &arc)),
             _ => None,
         });
-        arc.unwrap().angle.to_degrees().round()
+        arc.unwrap().angle().to_degrees().round()
     };
     assert_eq!((sweep("G02"), sweep("G03")), (-90.0, 270.0));
 }

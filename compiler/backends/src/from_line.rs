@@ -1,0 +1,305 @@
+//! A program from a line on: what was in force there is set again, the tool goes to the place over a safe
+//! height, and the rest follows. The result is motion IR like any other, so every back end can write it.
+
+use crate::sources::{Sources, Words};
+use gr_ir::{Builder, FrameId, Marker, Note, Op, Override, PathMode, Pose, Program, Source, State, Turn};
+use gr_text::{Diagnostic, FileId, Span, code};
+
+/// Line number of operations that no source line asked for.
+pub const INSERTED: u32 = u32::MAX;
+
+/// How far above the place rapid ends and feed begins, mm.
+const CLEARANCE: f64 = 2.0;
+
+/// What can be chosen.
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
+pub struct Options {
+    /// Height of the approach in the work frame in force, mm; none = the highest point of the program.
+    pub safe_z: Option<f64>,
+}
+
+/// A program that begins later, and what there is to say about it.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Restart {
+    /// The program.
+    pub program: Program,
+    /// Warnings.
+    pub notes: Vec<Diagnostic>,
+}
+
+/// Lets a program begin at `line` (from 1) of `file`.
+pub fn from_line(
+    program: &Program,
+    file: FileId,
+    line: u32,
+    options: &Options,
+    sources: &dyn Sources,
+) -> Result<Restart, Vec<Diagnostic>> {
+    let target = line.saturating_sub(1);
+    let place = sources.place(Source { file, line: target, ..Source::default() });
+    let Some(found) = find(program, file, target) else {
+        return Err(vec![Diagnostic::new(code::FROM_LINE_NOTHING_LEFT, place.0, place.1, &[line.to_string()])]);
+    };
+    let mut notes = Vec::new();
+    let fault = |code| Err(vec![Diagnostic::new(code, place.0, place.1, &[])]);
+    if compensated(program, found.index, target, sources) {
+        return fault(code::FROM_LINE_INSIDE_COMPENSATION);
+    }
+    let cursor = program.cursor_at(found.index);
+    if inside_cycle(program, found.index) || cursor.state().sync.is_some() {
+        return fault(code::FROM_LINE_INSIDE_CYCLE);
+    }
+    if let Some(way) = found.repeated {
+        notes.push(Diagnostic::new(code::FROM_LINE_INSIDE_LOOP, place.0, place.1, &[way]));
+    }
+    let (state, pose) = (*cursor.state(), *cursor.pose());
+    let safe = options.safe_z.unwrap_or_else(|| {
+        let top = top(program, &state);
+        notes.push(no_height(place, top));
+        top
+    });
+    let restart = build(program, found.index, &state, &pose, safe.max(pose.axes[2]), line);
+    Ok(Restart { program: restart, notes })
+}
+
+fn no_height(place: (FileId, Span), top: f64) -> Diagnostic {
+    Diagnostic::new(code::FROM_LINE_NO_SAFE_HEIGHT, place.0, place.1, &[format!("{top:.3}")])
+}
+
+struct Found {
+    index: usize,
+    /// How often, in words, when it is more than once.
+    repeated: Option<String>,
+}
+
+/// The first operation that the line asks for, itself or through a call; failing that the first of a later line.
+fn find(program: &Program, file: FileId, line: u32) -> Option<Found> {
+    let skip = program.steps().take(8).position(|s| s.op == Op::Reset).map_or(0, |i| i + 1);
+    let mut first: Option<usize> = None;
+    let mut later: Option<usize> = None;
+    let mut ways: Vec<Source> = Vec::new();
+    for step in program.steps().skip(skip) {
+        if matches!(step.op, Op::Reset | Op::Finish) {
+            continue;
+        }
+        let own = step.source.file == file && step.source.line == line;
+        let through = program.call_stack(step.source).find(|f| f.file == file && f.line == line);
+        if own || through.is_some() {
+            first.get_or_insert(step.index);
+            let frame = if own { step.source.frame } else { through.map_or(FrameId::MAIN, |f| f.parent) };
+            let way = Source { file, line, frame };
+            if ways.len() < 1000 && !ways.contains(&way) {
+                ways.push(way);
+            }
+        }
+        let outer = program.call_stack(step.source).last().map_or(step.source.line, |f| f.line);
+        if later.is_none() && step.source.file == file && outer > line {
+            later = Some(step.index);
+        }
+    }
+    let repeated = (ways.len() > 1).then(|| {
+        let inner = program.call_stack(ways[0]).next();
+        let name = inner.map(|f| program.frames.name(f).to_string()).unwrap_or_default();
+        format!("{} times, in {name}", if ways.len() < 1000 { ways.len().to_string() } else { "many".into() })
+    });
+    Some(Found { index: first.or(later)?, repeated })
+}
+
+/// Whether cutter compensation is on before an operation. The motion shows no trace of it, so the lines that were
+/// executed are looked at.
+fn compensated(program: &Program, index: usize, line: u32, sources: &dyn Sources) -> bool {
+    let mut on = false;
+    let mut last: Option<Source> = None;
+    let mut look = |file: FileId, line: u32| {
+        let Some(text) = sources.line(file, line) else { return };
+        let words = Words::of(text);
+        if words.g(400) {
+            on = false;
+        } else if [410, 420, 411, 421].into_iter().any(|g| words.g(g)) {
+            on = true;
+        }
+    };
+    for step in program.steps().take(index) {
+        let source = step.source;
+        if last == Some(source) {
+            continue;
+        }
+        // Lines that asked for nothing, a lone G40 for one, lie between the two.
+        let from = match last {
+            Some(l) if l.file == source.file && l.frame == source.frame && l.line < source.line => l.line + 1,
+            _ => source.line,
+        };
+        for l in from..=source.line {
+            look(source.file, l);
+        }
+        last = Some(source);
+    }
+    if let Some(l) = last.filter(|l| l.line < line) {
+        for between in l.line + 1..line {
+            look(l.file, between);
+        }
+    }
+    on
+}
+
+fn inside_cycle(program: &Program, index: usize) -> bool {
+    let mut depth = 0i32;
+    for step in program.steps().take(index) {
+        match step.op {
+            Op::Begin { marker: Marker::Cycle, .. } => depth += 1,
+            Op::Close(Marker::Cycle) => depth -= 1,
+            _ => {}
+        }
+    }
+    depth > 0
+}
+
+/// The highest point of the whole program, in the work frame of a state.
+fn top(program: &Program, state: &State) -> f64 {
+    let mut highest = f64::NEG_INFINITY;
+    let mut cursor = program.cursor();
+    while let Some(view) = cursor.next() {
+        if view.op.moves() {
+            highest = highest.max(view.state.machine(&view.end.axes)[2]);
+        }
+    }
+    if highest.is_finite() { highest - state.machine(&[0.0; 9])[2] } else { 0.0 }
+}
+
+fn build(program: &Program, index: usize, state: &State, pose: &Pose, safe: f64, line: u32) -> Program {
+    // A place that no program names, so that every axis of the approach moves and has its word.
+    let used = axes_used(program);
+    let far = Pose::at(std::array::from_fn(|i| if i < 3 || used[i] { pose.axes[i] + 777.25 } else { pose.axes[i] }));
+    let mut out = Builder::from_state(far, State::default());
+    for (id, name) in &program.files {
+        out.file(*id, name);
+    }
+    for frame in program.frames.iter() {
+        let name = program.frames.name(frame).into();
+        let (parent, file, line, pass) = (frame.parent, frame.file, frame.line, frame.pass);
+        out.frame(frame.id, &gr_canon::CallFrame { parent, file, line, name, pass });
+    }
+    let mut restore = Restore { out, source: Source { line: INSERTED, ..Source::default() } };
+    restore.push(Op::Note(Note::Comment, &format!("restart at line {line}")));
+    restore.frame(state);
+    restore.tool(state);
+    restore.modes(state);
+    restore.spindles(state);
+    restore.approach(program, state, pose, safe);
+    let mut out = restore.out;
+    let mut rest = program.cursor_at(index);
+    while let Some(view) = rest.next() {
+        out.push_to(view.op, view.end, view.source);
+    }
+    out.finish()
+}
+
+struct Restore {
+    out: Builder,
+    source: Source,
+}
+
+impl Restore {
+    fn push(&mut self, op: Op<'_>) {
+        self.out.push(op, self.source);
+    }
+
+    fn frame(&mut self, s: &State) {
+        self.push(Op::Units(s.units));
+        self.push(Op::Plane(s.plane));
+        self.push(Op::WorkOffset(s.work, s.work_offset));
+        self.push(Op::Rotation(s.rotation));
+        if s.local_offset != [0.0; 9] {
+            self.push(Op::LocalOffset(s.local_offset));
+        }
+    }
+
+    fn tool(&mut self, s: &State) {
+        if s.tool > 0 {
+            self.push(Op::ToolPrepare(s.tool));
+            self.push(Op::ToolChange(0));
+        }
+        self.push(Op::ToolOffset(s.tool_offset));
+        if s.prepared > 0 && s.prepared != s.tool {
+            self.push(Op::ToolPrepare(s.prepared));
+        }
+    }
+
+    fn modes(&mut self, s: &State) {
+        if s.path != PathMode::default() || s.merge_tolerance != 0.0 {
+            self.push(Op::PathMode(s.path));
+            self.push(Op::MergeTolerance(s.merge_tolerance));
+        }
+        for (which, on, usual) in [
+            (Override::Feed, s.feed_override, true),
+            (Override::Speed(0), s.speed_override & 1 != 0, true),
+            (Override::Adaptive, s.adaptive, false),
+            (Override::FeedHold, s.feed_hold, true),
+        ] {
+            if on != usual {
+                self.push(Op::Override(which, on));
+            }
+        }
+        self.push(Op::FeedMode { spindle: s.feed_spindle, mode: s.feed_mode });
+        self.push(Op::Feed { linear: s.feed, angular: s.feed_angular });
+    }
+
+    fn spindles(&mut self, s: &State) {
+        for (number, spindle) in (0..).zip(&s.spindles) {
+            if spindle.surface.is_some() {
+                self.push(Op::SpindleMode { spindle: number, surface: spindle.surface });
+            }
+            if spindle.speed != 0.0 {
+                self.push(Op::SpindleSpeed { spindle: number, speed: spindle.speed });
+            }
+            if spindle.turn != Turn::Stop {
+                self.push(Op::SpindleTurn { spindle: number, turn: spindle.turn });
+            }
+        }
+        if s.mist {
+            self.push(Op::Mist(true));
+        }
+        if s.flood {
+            self.push(Op::Flood(true));
+        }
+    }
+
+    /// Up, over the place, down: rapid to just above it, then at feed.
+    fn approach(&mut self, program: &Program, state: &State, goal: &Pose, safe: f64) {
+        let used = axes_used(program);
+        let mut at = *self.out.pose();
+        at.axes[2] = safe;
+        self.out.push_to(Op::Rapid, &at, self.source);
+        for (i, value) in goal.axes.iter().enumerate() {
+            if i != 2 && (i < 3 || used[i]) {
+                at.axes[i] = *value;
+            }
+        }
+        self.out.push_to(Op::Rapid, &at, self.source);
+        let height = goal.axes[2];
+        if state.feed > 0.0 && state.feed_mode == gr_ir::FeedMode::PerTime {
+            if height + CLEARANCE < safe {
+                at.axes[2] = height + CLEARANCE;
+                self.out.push_to(Op::Rapid, &at, self.source);
+            }
+            at.axes[2] = height;
+            if height != safe {
+                self.out.push_to(Op::Linear, &at, self.source);
+            }
+        } else if height != safe {
+            at.axes[2] = height;
+            self.out.push_to(Op::Rapid, &at, self.source);
+        }
+    }
+}
+
+/// Which axes ever move.
+fn axes_used(program: &Program) -> [bool; 9] {
+    let mut used = [false; 9];
+    for step in program.steps().filter(|s| s.op.moves()) {
+        for (i, u) in used.iter_mut().enumerate() {
+            *u |= step.start.axes[i] != step.end.axes[i];
+        }
+    }
+    used
+}

@@ -1,0 +1,352 @@
+//! Operations one after another.
+
+use super::write::Writer;
+use super::{Emitted, Language, Options};
+use crate::sources::{Sources, Words};
+use gr_ir::{Axes, FeedMode, Note, Op, Plane, Program, Source, State, Stop, Turn, Units, View};
+use gr_text::{Code, Diagnostic, Severity, code};
+
+/// Findings reported at most.
+const MOST_FAULTS: usize = 100;
+
+/// Writes a program. Errors are at the source lines that the language can't express.
+pub fn emit(program: &Program, options: &Options, sources: &dyn Sources) -> Result<Emitted, Vec<Diagnostic>> {
+    if let Some(mistake) = options.mistakes() {
+        let (file, span) = sources.place(Source::default());
+        return Err(vec![Diagnostic::new(code::EMIT_BAD_OPTION, file, span, &[mistake])]);
+    }
+    let mut emitter = Emitter::new(program, options, sources);
+    emitter.run(program);
+    if emitter.found.iter().any(|d| d.severity == Severity::Error) {
+        Err(emitter.found)
+    } else {
+        Ok(Emitted { text: emitter.w.text, notes: emitter.found })
+    }
+}
+
+pub(super) struct Emitter<'a> {
+    pub program: &'a Program,
+    pub w: Writer,
+    pub options: &'a Options,
+    pub sources: &'a dyn Sources,
+    pub found: Vec<Diagnostic>,
+    /// Where the written program has the axes, in the frame of the moment.
+    pub at: Axes,
+    /// The axis was given by a word since the frame moved.
+    pub anchored: [bool; 9],
+    /// The axis stands where a probe stopped, which only the machine knows.
+    pub loose: [bool; 9],
+    /// The state whose frame `at` is in.
+    pub frame: State,
+    /// Active G0 or G1, as far as a word can be left out.
+    pub motion: Option<u8>,
+    pub plane: Plane,
+    pub feed: String,
+    pub feed_mode: FeedMode,
+    /// Work offsets and rotations as the written program leaves them.
+    pub offsets: [Axes; 10],
+    pub rotations: [f64; 10],
+    pub tools: Vec<(i32, Axes)>,
+    /// G28.1 or G30.1 somewhere: the stored reference is the program's own.
+    pub own_reference: bool,
+    words_of: Option<(Source, Words)>,
+    last_fault: Option<(Source, Code)>,
+    /// Operations before this one were written already, together with an earlier one.
+    pub done_until: usize,
+}
+
+impl<'a> Emitter<'a> {
+    fn new(program: &'a Program, options: &'a Options, sources: &'a dyn Sources) -> Emitter<'a> {
+        let state = *program.start_state();
+        Emitter {
+            program,
+            w: Writer::new(options),
+            options,
+            sources,
+            found: Vec::new(),
+            at: program.start().axes,
+            anchored: [false; 9],
+            loose: [false; 9],
+            frame: state,
+            motion: None,
+            plane: state.plane,
+            feed: String::new(),
+            feed_mode: FeedMode::PerTime,
+            offsets: options.stored_offsets,
+            rotations: options.stored_rotations,
+            tools: options.tools.clone(),
+            own_reference: own_reference(program, sources),
+            words_of: None,
+            last_fault: None,
+            done_until: 0,
+        }
+    }
+
+    pub fn say(&mut self, code: Code, source: Source, args: &[String]) {
+        if self.last_fault == Some((source, code)) || self.found.len() >= MOST_FAULTS {
+            return;
+        }
+        self.last_fault = Some((source, code));
+        let (file, span) = self.sources.place(source);
+        self.found.push(Diagnostic::new(code, file, span, args));
+    }
+
+    /// The language has no way to say it.
+    pub fn cannot(&mut self, what: &str, source: Source) {
+        self.say(code::EMIT_NOT_EXPRESSIBLE, source, &[what.into(), self.options.language.title().into()]);
+    }
+
+    /// Written as a comment: no effect on the machine.
+    pub fn as_comment(&mut self, what: &str, source: Source) {
+        self.say(code::EMIT_DROPPED_NOTE, source, &[what.into(), self.options.language.title().into()]);
+        self.w.comment(what);
+    }
+
+    pub fn linuxcnc(&self) -> bool {
+        self.options.language == Language::Linuxcnc
+    }
+
+    /// Words of the source line.
+    pub fn words(&mut self, source: Source) -> Option<Words> {
+        if let Some((s, w)) = self.words_of
+            && s == source
+        {
+            return Some(w);
+        }
+        let words = Words::of(self.sources.line(source.file, source.line)?);
+        self.words_of = Some((source, words));
+        Some(words)
+    }
+
+    fn run(&mut self, program: &Program) {
+        let skip = prologue(program);
+        let epilogue = epilogue(program);
+        let ends = program.steps().any(|s| s.op == Op::End);
+        self.header(ends);
+        let mut cursor = program.cursor();
+        while let Some(view) = cursor.next() {
+            let index = view.index;
+            if index < skip || index < self.done_until || (epilogue.start..epilogue.end).contains(&index) {
+                self.follow_silently(&view);
+            } else if let Op::End = view.op {
+                self.end(index);
+                break;
+            } else {
+                self.op(&view);
+            }
+        }
+        self.footer(ends);
+    }
+
+    fn end(&mut self, index: usize) {
+        let before = index.checked_sub(1).and_then(|i| self.program.get(i)).map(|s| s.op);
+        let pallet = matches!(before, Some(Op::Stop(Stop::Pallet)));
+        self.w.block(if pallet || self.options.language == Language::FanucMill { "M30" } else { "M2" });
+    }
+
+    /// The operation after this index.
+    pub fn op_after(&self, index: usize) -> Option<Op<'a>> {
+        self.program.get(index + 1).map(|s| s.op)
+    }
+
+    /// Keeps up with what a silent operation does to the frame.
+    fn follow_silently(&mut self, view: &View<'_, '_>) {
+        match view.op {
+            Op::WorkOffset(n, offset) if usize::from(n) < 10 => self.offsets[usize::from(n)] = offset,
+            Op::Rotation(r) => self.rotations[usize::from(view.state.work.min(9))] = r,
+            Op::Plane(p) if view.index < self.done_until => self.plane = p,
+            _ => {}
+        }
+        self.move_frame(view.state);
+    }
+
+    /// Writes `at` in the frame of another state; the machine stands still.
+    pub fn move_frame(&mut self, state: &State) {
+        let same = state.tool_offset == self.frame.tool_offset
+            && state.work_offset == self.frame.work_offset
+            && state.local_offset == self.frame.local_offset
+            && state.rotation == self.frame.rotation;
+        if !same {
+            let machine = self.frame.machine(&self.at);
+            self.at = state.work_frame(&machine);
+            self.anchored = [false; 9];
+        }
+        self.frame = *state;
+    }
+
+    fn header(&mut self, ends: bool) {
+        let name = self.options.name.clone();
+        match self.options.language {
+            Language::Linuxcnc if !ends => self.w.bare("%"),
+            Language::FanucMill => {
+                self.w.bare("%");
+                let number: String = name.chars().filter(char::is_ascii_digit).take(4).collect();
+                let number: u32 = number.parse().unwrap_or(1).max(1);
+                self.w.bare(&format!("O{number:04}"));
+            }
+            _ => {}
+        }
+        if self.options.comments && !name.is_empty() {
+            self.w.comment(&name);
+        }
+        let units = if self.options.units == Units::Inch { "G20" } else { "G21" };
+        let plane = plane_word(self.plane);
+        let rest = match self.options.language {
+            Language::Linuxcnc if self.options.arcs == super::Arcs::IjkAbsolute => "G40 G80 G90 G90.1 G94",
+            Language::Linuxcnc => "G40 G80 G90 G91.1 G94",
+            Language::FanucMill => "G40 G80 G90 G94",
+            Language::Grbl => "G40 G80 G90 G91.1 G94",
+        };
+        self.w.block(&format!("{units} {plane} {rest}"));
+    }
+
+    fn footer(&mut self, ends: bool) {
+        match self.options.language {
+            Language::Linuxcnc if !ends => self.w.bare("%"),
+            Language::FanucMill => {
+                if !ends {
+                    self.w.block("M30");
+                }
+                self.w.bare("%");
+            }
+            _ => {}
+        }
+    }
+
+    fn op(&mut self, view: &View<'_, '_>) {
+        match view.op {
+            Op::Rapid => self.rapid(view),
+            Op::Linear => self.linear(view),
+            Op::Arc(arc) => self.arc(view, &arc),
+            Op::Nurbs { order, points } => self.nurbs(view, order, points),
+            Op::Probe(kind) => self.probe(view, kind),
+            Op::RigidTap { bottom, scale } => self.rigid_tap(view, bottom, scale),
+            Op::Dwell(seconds) => self.dwell(seconds),
+            Op::RunTime(what) => self.say(code::EMIT_RUNTIME_VALUE, view.source, &[what.into()]),
+            Op::Note(note, text) => self.note(note, text, view.source),
+            Op::LogClose if self.linuxcnc() => self.w.bare("(LOGCLOSE)"),
+            Op::LogClose => {}
+            Op::Stop(stop) => self.stop(stop, view),
+            _ => self.setting(view),
+        }
+    }
+
+    fn dwell(&mut self, seconds: f64) {
+        let word = match self.options.language {
+            // Whole milliseconds without a point; finer ones as seconds with a point.
+            Language::FanucMill => {
+                let ms = seconds * 1000.0;
+                if (ms - libm::round(ms)).abs() < 1e-9 {
+                    format!("P{}", libm::round(ms))
+                } else {
+                    format!("X{}", self.w.number(seconds, 6))
+                }
+            }
+            _ => format!("P{}", self.w.number(seconds, 6)),
+        };
+        self.w.block(&format!("G4 {word}"));
+    }
+
+    fn note(&mut self, note: Note, text: &str, source: Source) {
+        match note {
+            Note::Comment => {
+                if self.options.comments && !text.starts_with("interpreter:") {
+                    self.w.comment(text);
+                }
+            }
+            Note::Message if self.linuxcnc() => self.active_comment("MSG,", text),
+            Note::Message => self.as_comment(text, source),
+            Note::Log if self.linuxcnc() => self.active_comment("LOG,", text),
+            Note::LogOpen if self.linuxcnc() => self.active_comment("LOGOPEN,", text),
+            Note::LogAppend if self.linuxcnc() => self.active_comment("LOGAPPEND,", text),
+            Note::Log | Note::LogOpen | Note::LogAppend => self.as_comment("a log statement", source),
+        }
+    }
+
+    fn active_comment(&mut self, head: &str, text: &str) {
+        let clean: String = text.chars().filter(|c| !c.is_control() && *c != ')').take(200).collect();
+        self.w.bare(&format!("({head}{clean})"));
+    }
+
+    fn stop(&mut self, stop: Stop, view: &View<'_, '_>) {
+        let next = self.op_after(view.index);
+        match (stop, next) {
+            (Stop::Program, _) => self.w.block("M0"),
+            (Stop::Optional, _) => self.w.block("M1"),
+            // The end with pallet change is M30.
+            (Stop::Pallet, Some(Op::End)) => {}
+            (Stop::Pallet, Some(Op::Stop(Stop::Program))) if self.options.language != Language::Grbl => {
+                self.w.block("M60");
+                self.done_until = view.index + 2;
+            }
+            (Stop::Pallet, _) => self.cannot("a pallet change", view.source),
+        }
+    }
+}
+
+pub(super) fn plane_word(plane: Plane) -> &'static str {
+    match plane {
+        Plane::Xy => "G17",
+        Plane::Xz => "G18",
+        Plane::Yz => "G19",
+        Plane::Uv => "G17.1",
+        Plane::Uw => "G18.1",
+        Plane::Vw => "G19.1",
+    }
+}
+
+/// How many leading operations only tell how the interpreter starts.
+fn prologue(program: &Program) -> usize {
+    program.steps().take(8).position(|s| s.op == Op::Reset).map_or(0, |i| i + 1)
+}
+
+/// The operations around the end that M2 or M30 does by itself; the end itself is not among them.
+fn epilogue(program: &Program) -> Epilogue {
+    let Some(end) = program.steps().find(|s| s.op == Op::End) else { return Epilogue { start: 0, end: 0 } };
+    let mut start = end.index;
+    while start > 0 {
+        let Some(step) = program.get(start - 1) else { break };
+        if step.source != end.source || !done_by_end(&step.op) {
+            break;
+        }
+        start -= 1;
+    }
+    Epilogue { start, end: end.index }
+}
+
+#[derive(Clone, Copy)]
+struct Epilogue {
+    start: usize,
+    end: usize,
+}
+
+fn done_by_end(op: &Op<'_>) -> bool {
+    matches!(
+        op,
+        Op::WorkOffset(..)
+            | Op::Rotation(_)
+            | Op::LocalOffset(_)
+            | Op::Plane(_)
+            | Op::FeedMode { .. }
+            | Op::Feed { .. }
+            | Op::Override(_, true)
+            | Op::SpindleTurn { turn: Turn::Stop, .. }
+            | Op::SpindleMode { .. }
+            | Op::Mist(false)
+            | Op::Flood(false)
+            | Op::Stop(Stop::Pallet)
+            | Op::Note(Note::Comment, _)
+            | Op::Finish
+    )
+}
+
+/// Whether the program stores a reference point of its own.
+fn own_reference(program: &Program, sources: &dyn Sources) -> bool {
+    let Some(first) = program.steps().map(|s| s.source).find(|s| sources.line(s.file, s.line).is_some()) else {
+        return false;
+    };
+    (0u32..).map_while(|l| sources.line(first.file, l)).any(|text| {
+        let near = text.contains("28") || text.contains("30");
+        near && (Words::of(text).g(281) || Words::of(text).g(301))
+    })
+}

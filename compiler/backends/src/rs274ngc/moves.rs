@@ -1,0 +1,333 @@
+//! Moves: which words are written, and with which numbers.
+
+use super::emit::Emitter;
+use super::write::AXES;
+use super::Language;
+use gr_ir::{Axes, FeedMode, Op, Pose, Source, State, View};
+
+impl Emitter<'_> {
+    /// Whether the language has these axes; an error if not.
+    fn has_axes(&mut self, start: &Axes, end: &Axes, source: Source) -> bool {
+        let most = match self.options.language {
+            Language::Linuxcnc => 9,
+            Language::FanucMill => 6,
+            Language::Grbl => 3,
+        };
+        match (most..9).find(|i| start[*i] != end[*i]) {
+            Some(i) => {
+                self.cannot(&format!("a move of the {} axis", AXES[i]), source);
+                false
+            }
+            None => true,
+        }
+    }
+
+    /// Whether the source line gave a word for the axis. Without a text: whether it is a main axis.
+    fn given(&mut self, axis: usize, source: Source) -> bool {
+        match self.words(source) {
+            // Put in by this program: it moves what it means to move.
+            _ if source.line == crate::from_line::INSERTED => false,
+            Some(words) => {
+                let letter = AXES[axis].to_ascii_lowercase() as u8;
+                words.has(letter) || (axis == 2 && words.has(b'r'))
+            }
+            None => axis < 3,
+        }
+    }
+
+    /// The axis words of a move. An axis that stands still has no word, so that where an unknown offset or an
+    /// unknown position hides behind a number, the number is not written.
+    pub fn axis_words(&mut self, start: &Pose, end: &Pose, source: Source, forced: &[usize]) -> Vec<String> {
+        let mut out = Vec::new();
+        for i in 0..9 {
+            let (from, to) = (start.axes[i], end.axes[i]);
+            let force = forced.contains(&i);
+            let moves = from.to_bits() != to.to_bits() && from != to;
+            if self.loose[i] && !force && !self.given(i, source) {
+                self.at[i] = to;
+                continue;
+            }
+            let named = !self.anchored[i] && (self.given(i, source));
+            let repeated = self.options.repeat_words && self.anchored[i] && i < 3;
+            if !(force || moves || named || repeated) {
+                continue;
+            }
+            let (text, said) = self.w.axis(i, to);
+            if self.anchored[i] && said == self.at[i] && !force && !repeated {
+                continue;
+            }
+            self.set(i, said);
+            out.push(format!("{}{text}", AXES[i]));
+        }
+        if out.is_empty() {
+            // A move to where the axis is: one word keeps it in the program.
+            if let Some(i) = (0..9).find(|i| self.anchored[*i] && self.given(*i, source)) {
+                let (text, said) = self.w.axis(i, end.axes[i]);
+                self.set(i, said);
+                out.push(format!("{}{text}", AXES[i]));
+            }
+        }
+        out
+    }
+
+    fn set(&mut self, axis: usize, said: f64) {
+        self.at[axis] = said;
+        self.anchored[axis] = true;
+        self.loose[axis] = false;
+    }
+
+    /// A block of motion; nothing when there are no words.
+    fn motion_block(&mut self, code: u8, words: &[String], feed: &[String]) {
+        if words.is_empty() {
+            return;
+        }
+        self.w.begin();
+        if self.motion != Some(code) || self.options.repeat_words {
+            self.w.add(if code == 0 { "G0" } else { "G1" });
+        }
+        self.motion = Some(code);
+        for word in words.iter().chain(feed) {
+            self.w.add(word);
+        }
+        self.w.end();
+    }
+
+    pub fn rapid(&mut self, view: &View<'_, '_>) {
+        if !self.has_axes(&view.start.axes, &view.end.axes, view.source) {
+            return;
+        }
+        if let Some(words) = self.words(view.source) {
+            if words.g(530) {
+                return self.machine_move(view, "G0");
+            }
+            let home = [(280, "G28"), (300, "G30")].into_iter().find(|(g, _)| words.g(*g));
+            if let Some((_, code)) = home {
+                return self.home(view, code);
+            }
+        }
+        let words = self.axis_words(view.start, view.end, view.source, &[]);
+        self.motion_block(0, &words, &[]);
+    }
+
+    /// G53: the numbers are the machine's, whatever the offsets are.
+    fn machine_move(&mut self, view: &View<'_, '_>, code: &str) {
+        let goal = view.state.machine(&view.end.axes);
+        let from = view.state.machine(&view.start.axes);
+        let mut reached = self.frame.machine(&self.at);
+        self.w.begin();
+        let feed = if code == "G1" { self.feed_words(view.state, view.start, view.end, view.source) } else { Vec::new() };
+        let mut words = Vec::new();
+        for i in 0..9 {
+            // Rotation leaves rounding dust in an axis that stands still.
+            let moves = (goal[i] - from[i]).abs() > 1e-9;
+            if moves || (self.words(view.source).is_some() && self.given(i, view.source)) {
+                let (text, said) = self.w.axis(i, goal[i]);
+                reached[i] = said;
+                words.push(format!("{}{text}", AXES[i]));
+                self.anchored[i] = false;
+                self.loose[i] = false;
+            }
+        }
+        self.at = self.frame.work_frame(&reached);
+        if words.is_empty() {
+            return;
+        }
+        self.motion = None;
+        let code = ["G53".to_string(), code.to_string()];
+        let line: Vec<String> = code.into_iter().chain(words).chain(feed).collect();
+        self.w.block(&line.join(" "));
+    }
+
+    /// G28 and G30: over a point to the reference, whose place only the machine knows.
+    fn home(&mut self, view: &View<'_, '_>, code: &str) {
+        let next = self.program.get(view.index + 1);
+        let second = next.filter(|s| s.op == Op::Rapid && s.source == view.source);
+        if self.own_reference {
+            if second.is_none() {
+                return self.machine_move(view, "G0");
+            }
+            let words = self.axis_words(view.start, view.end, view.source, &[]);
+            return self.motion_block(0, &words, &[]);
+        }
+        let named: Vec<usize> = (0..9).filter(|i| self.given(*i, view.source)).collect();
+        let all = self.options.language == Language::FanucMill && named.is_empty();
+        let axes = if all { vec![0, 1, 2] } else { named };
+        let through = if second.is_some() { view.end } else { view.start };
+        let mut words = vec![code.to_string()];
+        for i in axes {
+            words.push(format!("{}{}", AXES[i], self.w.axis(i, through.axes[i]).0));
+        }
+        self.w.block(&words.join(" "));
+        self.motion = None;
+        self.at = second.map_or(view.end.axes, |s| s.end.axes);
+        self.anchored = [false; 9];
+        if second.is_some() {
+            self.done_until = view.index + 2;
+        }
+    }
+
+    pub fn linear(&mut self, view: &View<'_, '_>) {
+        if !self.has_axes(&view.start.axes, &view.end.axes, view.source) {
+            return;
+        }
+        if let Some(sync) = view.state.sync.filter(|s| !s.velocity) {
+            return self.thread(view, sync.per_rev, sync.spindle);
+        }
+        if self.words(view.source).is_some_and(|w| w.g(530)) {
+            return self.machine_move(view, "G1");
+        }
+        self.straight(view.start, view.end, view.state, view.source);
+    }
+
+    /// G1 from one pose to another.
+    pub fn straight(&mut self, start: &Pose, end: &Pose, state: &State, source: Source) {
+        let words = self.axis_words(start, end, source, &[]);
+        if words.is_empty() {
+            return;
+        }
+        let feed = self.feed_words(state, start, end, source);
+        self.motion_block(1, &words, &feed);
+    }
+
+    /// Straight pieces along a curve.
+    pub fn lines(&mut self, pieces: usize, state: &State, source: Source, at: &dyn Fn(f64) -> Pose) {
+        let mut from = at(0.0);
+        for k in 1..=pieces {
+            let to = at(k as f64 / pieces as f64);
+            self.straight(&from, &to, state, source);
+            from = to;
+        }
+    }
+
+    fn thread(&mut self, view: &View<'_, '_>, per_rev: f64, spindle: i32) {
+        if self.options.language == Language::Grbl {
+            return self.cannot("threading (motion that follows the spindle)", view.source);
+        }
+        let moved: Vec<usize> = (0..9).filter(|i| view.start.axes[*i] != view.end.axes[*i]).collect();
+        let mut words = vec!["G33".to_string()];
+        words.extend(self.axis_words(view.start, view.end, view.source, &moved));
+        if words.len() == 1 {
+            return;
+        }
+        let (pitch, _) = self.w.length(per_rev, self.w.places.max(6));
+        words.push(format!("{}{pitch}", if self.linuxcnc() { 'K' } else { 'F' }));
+        if !self.linuxcnc() {
+            self.feed.clear();
+        }
+        if spindle > 0 {
+            words.push(format!("${spindle}"));
+        }
+        self.w.block(&words.join(" "));
+        self.motion = None;
+    }
+
+    pub fn rigid_tap(&mut self, view: &View<'_, '_>, bottom: [f64; 3], scale: f64) {
+        let Some(sync) = view.state.sync else { return self.cannot("rigid tapping without a pitch", view.source) };
+        if !self.linuxcnc() {
+            return self.cannot("rigid tapping", view.source);
+        }
+        let mut words = vec!["G33.1".to_string()];
+        for i in 0..3 {
+            if bottom[i] != view.start.axes[i] {
+                words.push(format!("{}{}", AXES[i], self.w.axis(i, bottom[i]).0));
+            }
+        }
+        words.push(format!("K{}", self.w.length(sync.per_rev, self.w.places.max(6)).0));
+        if scale != 1.0 && scale != 0.0 {
+            words.push(format!("I{}", self.w.number(scale, 6)));
+        }
+        if sync.spindle > 0 {
+            words.push(format!("${}", sync.spindle));
+        }
+        self.w.block(&words.join(" "));
+        self.motion = None;
+    }
+
+    pub fn probe(&mut self, view: &View<'_, '_>, kind: u8) {
+        if self.options.language == Language::FanucMill {
+            return self.cannot("probing with an own error rule (G38)", view.source);
+        }
+        let moved: Vec<usize> = (0..9).filter(|i| view.start.axes[*i] != view.end.axes[*i]).collect();
+        let mut words = vec![format!("G38.{}", 2 + (kind & 3))];
+        words.extend(self.axis_words(view.start, view.end, view.source, &moved));
+        words.extend(self.feed_words(view.state, view.start, view.end, view.source));
+        self.w.block(&words.join(" "));
+        for i in moved {
+            self.loose[i] = true;
+            self.anchored[i] = false;
+        }
+        self.motion = None;
+    }
+
+    /// The words that bring feed and feed mode to what the state says.
+    pub fn feed_words(&mut self, state: &State, start: &Pose, end: &Pose, source: Source) -> Vec<String> {
+        let mut out = Vec::new();
+        let mode = state.feed_mode;
+        if mode != self.feed_mode {
+            if mode != FeedMode::PerTime && self.options.language == Language::Grbl && mode == FeedMode::PerRev {
+                self.cannot("a feed per revolution", source);
+                return out;
+            }
+            out.push(match mode {
+                FeedMode::PerTime => "G94".to_string(),
+                FeedMode::PerRev => "G95".to_string(),
+                FeedMode::Inverse => "G93".to_string(),
+            });
+            self.feed_mode = mode;
+            self.feed.clear();
+        }
+        let straight = [0, 1, 2, 6, 7, 8].iter().any(|i| start.axes[*i] != end.axes[*i]);
+        let rotary = (3..6).any(|i| start.axes[i] != end.axes[i]) && !straight;
+        let per = if mode == FeedMode::PerRev { 1.0 } else { 60.0 };
+        let value = match (mode, rotary) {
+            (FeedMode::Inverse, _) => state.feed * 60.0,
+            (_, true) => state.feed_angular.to_degrees() * per,
+            (_, false) => state.feed * per / self.w.unit,
+        };
+        let text = self.w.number(value, self.w.places.max(6));
+        if text != self.feed || mode == FeedMode::Inverse || self.options.repeat_words {
+            out.push(format!("F{text}"));
+            self.feed = text;
+        }
+        out
+    }
+
+    pub fn nurbs(&mut self, view: &View<'_, '_>, order: u32, points: &[f64]) {
+        let count = points.len() / 3;
+        let point = |i: usize| [points[3 * i], points[3 * i + 1], points[3 * i + 2]];
+        let plain = (0..count).all(|i| point(i)[2] == 1.0);
+        let fits = plain && count == order as usize && (order == 3 || order == 4);
+        if !fits || !self.linuxcnc() {
+            return self.spline_as_lines(view);
+        }
+        let from = [self.at[0], self.at[1]];
+        let offset = |a: [f64; 3], b: [f64; 2]| [a[0] - b[0], a[1] - b[1]];
+        let words = self.axis_words(view.start, view.end, view.source, &[0, 1]);
+        let to = [self.at[0], self.at[1]];
+        let mut line = vec![if order == 4 { "G5".to_string() } else { "G5.1".to_string() }];
+        line.extend(words);
+        let mut pair = |letters: [char; 2], v: [f64; 2]| {
+            for (letter, v) in letters.into_iter().zip(v) {
+                line.push(format!("{letter}{}", self.w.length(v, self.w.places).0));
+            }
+        };
+        pair(['I', 'J'], offset(point(1), from));
+        if order == 4 {
+            pair(['P', 'Q'], offset(point(2), to));
+        }
+        line.extend(self.feed_words(view.state, view.start, view.end, view.source));
+        self.w.block(&line.join(" "));
+        self.motion = None;
+    }
+
+    fn spline_as_lines(&mut self, view: &View<'_, '_>) {
+        let mut from = *view.start;
+        let mut poses = Vec::new();
+        let tolerance = self.options.arc_tolerance;
+        gr_ir::geometry::flatten(&view.op, view.start, view.end, tolerance, |axes| poses.push(Pose::at(*axes)));
+        for to in poses {
+            self.straight(&from, &to, view.state, view.source);
+            from = to;
+        }
+    }
+}

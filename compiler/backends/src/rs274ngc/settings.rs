@@ -1,0 +1,372 @@
+//! Everything that does not move: offsets, tools, spindle, coolant, modes, outputs.
+
+use super::emit::Emitter;
+use super::write::AXES;
+use super::Language;
+use gr_ir::{Axes, Op, Override, PathMode, Source, Turn, View};
+use gr_text::code;
+
+const OFFSETS: [&str; 10] = ["", "G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3"];
+
+impl Emitter<'_> {
+    pub fn setting(&mut self, view: &View<'_, '_>) {
+        let source = view.source;
+        match view.op {
+            Op::WorkOffset(n, offset) => self.work_offset(n, &offset, view),
+            Op::Rotation(angle) => self.rotation(angle, view),
+            Op::LocalOffset(offset) => self.local_offset(&offset, view),
+            Op::ToolOffset(offset) => self.tool_offset(&offset, view),
+            Op::ToolPrepare(n) => self.w.block(&format!("T{n}")),
+            Op::ToolChange(_) => self.tool_change(view),
+            Op::ToolNumber(n) if self.linuxcnc() => self.w.block(&format!("M61 Q{n}")),
+            Op::ToolNumber(_) => self.cannot("naming the tool in the spindle (M61)", source),
+            Op::ToolEntry { .. } => self.tool_entry(view),
+            Op::SpindleMode { spindle, surface } => self.spindle_mode(spindle, surface, view),
+            Op::SpindleSpeed { spindle, speed } => self.spindle_speed(spindle, speed, view),
+            Op::SpindleTurn { spindle, turn } => self.spindle_turn(spindle, turn, source),
+            Op::SpindleOrient { spindle, angle, direction } => self.orient(spindle, angle, direction, view),
+            Op::SpindleWait { .. } => self.cannot("waiting for spindle orientation alone", source),
+            Op::Mist(on) => self.coolant(on, "M7", view),
+            Op::Flood(on) => self.coolant(on, "M8", view),
+            Op::PathMode(mode) => self.path_mode(mode, view),
+            Op::MergeTolerance(t) if self.linuxcnc() && t > 0.0 => self.merge_tolerance(t, view),
+            Op::Override(which, on) => self.override_switch(which, on, source),
+            Op::DigitalOut { index, on, synced } => {
+                let code = match (synced, on) {
+                    (true, true) => 62,
+                    (true, false) => 63,
+                    (false, true) => 64,
+                    (false, false) => 65,
+                };
+                self.machine_io(&format!("M{code} P{index}"), "a digital output", source);
+            }
+            Op::AnalogOut { index, value, synced } => {
+                let value = self.w.number(value, 9);
+                let code = if synced { 67 } else { 68 };
+                self.machine_io(&format!("M{code} E{index} Q{value}"), "an analog output", source);
+            }
+            Op::InputWait { index, digital, wait, timeout } => {
+                let letter = if digital { 'P' } else { 'E' };
+                let limit = if wait == 0 { String::new() } else { format!(" Q{}", self.w.number(timeout, 6)) };
+                self.machine_io(&format!("M66 {letter}{index} L{wait}{limit}"), "reading an input", source);
+            }
+            Op::UserM { code, p, q } => self.user_code(code, p, q, source),
+            _ => {}
+        }
+    }
+
+    fn machine_io(&mut self, block: &str, what: &str, source: Source) {
+        if self.linuxcnc() { self.w.block(block) } else { self.cannot(what, source) }
+    }
+
+    fn user_code(&mut self, code: i32, p: f64, q: f64, source: Source) {
+        let mut block = format!("M{code}");
+        // A word that was not there reads as zero or below; the program behind the code gets the same.
+        for (letter, value) in [('P', p), ('Q', q)] {
+            if value != 0.0 && value != -1.0 {
+                block += &format!(" {letter}{}", self.w.number(value, 9));
+            }
+        }
+        self.machine_io(&block, "a user-defined M-code", source);
+    }
+
+    /// Words of the axes in which two offsets differ, with all the decimals an offset needs.
+    fn changed(&self, new: &Axes, old: &Axes) -> Vec<String> {
+        let places = self.w.places.max(9);
+        let differs = (0..9).filter(|i| new[*i] != old[*i]);
+        differs.map(|i| format!("{}{}", AXES[i], self.w.axis_fine(i, new[i], places).0)).collect()
+    }
+
+    fn work_offset(&mut self, n: u8, offset: &Axes, view: &View<'_, '_>) {
+        let index = usize::from(n.clamp(1, 9));
+        let selected = self.frame.work == n;
+        if self.options.language != Language::Linuxcnc && index > 6 {
+            self.cannot(&format!("work offset {}", OFFSETS[index]), view.source);
+            return self.move_frame(view.state);
+        }
+        let words = self.changed(offset, &self.offsets[index]);
+        if words.is_empty() || !selected {
+            self.w.block(OFFSETS[index]);
+        }
+        if !words.is_empty() {
+            let block = format!("G10 L2 P{index} {}", words.join(" "));
+            self.say(code::EMIT_OFFSET_NOT_CARRIED, view.source, &[OFFSETS[index].into(), block.clone()]);
+            let fanuc = self.options.language == Language::FanucMill;
+            self.w.block(&if fanuc { block.replacen("G10", "G90 G10", 1) } else { block });
+        }
+        self.offsets[index] = *offset;
+        self.motion_unsure();
+        self.move_frame(view.state);
+    }
+
+    fn rotation(&mut self, angle: f64, view: &View<'_, '_>) {
+        let index = usize::from(view.state.work.clamp(1, 9));
+        if angle != self.rotations[index] {
+            if self.linuxcnc() {
+                let degrees = self.w.number(angle.to_degrees(), 10);
+                self.w.block(&format!("G10 L2 P{index} R{degrees}"));
+            } else {
+                self.cannot("a rotated work offset", view.source);
+            }
+        }
+        self.rotations[index] = angle;
+        self.move_frame(view.state);
+    }
+
+    /// G92 and G52: what the axes are called from here on.
+    fn local_offset(&mut self, offset: &Axes, view: &View<'_, '_>) {
+        let old = self.frame.local_offset;
+        self.move_frame(view.state);
+        let inserted = view.source.line == crate::from_line::INSERTED;
+        let shift = match self.options.language {
+            Language::FanucMill => true,
+            // G92 refers to where the machine is, which nobody knows before the first move.
+            Language::Linuxcnc => inserted || self.words(view.source).is_some_and(|w| w.g(520)),
+            Language::Grbl if inserted => return self.cannot("a shifted work frame (G92) at the start", view.source),
+            Language::Grbl => false,
+        };
+        if offset.iter().all(|v| *v == 0.0) && !shift {
+            self.w.block("G92.1");
+            return self.motion_unsure();
+        }
+        let places = self.w.places.max(9);
+        let mut words = Vec::new();
+        for i in (0..9).filter(|i| offset[*i] != old[*i]) {
+            // G52 names the shift, G92 what the present place is called; the place has been rounded before.
+            let value = if shift { offset[i] } else { self.at[i] };
+            let (text, said) = self.w.axis_fine(i, value, places);
+            words.push(format!("{}{text}", AXES[i]));
+            if !shift {
+                self.at[i] = said;
+            }
+        }
+        let code = if shift { "G52" } else { "G92" };
+        if words.is_empty() {
+            return;
+        }
+        self.w.block(&format!("{code} {}", words.join(" ")));
+        self.motion_unsure();
+    }
+
+    /// Blocks with axis words of another meaning may end the modal motion on some controls.
+    fn motion_unsure(&mut self) {
+        self.motion = None;
+    }
+
+    fn tool_offset(&mut self, offset: &Axes, view: &View<'_, '_>) {
+        let words = self.words(view.source);
+        let off = words.is_some_and(|w| w.g(490));
+        let zero = offset.iter().all(|v| *v == 0.0);
+        let named = self.tool_with(offset, view.state.tool);
+        let block = match (named, self.options.language) {
+            _ if off || (zero && named.is_none()) => "G49".to_string(),
+            (Some(n), Language::Linuxcnc | Language::FanucMill) => format!("G43 H{n}"),
+            (_, Language::Linuxcnc) => format!("G43.1 {}", self.changed_all(offset)),
+            (_, Language::Grbl) if (0..9).all(|i| i == 2 || offset[i] == 0.0) => {
+                format!("G43.1 Z{}", self.w.axis_fine(2, offset[2], self.w.places.max(9)).0)
+            }
+            _ => {
+                self.cannot("a tool offset that is no tool's length", view.source);
+                return self.move_frame(view.state);
+            }
+        };
+        self.w.block(&block);
+        self.motion_unsure();
+        self.move_frame(view.state);
+    }
+
+    fn changed_all(&self, offset: &Axes) -> String {
+        let words = self.changed(offset, &self.frame.tool_offset);
+        if words.is_empty() { "Z0".into() } else { words.join(" ") }
+    }
+
+    /// The tool whose offset this is, the one in the spindle first.
+    fn tool_with(&self, offset: &Axes, in_spindle: i32) -> Option<i32> {
+        let same = |(n, o): &&(i32, Axes)| *n > 0 && (0..9).all(|i| (o[i] - offset[i]).abs() < 1e-9);
+        let all = || self.tools.iter().filter(same);
+        all().find(|(n, _)| *n == in_spindle).or_else(|| all().next()).map(|(n, _)| *n)
+    }
+
+    fn tool_change(&mut self, view: &View<'_, '_>) {
+        if self.options.language == Language::Grbl {
+            let what = format!("the change to tool {}", view.state.tool);
+            self.as_comment(&what, view.source);
+            return self.w.block("M0");
+        }
+        self.w.block("M6");
+        self.motion_unsure();
+    }
+
+    fn tool_entry(&mut self, view: &View<'_, '_>) {
+        let Op::ToolEntry { tool, offset, diameter, front, back, orientation, .. } = view.op else { return };
+        if !self.linuxcnc() {
+            return self.cannot("writing the tool table (G10 L1)", view.source);
+        }
+        let places = self.w.places.max(9);
+        let old = self.tools.iter().find(|(n, _)| *n == tool).map_or([0.0; 9], |t| t.1);
+        let mut words = self.changed(&offset, &old);
+        words.push(format!("R{}", self.w.length(0.5 * diameter, places).0));
+        if front != 0.0 || back != 0.0 {
+            words.push(format!("I{} J{}", self.w.number(front.to_degrees(), 9), self.w.number(back.to_degrees(), 9)));
+        }
+        if orientation != 0 {
+            words.push(format!("Q{orientation}"));
+        }
+        self.w.block(&format!("G10 L1 P{tool} {}", words.join(" ")));
+        self.tools.retain(|(n, _)| *n != tool);
+        self.tools.push((tool, offset));
+    }
+
+    fn spindle_word(&mut self, spindle: i32, source: Source) -> Option<String> {
+        if spindle <= 0 {
+            return Some(String::new());
+        }
+        if self.linuxcnc() {
+            return Some(format!(" ${spindle}"));
+        }
+        self.cannot("a second spindle", source);
+        None
+    }
+
+    fn spindle_mode(&mut self, spindle: i32, surface: Option<f64>, view: &View<'_, '_>) {
+        if self.options.language != Language::Linuxcnc && surface.is_some() {
+            return self.cannot("constant surface speed", view.source);
+        }
+        let Some(which) = self.spindle_word(spindle, view.source) else { return };
+        // G96 and G97 want their S in the same block.
+        let next = match self.op_after(view.index) {
+            Some(Op::SpindleSpeed { spindle: s, speed }) if s == spindle => Some(speed),
+            _ => None,
+        };
+        let speed = next.map(|speed| format!(" S{}", self.speed_text(speed, surface.is_some()))).unwrap_or_default();
+        match surface {
+            Some(limit) => {
+                // A limit beyond any spindle stands for none.
+                let limit = if limit < 1e9 { format!(" D{}", self.w.number(limit, 6)) } else { String::new() };
+                self.w.block(&format!("G96{limit}{speed}{which}"));
+            }
+            None if self.linuxcnc() => self.w.block(&format!("G97{speed}{which}")),
+            None => self.w.block(speed.trim()),
+        }
+        if next.is_some() {
+            self.done_until = view.index + 2;
+        }
+    }
+
+    /// rpm, or m/min or feet/min of surface speed as the length unit says.
+    fn speed_text(&self, speed: f64, surface: bool) -> String {
+        let per_minute = if self.w.unit == 1.0 { 1000.0 } else { 304.8 };
+        let value = if surface { speed * 60.0 / per_minute } else { speed };
+        self.w.number(value, 6)
+    }
+
+    fn spindle_speed(&mut self, spindle: i32, speed: f64, view: &View<'_, '_>) {
+        let surface = view.state.spindle(spindle).surface.is_some();
+        let Some(which) = self.spindle_word(spindle, view.source) else { return };
+        let text = self.speed_text(speed, surface);
+        let text = if self.linuxcnc() { text } else { text.trim_end_matches('.').to_string() };
+        self.w.block(&format!("S{text}{which}"));
+    }
+
+    fn spindle_turn(&mut self, spindle: i32, turn: Turn, source: Source) {
+        let Some(which) = self.spindle_word(spindle, source) else { return };
+        let code = match turn {
+            Turn::Cw => "M3",
+            Turn::Ccw => "M4",
+            Turn::Stop => "M5",
+        };
+        self.w.block(&format!("{code}{which}"));
+    }
+
+    fn orient(&mut self, spindle: i32, angle: f64, direction: i32, view: &View<'_, '_>) {
+        if !self.linuxcnc() {
+            return self.cannot("spindle orientation to an angle", view.source);
+        }
+        let Some(which) = self.spindle_word(spindle, view.source) else { return };
+        let mut block = format!("M19 R{}", self.w.number(angle.to_degrees(), 9));
+        if direction != 0 {
+            block += &format!(" P{direction}");
+        }
+        if let Some(Op::SpindleWait { timeout, .. }) = self.op_after(view.index) {
+            block += &format!(" Q{}", self.w.number(timeout, 6));
+            self.done_until = view.index + 2;
+        }
+        self.w.block(&(block + &which));
+    }
+
+    fn coolant(&mut self, on: bool, code: &str, view: &View<'_, '_>) {
+        if on {
+            return self.w.block(code);
+        }
+        // M9 ends both; the pair that it makes is written once.
+        let pair = match (view.op, self.op_after(view.index)) {
+            (Op::Mist(_), Some(Op::Flood(false))) | (Op::Flood(_), Some(Op::Mist(false))) => true,
+            _ => false,
+        };
+        self.w.block("M9");
+        if pair {
+            self.done_until = view.index + 2;
+        } else if view.state.mist {
+            self.w.block("M7");
+        } else if view.state.flood {
+            self.w.block("M8");
+        }
+    }
+
+    fn path_mode(&mut self, mode: PathMode, view: &View<'_, '_>) {
+        let source = view.source;
+        match (mode, self.options.language) {
+            (PathMode::ExactStop, Language::Linuxcnc) => self.w.block("G61.1"),
+            (PathMode::ExactPath, Language::Linuxcnc | Language::Grbl) => self.w.block("G61"),
+            (PathMode::ExactStop, Language::FanucMill) => self.w.block("G61"),
+            (PathMode::Blend(t), Language::Linuxcnc) => self.blend(t, view),
+            (PathMode::Blend(t), Language::FanucMill) => {
+                self.w.block("G64");
+                if t > 0.0 {
+                    self.as_comment("the path tolerance G64 P", source);
+                }
+            }
+            (PathMode::ExactStop, Language::Grbl) => self.as_comment("exact stop G61.1", source),
+            (PathMode::ExactPath, Language::FanucMill) => self.as_comment("exact path G61", source),
+            (PathMode::Blend(_), Language::Grbl) => self.as_comment("path blending G64", source),
+        }
+    }
+
+    fn blend(&mut self, tolerance: f64, view: &View<'_, '_>) {
+        let places = self.w.places.max(9);
+        let mut block = "G64".to_string();
+        if tolerance > 0.0 {
+            block += &format!(" P{}", self.w.length(tolerance, places).0);
+        }
+        if let Some(Op::MergeTolerance(q)) = self.op_after(view.index) {
+            if q != tolerance && tolerance > 0.0 {
+                block += &format!(" Q{}", self.w.length(q, places).0);
+            }
+            self.done_until = view.index + 2;
+        }
+        self.w.block(&block);
+    }
+
+    /// A merge tolerance on its own: only G64 can say it.
+    fn merge_tolerance(&mut self, tolerance: f64, view: &View<'_, '_>) {
+        if let PathMode::Blend(p) = view.state.path
+            && p > 0.0
+        {
+            let places = self.w.places.max(9);
+            let (p, q) = (self.w.length(p, places).0, self.w.length(tolerance, places).0);
+            self.w.block(&format!("G64 P{p} Q{q}"));
+        }
+    }
+
+    fn override_switch(&mut self, which: Override, on: bool, source: Source) {
+        let state = i32::from(on);
+        let (block, name) = match which {
+            Override::Feed => (format!("M50 P{state}"), "the feed override switch"),
+            Override::Speed(n) if n > 0 => (format!("M51 P{state} ${n}"), "the speed override switch"),
+            Override::Speed(_) => (format!("M51 P{state}"), "the speed override switch"),
+            Override::Adaptive => (format!("M52 P{state}"), "adaptive feed"),
+            Override::FeedHold => (format!("M53 P{state}"), "the feed hold switch"),
+        };
+        if self.linuxcnc() { self.w.block(&block) } else { self.as_comment(name, source) }
+    }
+}

@@ -1,0 +1,172 @@
+//! What a back end may ask about the source text. Motion is known from the IR alone; the text tells which words
+//! stood there, which matters where a number is only a simulation's: G53, G28, a word that happens to change
+//! nothing.
+
+use gr_ir::Source;
+use gr_text::{FileId, Span};
+
+/// Gives source lines.
+pub trait Sources {
+    /// The bytes of a line, for messages.
+    fn place(&self, source: Source) -> (FileId, Span);
+    /// The text of a line (from 0); none where there is no such line or no text.
+    fn line(&self, file: FileId, line: u32) -> Option<&str>;
+}
+
+/// No text at hand.
+pub struct NoSources;
+
+impl Sources for NoSources {
+    fn place(&self, source: Source) -> (FileId, Span) {
+        (source.file, Span::default())
+    }
+    fn line(&self, _file: FileId, _line: u32) -> Option<&str> {
+        None
+    }
+}
+
+/// Whole texts by file number.
+pub struct Texts<'a> {
+    files: Vec<(FileId, &'a str, gr_text::LineIndex)>,
+}
+
+impl<'a> Texts<'a> {
+    /// Indexes the lines of some files.
+    pub fn new(files: impl IntoIterator<Item = (FileId, &'a str)>) -> Texts<'a> {
+        let files = files.into_iter().map(|(id, t)| (id, t, gr_text::LineIndex::new(t.as_bytes())));
+        Texts { files: files.collect() }
+    }
+    fn span(&self, file: FileId, line: u32) -> Option<(&'a str, Span)> {
+        let (_, text, index) = self.files.iter().find(|f| f.0 == file)?;
+        let line = line as usize;
+        if line >= index.count() {
+            return None;
+        }
+        let (start, end) = (index.start(line), index.start(line.checked_add(1)?));
+        let body = text.get(start as usize..end as usize)?.trim_end_matches(['\r', '\n']);
+        Some((body, Span::new(start, start + body.len() as u32)))
+    }
+}
+
+impl Sources for Texts<'_> {
+    fn place(&self, source: Source) -> (FileId, Span) {
+        (source.file, self.span(source.file, source.line).map(|s| s.1).unwrap_or_default())
+    }
+    fn line(&self, file: FileId, line: u32) -> Option<&str> {
+        self.span(file, line).map(|s| s.0)
+    }
+}
+
+/// What stands in a line, as far as a look at its letters tells: expressions are skipped, not evaluated.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Words {
+    /// Bit `letter - 'a'`; `@` counts as X and Y, `^` too.
+    letters: u32,
+    codes: u32,
+}
+
+/// Codes that [`Words`] looks for, times ten.
+const CODES: [u32; 13] = [530, 280, 300, 281, 301, 400, 410, 420, 411, 421, 490, 520, 921];
+
+impl Words {
+    /// Reads a line.
+    pub fn of(line: &str) -> Words {
+        let mut words = Words::default();
+        let bytes = line.as_bytes();
+        let mut i = 0;
+        while i < bytes.len() {
+            match bytes[i].to_ascii_lowercase() {
+                b'(' => i += bytes[i..].iter().position(|b| *b == b')').unwrap_or(bytes.len()),
+                b';' => break,
+                b'[' => i = close(bytes, i),
+                // A parameter is a value here or the target of a setting, never an axis word.
+                b'#' => i = parameter(bytes, i),
+                b'@' | b'^' => words.letters |= bit(b'x') | bit(b'y'),
+                l @ b'a'..=b'z' => {
+                    words.letters |= bit(l);
+                    if l == b'g' {
+                        words.code(&bytes[i + 1..]);
+                    }
+                }
+                _ => {}
+            }
+            i += 1;
+        }
+        words
+    }
+
+    fn code(&mut self, rest: &[u8]) {
+        let mut number = String::new();
+        for b in rest {
+            match b {
+                b'0'..=b'9' | b'.' => number.push(char::from(*b)),
+                b' ' | b'\t' => {}
+                _ => break,
+            }
+        }
+        let tenths = number.parse::<f64>().map_or(0, |v| (v * 10.0).round() as u32);
+        if let Some(i) = CODES.iter().position(|c| *c == tenths) {
+            self.codes |= 1 << i;
+        }
+    }
+
+    /// Whether a letter (lower case) stands there.
+    pub fn has(self, letter: u8) -> bool {
+        self.letters & bit(letter) != 0
+    }
+    /// Whether a G-code (times ten) of the list stands there.
+    pub fn g(self, tenths: u32) -> bool {
+        CODES.iter().position(|c| *c == tenths).is_some_and(|i| self.codes & (1 << i) != 0)
+    }
+}
+
+fn bit(letter: u8) -> u32 {
+    1 << (letter - b'a')
+}
+
+/// Index of the bracket that closes the one at `i`.
+fn close(bytes: &[u8], i: usize) -> usize {
+    let mut depth = 0;
+    for (j, b) in bytes.iter().enumerate().skip(i) {
+        match b {
+            b'[' => depth += 1,
+            b']' => depth -= 1,
+            _ => {}
+        }
+        if depth == 0 {
+            return j;
+        }
+    }
+    bytes.len()
+}
+
+fn parameter(bytes: &[u8], i: usize) -> usize {
+    match bytes.get(i + 1) {
+        Some(b'<') => i + bytes[i..].iter().position(|b| *b == b'>').unwrap_or(bytes.len()),
+        _ => i,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn letters_and_codes() {
+        let w = Words::of("N10 g 53 G0 x[#<cat> + sin[3]] #<zeta>=3 (Y) ; A");
+        assert!(w.has(b'x') && w.has(b'g') && w.g(530));
+        assert!(!w.has(b'y') && !w.has(b'z') && !w.has(b'a') && !w.has(b'c') && !w.g(280));
+        assert!(Words::of("G28.1").g(281) && !Words::of("G28.1").g(280));
+        assert!(Words::of("@5 ^30").has(b'y'));
+        assert_eq!(Words::of("x[[[").has(b'x'), true);
+    }
+
+    #[test]
+    fn lines_of_texts() {
+        let texts = Texts::new([(FileId(3), "G0 X1\r\nG1 X2")]);
+        assert_eq!(texts.line(FileId(3), 1), Some("G1 X2"));
+        assert_eq!(texts.line(FileId(3), 2), None);
+        let at = Source { file: FileId(3), line: 0, ..Source::default() };
+        assert_eq!(texts.place(at), (FileId(3), Span::new(0, 5)));
+    }
+}
