@@ -25,15 +25,18 @@ pub const GROUPS: usize = 17;
 /// Number of M groups.
 pub const M_GROUPS: usize = 11;
 
-/// One block's words after evaluation. Cleared by resetting two masks, not by writing every field.
+/// One block's words after evaluation. Cleared by resetting masks, not by writing every field.
 #[derive(Clone, Debug)]
 pub struct Block {
     /// Bit `letter - b'a'` for each letter word present (`@` bit 26, `^` bit 27, `$` bit 28).
     pub present: u32,
-    /// Values by the same index; meaningless where the bit is clear. Integer words (D H L N O T $) hold whole numbers.
+    /// Values by the same index; where the bit is clear, the value some earlier block had. Integer words
+    /// (H L N T $) hold whole numbers.
     pub values: [f64; 29],
     /// G-code of each group times ten, −1 = none.
     pub g: [i16; GROUPS],
+    /// Which entries of `g` are set.
+    pub g_mask: u32,
     /// M-code of each group, −1 = none.
     pub m: [i16; M_GROUPS],
     /// How many M-codes.
@@ -42,33 +45,72 @@ pub struct Block {
     pub user_m: i16,
     /// The motion this block makes (G-code times ten), −1 = none.
     pub motion: i16,
+    /// Steps of execution that are done already (a remapped block is executed in several goes).
+    pub(crate) done: u32,
+    /// Steps of execution that a remap takes over.
+    pub(crate) remapped: u32,
 }
 
 impl Default for Block {
     fn default() -> Self {
-        Block { present: 0, values: [0.0; 29], g: [-1; GROUPS], m: [-1; M_GROUPS], m_count: 0, user_m: -1, motion: -1 }
+        Block {
+            present: 0,
+            values: [0.0; 29],
+            g: [-1; GROUPS],
+            g_mask: 0,
+            m: [-1; M_GROUPS],
+            m_count: 0,
+            user_m: -1,
+            motion: -1,
+            done: 0,
+            remapped: 0,
+        }
     }
 }
 
 /// Index of a letter (lower case, `@`, `^`, `$`).
+#[inline]
 pub const fn slot(letter: u8) -> usize {
     match letter {
         b'@' => 26,
         b'^' => 27,
         b'$' => 28,
-        l => (l - b'a') as usize,
+        l => (l.wrapping_sub(b'a') & 31) as usize,
     }
 }
 
+/// Mask of several letters, for [`Block::has_any_of`].
+pub const fn letters(list: &[u8]) -> u32 {
+    let (mut mask, mut i) = (0, 0);
+    while i < list.len() {
+        mask |= 1 << slot(list[i]);
+        i += 1;
+    }
+    mask
+}
+
+/// X Y Z A B C U V W.
+pub const AXIS_LETTERS: [u8; 9] = *b"xyzabcuvw";
+/// Mask of the axis letters.
+pub const AXES: u32 = letters(b"xyzabcuvw");
+
 impl Block {
-    /// Forgets everything.
+    /// Forgets everything but old values.
+    #[inline]
     pub fn clear(&mut self) {
         self.present = 0;
-        self.g = [-1; GROUPS];
-        self.m = [-1; M_GROUPS];
-        self.m_count = 0;
-        self.user_m = -1;
+        if self.g_mask != 0 {
+            self.g = [-1; GROUPS];
+            self.g_mask = 0;
+        }
+        if self.m_count != 0 {
+            self.m = [-1; M_GROUPS];
+            self.m_count = 0;
+            self.user_m = -1;
+        }
         self.motion = -1;
+        self.done = 0;
+        self.remapped = 0;
     }
     /// Whether a word is there.
     #[inline]
@@ -80,6 +122,11 @@ impl Block {
     pub fn has_any(&self, letters: &[u8]) -> bool {
         letters.iter().any(|l| self.has(*l))
     }
+    /// Whether any word of a mask made by [`letters`] is there.
+    #[inline]
+    pub fn has_any_of(&self, mask: u32) -> bool {
+        self.present & mask != 0
+    }
     /// A word's value.
     #[inline]
     pub fn get(&self, letter: u8) -> Option<f64> {
@@ -89,6 +136,11 @@ impl Block {
     #[inline]
     pub fn or_zero(&self, letter: u8) -> f64 {
         self.get(letter).unwrap_or(0.0)
+    }
+    /// A word's value, or −1, which is what the controller keeps for P, Q and L when they are missing.
+    #[inline]
+    pub fn or_minus_one(&self, letter: u8) -> f64 {
+        self.get(letter).unwrap_or(-1.0)
     }
     /// Sets a word (also used to put in what is implied).
     #[inline]
@@ -104,5 +156,18 @@ impl Block {
     #[inline]
     pub fn g(&self, group: Group) -> i16 {
         self.g[group as usize]
+    }
+    /// Sets the G-code of a group.
+    #[inline]
+    pub fn set_g(&mut self, group: usize, code: i16) {
+        self.g[group] = code;
+        self.g_mask |= 1 << group;
+    }
+    /// Whether a step of execution is still to do; marks it as done.
+    #[inline]
+    pub(crate) fn once(&mut self, step: u32) -> bool {
+        let todo = self.done & (1 << step) == 0;
+        self.done |= 1 << step;
+        todo
     }
 }

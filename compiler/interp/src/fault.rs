@@ -10,6 +10,8 @@ pub struct Fault {
     pub rs: Option<Rs274>,
     /// Arguments of both messages.
     pub args: Vec<String>,
+    /// Arguments of our own message, when they differ.
+    pub own_args: Vec<String>,
     /// The word that is to blame: its lower-case letter. The first such word of the block is underlined; no
     /// letter: the whole block.
     pub letter: Option<u8>,
@@ -23,16 +25,34 @@ pub type Res<T = ()> = Result<T, Box<Fault>>;
 impl Fault {
     /// A fault of the whole block.
     pub fn new(code: Code, rs: Rs274) -> Box<Fault> {
-        Box::new(Fault { code, rs: Some(rs), args: Vec::new(), letter: None, span: None })
+        Box::new(Fault { code, rs: Some(rs), args: Vec::new(), own_args: Vec::new(), letter: None, span: None })
     }
     /// Our own finding, which the real `rs274` does not have.
     pub fn own(code: Code) -> Box<Fault> {
-        Box::new(Fault { code, rs: None, args: Vec::new(), letter: None, span: None })
+        Box::new(Fault { code, rs: None, args: Vec::new(), own_args: Vec::new(), letter: None, span: None })
     }
     /// Blames a word.
     pub fn at(mut self: Box<Self>, letter: u8) -> Box<Fault> {
         self.letter = Some(letter);
         self
+    }
+    /// Replaces the first argument of our own message, where `rs274` shows another form of it.
+    pub fn named(mut self: Box<Self>, name: String) -> Box<Fault> {
+        self.own_args = vec![name];
+        self
+    }
+    /// Sets the arguments of our own message, where `rs274` has others.
+    pub fn own_args(mut self: Box<Self>, args: &[&str]) -> Box<Fault> {
+        self.own_args = args.iter().map(|a| (*a).to_string()).collect();
+        self
+    }
+    /// Arguments of our own message.
+    pub fn message_args(&self) -> &[String] {
+        if self.own_args.is_empty() { &self.args } else { &self.own_args }
+    }
+    /// What the real `rs274` prints.
+    pub fn rs_text(&self) -> Option<String> {
+        self.rs.map(|rs| gr_spec::fill(rs.text(), &self.args))
     }
     /// Adds a message argument.
     pub fn arg(mut self: Box<Self>, value: impl std::fmt::Display) -> Box<Fault> {

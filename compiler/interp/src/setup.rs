@@ -22,6 +22,10 @@ pub struct Setup {
     pub block_delete: bool,
     /// Limits.
     pub budgets: Budgets,
+    /// M100 … M199 exist on this machine. The real `rs274` has none.
+    pub user_m_codes: bool,
+    /// M99 in the main program begins it again, as on the machine; `rs274` ends.
+    pub loop_on_main_m99: bool,
     /// Go on after an error as `rs274 -n 0` does; `check` does too, to find more than one.
     pub keep_going: bool,
 }
@@ -37,6 +41,8 @@ impl Default for Setup {
             ini: Ini::default(),
             block_delete: false,
             budgets: Budgets::default(),
+            user_m_codes: true,
+            loop_on_main_m99: false,
             keep_going: false,
         }
     }

@@ -1,11 +1,143 @@
-#![allow(dead_code, clippy::unused_self)]
+//! Splines: G5 (cubic), G5.1 (quadratic), G5.2 … G5.3 (NURBS), all sent as NURBS with their control points.
 
-use gr_canon::Sink;
+use gr_canon::{Call, Nurbs, Plane, Sink};
+use gr_spec::{Rs274, code, rs274};
 
-use crate::{Interp, Res};
+use crate::{Fault, Interp, Res};
+
+fn words(text: Rs274, why: &str) -> Box<Fault> {
+    Fault::new(code::SPLINE_WORDS, text).arg(why)
+}
 
 impl<S: Sink> Interp<'_, S> {
-    pub(crate) fn convert_spline(&mut self, _g: i16) -> Res {
+    /// G5, G5.1, G5.2, G5.3.
+    pub(crate) fn convert_spline(&mut self, g: i16) -> Res {
+        match g {
+            52 => self.nurbs_point(),
+            53 => self.nurbs_end(),
+            _ => {
+                self.check_spline()?;
+                if g == 51 { self.quadratic_spline() } else { self.cubic_spline() }
+            }
+        }
+    }
+
+    fn check_spline(&self) -> Res {
+        if self.m.comp_side != 0 {
+            return Err(words(rs274::SPLINE_COMP, "cutter compensation is on"));
+        }
+        // Feed per revolution is not looked at.
+        if self.m.feed_mode != 2 {
+            self.check_cutting_feed(rs274::ARC_ZERO_FEED, rs274::ARC_NO_F)?;
+        }
+        if self.m.plane() != Plane::Xy {
+            return Err(words(rs274::SPLINE_PLANE, "the plane is not G17"));
+        }
+        if self.block.has_any(b"zabc") {
+            return Err(words(rs274::SPLINE_AXES, "it can't move Z, A, B or C"));
+        }
+        Ok(())
+    }
+
+    fn send_spline(&mut self, order: u32, points: &[[f64; 2]]) {
+        let points = points.iter().map(|p| [p[0], p[1], 1.0]).collect();
+        self.emit(Call::NurbsFeed(Box::new(Nurbs { order, points })));
+    }
+
+    fn quadratic_spline(&mut self) -> Res {
+        let (Some(i), Some(j)) = (self.block.get(b'i'), self.block.get(b'j')) else {
+            return Err(words(rs274::SPLINE_NO_IJ, "I or J is missing"));
+        };
+        let start = [self.m.current[0], self.m.current[1]];
+        let end = self.find_ends()?;
+        self.send_spline(3, &[start, [start[0] + i, start[1] + j], [end[0], end[1]]]);
+        self.m.current[..2].copy_from_slice(&end[..2]);
+        Ok(())
+    }
+
+    fn cubic_spline(&mut self) -> Res {
+        let start = [self.m.current[0], self.m.current[1]];
+        let tangent = self.spline_tangent(start)?;
+        let end = self.find_ends()?;
+        let (Some(p), Some(q)) = (self.block.get(b'p'), self.block.get(b'q')) else {
+            return Err(words(rs274::SPLINE_NO_PQ, "P or Q is missing"));
+        };
+        let first = [start[0] + tangent[0], start[1] + tangent[1]];
+        self.send_spline(4, &[start, first, [end[0] + p, end[1] + q], [end[0], end[1]]]);
+        (self.m.cycle_i, self.m.cycle_j) = (-p, -q);
+        self.m.spline_tail = [end[0], end[1]];
+        self.m.current[..2].copy_from_slice(&end[..2]);
+        Ok(())
+    }
+
+    /// I and J, or what the last G5 left.
+    fn spline_tangent(&mut self, start: [f64; 2]) -> Res<[f64; 2]> {
+        match (self.block.get(b'i'), self.block.get(b'j')) {
+            (Some(i), Some(j)) => Ok([i, j]),
+            (None, None) => {
+                let kept = [self.m.cycle_i, self.m.cycle_j];
+                if start != self.m.spline_tail || kept == [0.0, 0.0] {
+                    self.warn(Fault::own(code::SPLINE_NO_FIRST_TANGENT).arg(kept[0]).arg(kept[1]));
+                }
+                Ok(kept)
+            }
+            _ => Err(words(rs274::SPLINE_ONE_OF_IJ, "I or J is missing")),
+        }
+    }
+
+    /// G5.2: one more control point.
+    fn nurbs_point(&mut self) -> Res {
+        let (x, y) = (self.block.has(b'x'), self.block.has(b'y'));
+        let weight = self.block.get(b'p').unwrap_or(-1.0);
+        let begun = !self.queue.spline.points.is_empty();
+        if x != y {
+            return Err(words(rs274::NURBS_ONE_AXIS, "X or Y is missing"));
+        }
+        if !x && weight > 0.0 && begun {
+            return Err(words(rs274::NURBS_P_ALONE, "P without X and Y is for the first control point only"));
+        }
+        if weight <= 0.0 && begun {
+            return Err(words(rs274::NURBS_NO_P, "the weight P is missing or not greater than zero"));
+        }
+        if self.m.feed_mode == 0 && self.m.feed == 0.0 {
+            return Err(Fault::new(code::ARC_NO_FEED, rs274::NURBS_ZERO_FEED).arg("the feed is zero"));
+        }
+        if self.m.motion != 52 {
+            self.queue.spline.points.clear();
+        }
+        if self.queue.spline.points.is_empty() {
+            let first = if !x && weight > 0.0 { weight } else { 1.0 };
+            self.queue.spline.order = 3;
+            self.queue.spline.points.push([self.m.current[0], self.m.current[1], first]);
+        }
+        if let Some(order) = self.block.get(b'l').filter(|l| *l > 3.0) {
+            self.queue.spline.order = order as u32;
+        }
+        if x {
+            let end = self.find_ends()?;
+            self.queue.spline.points.push([end[0], end[1], weight]);
+        }
+        self.m.motion = 52;
+        Ok(())
+    }
+
+    /// G5.3: sends the NURBS.
+    fn nurbs_end(&mut self) -> Res {
+        if self.m.motion != 52 {
+            return Err(words(rs274::NURBS_NOT_BEGUN, "G5.3 without G5.2"));
+        }
+        let spline = &self.queue.spline;
+        if spline.points.len() < spline.order as usize {
+            let order = spline.order;
+            return Err(words(rs274::NURBS_TOO_FEW, "too few control points").arg(order));
+        }
+        let spline = std::mem::take(&mut self.queue.spline);
+        if let Some(last) = spline.points.last() {
+            self.m.current[..2].copy_from_slice(&last[..2]);
+        }
+        self.queue.spline.order = spline.order;
+        self.emit(Call::NurbsFeed(Box::new(spline)));
+        self.m.motion = -1;
         Ok(())
     }
 }

@@ -1,5 +1,12 @@
+use std::hash::{Hash, Hasher};
+use std::sync::Arc;
+
 use bytemuck::{Pod, Zeroable};
 use gr_canon::{Axes, Plane, Units};
+
+use crate::queue::Queue;
+use crate::world::World;
+use crate::{Setup, ToolTable};
 
 /// Number of spindles a machine may have.
 pub const SPINDLES: usize = 8;
@@ -127,8 +134,10 @@ pub struct Modal {
     pub probed: u8,
     /// Set by M6/M61 for #5400.
     pub tool_changed: u8,
+    /// M66 ran and its result is not read yet: 1 = digital, 2 = analog.
+    pub input_wanted: u8,
     /// Always 0; keeps the size a multiple of eight.
-    pub pad: [u8; 7],
+    pub pad: [u8; 6],
 }
 
 impl Modal {
@@ -150,9 +159,95 @@ impl Modal {
     }
 }
 
-/// The whole state between two blocks.
+/// What M70 and M73 keep.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SavedModes {
+    /// Active G-codes, as the controller reports them.
+    pub g: [i32; 17],
+    /// Active M-codes.
+    pub m: [i32; 9],
+    /// Line, feed, speed, G64 P, G64 Q.
+    pub settings: [f64; 5],
+}
+
+/// The whole state between two blocks, parameters excepted.
 #[derive(Clone, Debug)]
 pub struct State {
     /// Plain part.
     pub modal: Modal,
+    /// Calls that cutter compensation holds back.
+    pub queue: Queue,
+    /// What the machine would answer.
+    pub world: World,
+    /// Modes kept by M70 in the main program.
+    pub saved: Option<Box<SavedModes>>,
+    /// The tool table, once the program changed it or a tool was changed.
+    pub tools: Option<Arc<ToolTable>>,
+    /// The machine's own table, likewise.
+    pub world_tools: Option<Arc<ToolTable>>,
+}
+
+impl State {
+    /// Before the first block.
+    pub fn start(setup: &Setup) -> State {
+        let mut modal = Modal::zeroed();
+        modal.motion = 800;
+        modal.plane = Plane::Xy as u8;
+        modal.units = Units::Mm as u8;
+        modal.retract_r = 1;
+        modal.path_mode = 2;
+        modal.comp_first = 1;
+        modal.feed_override = 1;
+        modal.speed_override = [1; SPINDLES];
+        modal.feed_hold = 1;
+        modal.pocket = 1;
+        modal.origin_index = 1;
+        modal.n_number = -1;
+        let _ = setup;
+        State { modal, queue: Queue::default(), world: World::new(), saved: None, tools: None, world_tools: None }
+    }
+    /// The bytes that make two states the same state (`-0.0` counts as `0.0`).
+    pub fn key_bytes(&self) -> Vec<u8> {
+        let mut out = Vec::with_capacity(1024);
+        for part in [self.modal.bytes(), bytemuck::bytes_of(&self.world)] {
+            for eight in part.chunks(8) {
+                if eight == [0, 0, 0, 0, 0, 0, 0, 0x80] {
+                    out.extend_from_slice(&[0; 8]);
+                } else {
+                    out.extend_from_slice(eight);
+                }
+            }
+        }
+        if let Some(saved) = &self.saved {
+            out.push(1);
+            out.extend(saved.g.iter().chain(&saved.m).flat_map(|v| v.to_le_bytes()));
+            out.extend(saved.settings.iter().flat_map(|v| (v + 0.0).to_bits().to_le_bytes()));
+        }
+        for table in [&self.tools, &self.world_tools].into_iter().flatten() {
+            out.push(2);
+            for tool in &table.rows {
+                out.extend(tool.number.to_le_bytes());
+                out.extend(tool.pocket.to_le_bytes());
+                out.extend(tool.orientation.to_le_bytes());
+                let numbers = tool.offset.iter().chain([&tool.diameter, &tool.front_angle, &tool.back_angle]);
+                out.extend(numbers.flat_map(|v| (v + 0.0).to_bits().to_le_bytes()));
+            }
+        }
+        out
+    }
+}
+
+impl PartialEq for State {
+    fn eq(&self, other: &Self) -> bool {
+        self.key_bytes() == other.key_bytes() && self.queue == other.queue
+    }
+}
+
+impl Eq for State {}
+
+impl Hash for State {
+    fn hash<H: Hasher>(&self, h: &mut H) {
+        self.key_bytes().hash(h);
+        self.queue.hash(h);
+    }
 }
