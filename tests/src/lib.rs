@@ -6,3 +6,4 @@ pub mod matrix;
 pub mod oracle;
 pub mod process;
 pub mod programs;
+pub mod random;

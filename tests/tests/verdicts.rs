@@ -1,0 +1,112 @@
+//! What `gcc-robot check` says: the expected diagnostic on each one-fault program, and nothing but lints on every
+//! program that the real `rs274` accepts.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::Duration;
+
+use gr_tests::oracle::{Job, TOOLS, gcc_robot, reference, root, score};
+use gr_tests::process::run;
+
+/// Diagnostic codes (with severity) that `check` reports, in order.
+fn check(file: &Path, more: &[&str]) -> Vec<(String, String)> {
+    let out = run(
+        Command::new(gcc_robot())
+            .arg("check")
+            .args(["--message-format", "json"])
+            .args(more)
+            .arg(file)
+            .current_dir(file.parent().expect("a folder")),
+        Duration::from_secs(60),
+    )
+    .expect("it starts");
+    assert!(!out.timed_out, "{} ran into the time limit", file.display());
+    let text = out.output();
+    let mut found = Vec::new();
+    // One JSON object per line or one array: either way each diagnostic has "code" and "severity".
+    for part in text.split('{') {
+        let value = |key: &str| {
+            let at = part.find(&format!("\"{key}\""))? + key.len() + 2;
+            let rest = part[at..].trim_start_matches([':', ' ']);
+            Some(rest.strip_prefix('"')?.split('"').next()?.to_string())
+        };
+        if let (Some(code), Some(severity)) = (value("code"), value("severity"))
+            && code.starts_with('E')
+        {
+            found.push((code, severity));
+        }
+    }
+    found
+}
+
+fn table() -> tempfile::NamedTempFile {
+    let file = tempfile::NamedTempFile::new().expect("a temporary file");
+    std::fs::write(file.path(), TOOLS).expect("writable");
+    file
+}
+
+fn programs(folder: &str) -> Vec<PathBuf> {
+    let mut files: Vec<PathBuf> = std::fs::read_dir(root().join("tests/corpus").join(folder))
+        .expect("the corpus is there")
+        .filter_map(|e| Some(e.ok()?.path()))
+        .filter(|p| p.extension().is_some_and(|e| e == "ngc"))
+        .collect();
+    files.sort();
+    files
+}
+
+#[test]
+fn each_fault_has_its_diagnostic() {
+    let tools = table();
+    let tools = tools.path().display().to_string();
+    let (mut wrong, mut all) = (Vec::new(), 0);
+    for file in programs("errors") {
+        let text = std::fs::read_to_string(&file).unwrap_or_default();
+        let Some(expected) = text.lines().next().and_then(|l| l.strip_prefix("; expect ")) else { continue };
+        let code = expected.split(' ').next().unwrap_or_default().to_string();
+        all += 1;
+        let found = check(&file, &["--tools", &tools]);
+        if !found.iter().any(|(c, _)| *c == code) {
+            wrong.push(format!("{}: expected {expected}, got {found:?}", file.file_stem().unwrap_or_default().display()));
+        }
+    }
+    let line = format!("one-fault programs whose fault is named: {} of {all}", all - wrong.len());
+    score("diagnostics", &line);
+    assert!(wrong.is_empty(), "{line}\n{}", wrong.join("\n"));
+}
+
+fn is_lint(code: &str) -> bool {
+    gr_spec::Code::find(code).is_some_and(|c| c.def().lint)
+}
+
+/// A false alarm is an error on a program the real one accepts, or a warning that is not in the table of lints.
+/// Where rs274 is silent by mistake we warn on purpose; those programs lie in `errors/`.
+#[test]
+fn no_false_alarm() {
+    let Some(rs274) = reference() else { return };
+    let tools = table();
+    let tools = tools.path().display().to_string();
+    let mut files = programs("accepted");
+    let listed = Command::new("dpkg").args(["-L", "linuxcnc-uspace"]).output();
+    let listed = listed.map(|o| String::from_utf8_lossy(&o.stdout).into_owned()).unwrap_or_default();
+    files.extend(listed.lines().filter(|l| l.ends_with(".ngc")).map(PathBuf::from));
+    let (mut alarms, mut accepted) = (Vec::new(), 0);
+    for file in files {
+        let Ok(bytes) = std::fs::read(&file) else { continue };
+        let mut job = Job::new(bytes);
+        job.ini = std::fs::read_to_string(file.with_extension("ini")).ok();
+        if job.ini.is_some() || !job.reference(&rs274).ok() {
+            continue;
+        }
+        accepted += 1;
+        let found = check(&file, &["--tools", &tools, "--machine-units", "inch"]);
+        let bad: Vec<_> = found.iter().filter(|(c, s)| s != "hint" && !is_lint(c)).collect();
+        if !bad.is_empty() {
+            alarms.push(format!("{}: {bad:?}", file.display()));
+        }
+    }
+    let line = format!("false alarms on {accepted} accepted programs: {}", alarms.len());
+    score("false-alarms", &line);
+    println!("{line}");
+    assert!(alarms.is_empty(), "{line}\n{}", alarms.join("\n"));
+}
