@@ -126,7 +126,7 @@ impl Tables {
             self.fault(whole, code::SYNTAX_NOT_IN_DIALECT, rs274::SILENT, &["`$` commands in programs".to_string()]);
             return;
         }
-        let (block, flaws) = grammar::parse(&line.tokens, rules.family);
+        let (block, flaws) = grammar::parse(&line.tokens, &line.gaps(), rules.family);
         if let Some(last) = self.lines.last_mut() {
             last.deleted = block.deleted;
         }
@@ -224,7 +224,7 @@ impl Tables {
         // A P or Q at or below -1 looks to the controller as if there were none yet; what an expression
         // gives, only the interpreter knows.
         let counts = !matches!(letter, b'p' | b'q') || matches!(value.kind, Kind::Number(v) if v > -1.0);
-        if letter != b'n' && counts {
+        if letter != b'n' && counts && value.kind != Kind::Bad {
             self.seen |= bit;
         }
         match value.kind {

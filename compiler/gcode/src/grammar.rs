@@ -114,17 +114,33 @@ pub(crate) struct Block {
     pub items: Vec<Item>,
 }
 
+/// What the grammar knows besides the tokens.
+#[derive(Clone, Copy)]
+struct Ctx<'t> {
+    family: Family,
+    /// For each token whether a blank stands before it: means nothing, but tells where a damaged word may end.
+    gaps: &'t [bool],
+}
+
+impl<'t> Ctx<'t> {
+    fn gap_before(self, inp: &mut Ref<'t, '_>) -> bool {
+        let here = inp.cursor();
+        let index = inp.span_since(&here).start;
+        self.gaps.get(index).copied().unwrap_or(false)
+    }
+}
+
 /// Reads a line's tokens. There is always a result.
-pub(crate) fn parse(tokens: &[Token], family: Family) -> (Block, Vec<Flaw>) {
-    let (block, flaws) = line(family).parse(tokens).into_output_errors();
+pub(crate) fn parse(tokens: &[Token], gaps: &[bool], family: Family) -> (Block, Vec<Flaw>) {
+    let (block, flaws) = line(Ctx { family, gaps }).parse(tokens).into_output_errors();
     (block.unwrap_or_default(), flaws)
 }
 
-fn line<'t>(family: Family) -> Boxed<'t, Block> {
-    let value = value(family).boxed();
-    let slash = deleted(family).or_not().map(|slash| slash.is_some());
-    let number = line_number(family).or_not();
-    let rest = choice((o_word(value.clone(), family), items(value, family))).boxed();
+fn line<'t>(ctx: Ctx<'t>) -> Boxed<'t, Block> {
+    let value = value(ctx).boxed();
+    let slash = deleted(ctx).or_not().map(|slash| slash.is_some());
+    let number = line_number(ctx).or_not();
+    let rest = choice((o_word(value.clone(), ctx), items(value, ctx))).boxed();
     slash
         .then(number)
         .then(rest)
@@ -136,9 +152,9 @@ fn mark<'t>(byte: u8) -> impl Parser<'t, Tokens<'t>, Token, Extra> + Clone {
     just(Token::Mark(byte))
 }
 
-fn deleted<'t>(family: Family) -> Boxed<'t, ()> {
+fn deleted<'t>(ctx: Ctx<'t>) -> Boxed<'t, ()> {
     let level = custom(move |inp: &mut Ref<'t, '_>| match inp.peek() {
-        Some(Token::Number { value, whole: true }) if family == Family::Fanuc && (1.0..=9.0).contains(&value) => {
+        Some(Token::Number { value, whole: true }) if ctx.family == Family::Fanuc && (1.0..=9.0).contains(&value) => {
             inp.skip();
             Ok(())
         }
@@ -189,11 +205,13 @@ fn skip<'t>(inp: &mut Ref<'t, '_>, n: usize) {
     }
 }
 
-/// How many letters stand together.
-fn letters<'t>(inp: &mut Ref<'t, '_>) -> usize {
+/// How many letters stand together, without blanks between them.
+fn letters<'t>(inp: &mut Ref<'t, '_>, ctx: Ctx<'t>) -> usize {
     let here = inp.save();
     let mut n = 0;
-    while let Some(Token::Letter(b'a'..=b'z')) = inp.peek() {
+    while let Some(Token::Letter(b'a'..=b'z')) = inp.peek()
+        && (n == 0 || !ctx.gap_before(inp))
+    {
         inp.skip();
         n += 1;
     }
@@ -218,10 +236,10 @@ const FUNCTIONS: [(&str, Unary); 12] = [
     ("tan", Unary::Tan),
 ];
 
-fn value<'t>(family: Family) -> impl Parser<'t, Tokens<'t>, Expr, Extra> + Clone {
+fn value<'t>(ctx: Ctx<'t>) -> impl Parser<'t, Tokens<'t>, Expr, Extra> + Clone {
     recursive(move |value| {
         let value = value.boxed();
-        let expression = expression(value.clone(), family).boxed();
+        let expression = expression(value.clone(), ctx).boxed();
         let negative = prefix(b'-').ignore_then(value.clone()).map(|v| Kind::Unary(Unary::Negate, Box::new(v)));
         let positive = prefix(b'+').ignore_then(value.clone()).map(|v| v.kind);
         let bracketed = expression.clone().map(|v| v.kind);
@@ -236,7 +254,7 @@ fn value<'t>(family: Family) -> impl Parser<'t, Tokens<'t>, Expr, Extra> + Clone
             function().then(expression.clone()).map(|(f, v)| Kind::Unary(f, Box::new(v))),
             atan(expression),
             exists(value),
-            no_value(),
+            no_value(ctx),
         ))
         .map_with(|kind, e| Expr { kind, at: e.span() })
         .boxed()
@@ -299,21 +317,21 @@ fn name<'t>() -> impl Parser<'t, Tokens<'t>, usize, Extra> + Clone {
 }
 
 /// `value op value …` without brackets.
-fn chain<'t>(value: Boxed<'t, Expr>, family: Family) -> impl Parser<'t, Tokens<'t>, Expr, Extra> + Clone {
+fn chain<'t>(value: Boxed<'t, Expr>, ctx: Ctx<'t>) -> impl Parser<'t, Tokens<'t>, Expr, Extra> + Clone {
     value
         .clone()
-        .then(operator().then(value).repeated().collect::<Vec<_>>())
-        .map(move |(first, rest)| climb(first, rest, family))
+        .then(operator(ctx).then(value).repeated().collect::<Vec<_>>())
+        .map(move |(first, rest)| climb(first, rest, ctx.family))
 }
 
 /// `[ value op value … ]`
-fn expression<'t>(value: Boxed<'t, Expr>, family: Family) -> impl Parser<'t, Tokens<'t>, Expr, Extra> + Clone {
+fn expression<'t>(value: Boxed<'t, Expr>, ctx: Ctx<'t>) -> impl Parser<'t, Tokens<'t>, Expr, Extra> + Clone {
     mark(b'[')
-        .ignore_then(chain(value, family))
-        .then_ignore(close())
+        .ignore_then(chain(value, ctx))
+        .then_ignore(close(ctx))
 }
 
-fn find_operator<'t>(inp: &mut Ref<'t, '_>) -> Result<(Binary, usize), Flaw> {
+fn find_operator<'t>(inp: &mut Ref<'t, '_>, ctx: Ctx<'t>) -> Result<(Binary, usize), Flaw> {
     let star = ahead(inp, 1) == Some(Token::Mark(b'*'));
     match inp.peek() {
         Some(Token::Mark(b'+')) => return Ok((Binary::Plus, 1)),
@@ -341,7 +359,7 @@ fn find_operator<'t>(inp: &mut Ref<'t, '_>) -> Result<(Binary, usize), Flaw> {
     if let Some((name, operator)) = NAMES.iter().find(|(name, _)| spells(inp, name)) {
         return Ok((*operator, name.len()));
     }
-    let length = letters(inp);
+    let length = letters(inp, ctx);
     Err(match inp.peek() {
         Some(Token::Letter(first @ (b'a' | b'm' | b'o' | b'x' | b'e' | b'n' | b'g' | b'l'))) => {
             fail(inp, length, Problem::UnknownOperationName(first))
@@ -350,8 +368,8 @@ fn find_operator<'t>(inp: &mut Ref<'t, '_>) -> Result<(Binary, usize), Flaw> {
     })
 }
 
-fn operator<'t>() -> impl Parser<'t, Tokens<'t>, Binary, Extra> + Clone {
-    custom(|inp: &mut Ref<'t, '_>| match find_operator(inp) {
+fn operator<'t>(ctx: Ctx<'t>) -> impl Parser<'t, Tokens<'t>, Binary, Extra> + Clone {
+    custom(move |inp: &mut Ref<'t, '_>| match find_operator(inp, ctx) {
         Ok((operator, length)) => {
             skip(inp, length);
             Ok(operator)
@@ -361,13 +379,13 @@ fn operator<'t>() -> impl Parser<'t, Tokens<'t>, Binary, Extra> + Clone {
 }
 
 /// `]`; anything else is a missing operator.
-fn close<'t>() -> impl Parser<'t, Tokens<'t>, (), Extra> + Clone {
-    custom(|inp: &mut Ref<'t, '_>| match inp.peek() {
+fn close<'t>(ctx: Ctx<'t>) -> impl Parser<'t, Tokens<'t>, (), Extra> + Clone {
+    custom(move |inp: &mut Ref<'t, '_>| match inp.peek() {
         Some(Token::Mark(b']')) => {
             inp.skip();
             Ok(())
         }
-        _ => Err(find_operator(inp).err().unwrap_or_else(|| unexpected(inp))),
+        _ => Err(find_operator(inp, ctx).err().unwrap_or_else(|| unexpected(inp))),
     })
 }
 
@@ -475,9 +493,9 @@ fn exists<'t>(value: Boxed<'t, Expr>) -> Boxed<'t, Kind> {
 }
 
 /// Nothing a value begins with: says what is wrong.
-fn no_value<'t>() -> impl Parser<'t, Tokens<'t>, Kind, Extra> + Clone {
-    custom(|inp: &mut Ref<'t, '_>| {
-        let length = letters(inp);
+fn no_value<'t>(ctx: Ctx<'t>) -> impl Parser<'t, Tokens<'t>, Kind, Extra> + Clone {
+    custom(move |inp: &mut Ref<'t, '_>| {
+        let length = letters(inp, ctx);
         let known = FUNCTIONS.iter().map(|(name, _)| *name).chain(["atan", "exists"]).find(|name| spells(inp, name));
         Err(match inp.peek() {
             None => fail(inp, 0, Problem::NoValue),
@@ -504,20 +522,23 @@ fn no_value<'t>() -> impl Parser<'t, Tokens<'t>, Kind, Extra> + Clone {
 // ---- items ----
 
 /// Whether a word, setting or comment begins here. Letters of a name do not: `after_letter`.
-fn item_starts<'t>(inp: &mut Ref<'t, '_>, after_letter: bool, family: Family) -> bool {
+fn item_starts<'t>(inp: &mut Ref<'t, '_>, after_letter: bool, ctx: Ctx<'t>) -> bool {
     match inp.peek() {
         None | Some(Token::Paren | Token::Semicolon | Token::BadComment) => true,
-        Some(Token::Letter(letter)) if !after_letter && is_word_letter(letter, family) => matches!(
-            ahead(inp, 1),
-            Some(Token::Number { .. } | Token::Malformed { .. } | Token::Mark(b'[' | b'#' | b'+' | b'-'))
-        ),
+        Some(Token::Letter(letter)) if is_word_letter(letter, ctx.family) => {
+            let value = matches!(
+                ahead(inp, 1),
+                Some(Token::Number { .. } | Token::Malformed { .. } | Token::Mark(b'[' | b'#' | b'+' | b'-'))
+            );
+            value && (!after_letter || ctx.gap_before(inp))
+        }
         _ => false,
     }
 }
 
 /// Skips what belongs to a damaged value: to the next item outside brackets, or anywhere when a bracket is
 /// never closed.
-fn damage<'t>(family: Family) -> impl Parser<'t, Tokens<'t>, Expr, Extra> + Clone {
+fn damage<'t>(ctx: Ctx<'t>) -> impl Parser<'t, Tokens<'t>, Expr, Extra> + Clone {
     custom(move |inp: &mut Ref<'t, '_>| {
         let from = inp.cursor();
         let mut depth = 0i32;
@@ -525,7 +546,7 @@ fn damage<'t>(family: Family) -> impl Parser<'t, Tokens<'t>, Expr, Extra> + Clon
         // A letter right where the value should be is a word of its own only when it looks like one.
         while inp.peek().is_some() {
             let closed_later = depth > 0 && closes(inp, depth);
-            if !closed_later && item_starts(inp, after_letter, family) {
+            if !closed_later && item_starts(inp, after_letter, ctx) {
                 break;
             }
             match inp.next() {
@@ -559,11 +580,11 @@ fn closes<'t>(inp: &mut Ref<'t, '_>, mut depth: i32) -> bool {
     depth == 0
 }
 
-fn mended<'t>(value: Boxed<'t, Expr>, family: Family) -> Boxed<'t, Expr> {
-    value.recover_with(via_parser(damage(family))).boxed()
+fn mended<'t>(value: Boxed<'t, Expr>, ctx: Ctx<'t>) -> Boxed<'t, Expr> {
+    value.recover_with(via_parser(damage(ctx))).boxed()
 }
 
-fn line_number<'t>(family: Family) -> Boxed<'t, Item> {
+fn line_number<'t>(ctx: Ctx<'t>) -> Boxed<'t, Item> {
     let number = custom(move |inp: &mut Ref<'t, '_>| {
         if let Some(Token::Number { value, whole: true }) = inp.peek() {
             inp.skip();
@@ -572,7 +593,7 @@ fn line_number<'t>(family: Family) -> Boxed<'t, Item> {
         let sign = matches!(inp.peek(), Some(Token::Mark(b'-' | b'+')));
         let number = matches!(ahead(inp, usize::from(sign)), Some(Token::Number { .. } | Token::Malformed { .. }));
         let flaw = fail(inp, usize::from(sign) + usize::from(number), Problem::BadLineNumber);
-        while !item_starts(inp, false, family) {
+        while !item_starts(inp, false, ctx) {
             inp.skip();
         }
         inp.emit(flaw);
@@ -593,21 +614,21 @@ fn line_number<'t>(family: Family) -> Boxed<'t, Item> {
         .boxed()
 }
 
-fn items<'t>(value: Boxed<'t, Expr>, family: Family) -> Boxed<'t, Vec<Item>> {
+fn items<'t>(value: Boxed<'t, Expr>, ctx: Ctx<'t>) -> Boxed<'t, Vec<Item>> {
     let item = choice((
-        macro_statement(value.clone(), family),
-        word(value.clone(), family),
-        setting(value, family),
+        macro_statement(value.clone(), ctx),
+        word(value.clone(), ctx),
+        setting(value, ctx),
         comment(),
-        junk(family),
+        junk(ctx),
     ));
     item.repeated().collect::<Vec<_>>().boxed()
 }
 
-fn word<'t>(value: Boxed<'t, Expr>, family: Family) -> Boxed<'t, Item> {
-    let letter = select! { Token::Letter(letter) if is_word_letter(letter, family) => letter };
+fn word<'t>(value: Boxed<'t, Expr>, ctx: Ctx<'t>) -> Boxed<'t, Item> {
+    let letter = select! { Token::Letter(letter) if is_word_letter(letter, ctx.family) => letter };
     letter
-        .then(mended(value, family))
+        .then(mended(value, ctx))
         .map_with(|(letter, value), e| Item::Word { letter, value, at: e.span() })
         .boxed()
 }
@@ -616,16 +637,16 @@ fn target<'t>(value: Boxed<'t, Expr>) -> Boxed<'t, Name> {
     choice((name().map(Name::Named), value.map(Name::Number))).boxed()
 }
 
-fn setting<'t>(value: Boxed<'t, Expr>, family: Family) -> Boxed<'t, Item> {
+fn setting<'t>(value: Boxed<'t, Expr>, ctx: Ctx<'t>) -> Boxed<'t, Item> {
     // Macro B takes an assignment's right side without brackets.
-    let set = if family == Family::Fanuc { chain(value.clone(), family).boxed() } else { value.clone() };
+    let set = if ctx.family == Family::Fanuc { chain(value.clone(), ctx).boxed() } else { value.clone() };
     mark(b'#')
         .ignore_then(target(value.clone()))
         .then_ignore(must(b'=', Problem::NoEqualSign))
-        .then(mended(set, family))
+        .then(mended(set, ctx))
         .map_with(|(target, value), e| Item::Setting { target, value, at: e.span() })
         .recover_with(via_parser(
-            mark(b'#').then(damage(family)).map_with(|_, e| Item::Bad { letter: b'#', at: e.span() }),
+            mark(b'#').then(damage(ctx)).map_with(|_, e| Item::Bad { letter: b'#', at: e.span() }),
         ))
         .boxed()
 }
@@ -639,7 +660,7 @@ fn comment<'t>() -> Boxed<'t, Item> {
 }
 
 /// One or more tokens that begin nothing; one fault for all of them.
-fn junk<'t>(family: Family) -> impl Parser<'t, Tokens<'t>, Item, Extra> + Clone {
+fn junk<'t>(ctx: Ctx<'t>) -> impl Parser<'t, Tokens<'t>, Item, Extra> + Clone {
     custom(move |inp: &mut Ref<'t, '_>| {
         if inp.peek().is_none() {
             return Err(unexpected(inp));
@@ -647,7 +668,7 @@ fn junk<'t>(family: Family) -> impl Parser<'t, Tokens<'t>, Item, Extra> + Clone 
         let flaw = fail(inp, 1, Problem::BadCharacter);
         let from = inp.cursor();
         let mut after_letter = matches!(inp.next(), Some(Token::Letter(_)));
-        while !item_starts(inp, after_letter, family) && inp.peek() != Some(Token::Mark(b'#')) {
+        while !item_starts(inp, after_letter, ctx) && inp.peek() != Some(Token::Mark(b'#')) {
             after_letter = matches!(inp.next(), Some(Token::Letter(_)));
         }
         inp.emit(flaw);
@@ -678,8 +699,8 @@ const KEYWORDS: [(&str, Keyword); 15] = [
 /// Most arguments of a call.
 const ARGUMENTS: usize = 30;
 
-fn keyword<'t>() -> impl Parser<'t, Tokens<'t>, Keyword, Extra> + Clone {
-    custom(|inp: &mut Ref<'t, '_>| {
+fn keyword<'t>(ctx: Ctx<'t>) -> impl Parser<'t, Tokens<'t>, Keyword, Extra> + Clone {
+    custom(move |inp: &mut Ref<'t, '_>| {
         if let Some((word, keyword)) = KEYWORDS.iter().find(|(word, _)| spells(inp, word)) {
             skip(inp, word.len());
             return Ok(*keyword);
@@ -687,7 +708,7 @@ fn keyword<'t>() -> impl Parser<'t, Tokens<'t>, Keyword, Extra> + Clone {
         if matches!(inp.peek(), None | Some(Token::Paren | Token::Semicolon | Token::BadComment)) {
             return Ok(Keyword::Program);
         }
-        let length = letters(inp).max(1);
+        let length = letters(inp, ctx).max(1);
         Err(fail(inp, length, Problem::UnknownKeyword))
     })
 }
@@ -705,9 +726,9 @@ fn condition_name(keyword: Keyword) -> Option<&'static str> {
 type Arguments = (Vec<Expr>, Vec<Range>);
 
 /// What follows each keyword.
-fn arguments<'t>(value: Boxed<'t, Expr>, family: Family) -> Boxed<'t, (Keyword, Arguments)> {
-    let only = |f: fn(Keyword) -> bool| keyword().filter(move |k| f(*k));
-    let bracketed = mended(must_see(b'[', Problem::Unexpected).ignore_then(value).boxed(), family);
+fn arguments<'t>(value: Boxed<'t, Expr>, ctx: Ctx<'t>) -> Boxed<'t, (Keyword, Arguments)> {
+    let only = |f: fn(Keyword) -> bool| keyword(ctx).filter(move |k| f(*k));
+    let bracketed = mended(must_see(b'[', Problem::Unexpected).ignore_then(value).boxed(), ctx);
     let conditional = only(|k| condition_name(k).is_some())
         .then(see(b'[').ignore_then(bracketed.clone()).or_not())
         .validate(|(keyword, arg), e, emitter| {
@@ -740,7 +761,7 @@ fn arguments<'t>(value: Boxed<'t, Expr>, family: Family) -> Boxed<'t, (Keyword, 
             let _: Range = e.span();
             (keyword, (args, comments))
         });
-    let bare = keyword().map(|keyword| (keyword, (Vec::new(), Vec::new())));
+    let bare = keyword(ctx).map(|keyword| (keyword, (Vec::new(), Vec::new())));
     choice((conditional, optional, call, bare)).boxed()
 }
 
@@ -749,11 +770,11 @@ fn see<'t>(byte: u8) -> impl Parser<'t, Tokens<'t>, (), Extra> + Clone {
     must_see(byte, Problem::Unexpected)
 }
 
-fn o_word<'t>(value: Boxed<'t, Expr>, family: Family) -> Boxed<'t, Vec<Item>> {
+fn o_word<'t>(value: Boxed<'t, Expr>, ctx: Ctx<'t>) -> Boxed<'t, Vec<Item>> {
     let label = target(value.clone()).map_with(|label, e| (label, e.span()));
     let statement = just(Token::Letter(b'o'))
         .ignore_then(label)
-        .then(arguments(value, family))
+        .then(arguments(value, ctx))
         .map_with(|((label, label_at), (keyword, (args, comments))), e| Item::Control {
             keyword,
             label: Some(label),
@@ -793,10 +814,10 @@ fn trailing<'t>() -> impl Parser<'t, Tokens<'t>, Item, Extra> + Clone {
 // ---- macro statements (Fanuc) ----
 
 /// `IF […] GOTO n`, `IF […] THEN #…=…`, `WHILE […] DO n`, `DO n`, `END n`, `GOTO n`.
-fn macro_statement<'t>(value: Boxed<'t, Expr>, family: Family) -> Boxed<'t, Item> {
+fn macro_statement<'t>(value: Boxed<'t, Expr>, ctx: Ctx<'t>) -> Boxed<'t, Item> {
     let word = move |text: &'static str, next: fn(Option<Token>) -> bool| {
         custom(move |inp: &mut Ref<'t, '_>| {
-            if family != Family::Fanuc || !spells(inp, text) || !next(ahead(inp, text.len())) {
+            if ctx.family != Family::Fanuc || !spells(inp, text) || !next(ahead(inp, text.len())) {
                 return Err(unexpected(inp));
             }
             skip(inp, text.len());

@@ -115,6 +115,12 @@ impl Line {
         Span::new(first, end)
     }
 
+    /// For each token whether a blank stands before it.
+    pub fn gaps(&self) -> Vec<bool> {
+        let first = |n: u32| self.map[n as usize];
+        self.ends.iter().map(|(start, _)| *start > 0 && first(*start) != first(start - 1) + 1).collect()
+    }
+
     /// Text of the tokens `from..to` as the controller sees it.
     pub fn text(&self, from: usize, to: usize) -> &str {
         if from >= to || from >= self.ends.len() {

@@ -251,6 +251,12 @@ pub enum Keyword {
 }
 
 /// A fault found while parsing. It becomes a diagnostic when the line is executed, and a hint when it never is.
+///
+/// The faults of a line are in the order in which the controller would find them: those of the text first (see
+/// [`Fault::when_read`]), then from left to right. The controller evaluates while it reads, so a word whose
+/// evaluation fails wins over a fault further right: evaluate the words in order, and report a line's next fault
+/// at the first [`Form::Bad`] word or [`Node::Bad`]. A warning ([`Fault::stops`] says no) does not keep the block
+/// from being executed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Fault {
     /// Line of the chunk.
@@ -263,6 +269,18 @@ pub struct Fault {
     pub rs: Rs274,
     /// Arguments of both messages.
     pub args: Box<[String]>,
+}
+
+impl Fault {
+    /// Belongs to the line as text: the controller reports it whenever it reads the line, also while it skips
+    /// over a branch or a subroutine definition.
+    pub fn when_read(&self) -> bool {
+        self.code.def().code.starts_with("E01")
+    }
+    /// Whether the block can't be executed.
+    pub fn stops(&self) -> bool {
+        self.code.def().severity == gr_spec::Severity::Error
+    }
 }
 
 /// A stretch of whole lines with its tables.

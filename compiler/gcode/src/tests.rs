@@ -347,3 +347,17 @@ fn renumbered() {
     insta::assert_snapshot!(renumber(false));
     insta::assert_snapshot!(renumber(true));
 }
+
+#[test]
+fn examples_of_the_registry() {
+    let ours = |code: &str| ("E0101".."E0120").contains(&code) || ("E0210".."E0230").contains(&code);
+    for code in gr_spec::Code::all().filter(|c| ours(c.def().code)) {
+        let def = code.def();
+        let dialect = dialect(def.dialect.unwrap_or("linuxcnc"));
+        let (bad, good) = (def.bad.unwrap_or_default(), def.good.unwrap_or_default());
+        assert!(!bad.is_empty() && !good.is_empty(), "{} has no examples", def.code);
+        let codes: Vec<&str> = scan(bad, dialect).faults.iter().map(|f| f.code.def().code).collect();
+        assert_eq!(codes, [def.code], "{bad}");
+        assert_eq!(scan(good, dialect).faults.len(), 0, "{good}");
+    }
+}
