@@ -49,7 +49,7 @@ pub use fault::{Fault, Res};
 pub use files::*;
 pub use params::Params;
 pub use remap::subroutine_paths;
-pub use run::{ChunkExit, End, Files, Finding, Interp, NoFiles, Outcome, Place, run_chunk};
+pub use run::{ChunkExit, End, Files, Finding, Interp, NoFiles, Outcome, Place, run_chunk, run_lines};
 pub use setup::{Budgets, Ini, Setup, Tool, ToolTable};
 pub use state::{Modal, SavedModes, Side, State};
 pub use world::World;

@@ -233,6 +233,24 @@ impl<'a, S: Sink> Interp<'a, S> {
         Self::with(files, setup, sink, state, params, tools)
     }
 
+    /// A run that goes on at a line of the main program, outside of subroutines and loops. `shift` is the line of
+    /// the opening `%`, 0 without one.
+    pub fn resume(
+        files: &'a mut dyn Files,
+        setup: &'a Setup,
+        sink: S,
+        (state, params): (State, Params),
+        main: FileId,
+        (line, shift): (u32, i32),
+    ) -> Self {
+        let tools = Arc::new(setup.tools.clone());
+        let mut run = Self::with(files, setup, sink, state, params, tools);
+        run.place = Place { file: main, line, frame: FrameId::MAIN };
+        run.note_file(main);
+        (run.next, run.shift) = (line, shift);
+        run
+    }
+
     fn with(
         files: &'a mut dyn Files,
         setup: &'a Setup,
@@ -749,6 +767,19 @@ impl<'a, S: Sink> Interp<'a, S> {
 /// Runs one chunk that holds no control flow from a given state. Lines of calls and findings are relative to
 /// the chunk. Budgets count within the chunk.
 pub fn run_chunk<S: Sink>(chunk: &Chunk, state: &State, params: &Params, setup: &Setup, sink: S) -> ChunkExit {
+    let lines = 0..chunk.scan.lines.len() as u32;
+    run_lines(chunk, lines, state, params, setup, sink)
+}
+
+/// Runs some lines of such a chunk.
+pub fn run_lines<S: Sink>(
+    chunk: &Chunk,
+    lines: std::ops::Range<u32>,
+    state: &State,
+    params: &Params,
+    setup: &Setup,
+    sink: S,
+) -> ChunkExit {
     let mut files = NoFiles::default();
     let tools = state.tools.clone().unwrap_or_else(|| Arc::new(setup.tools.clone()));
     let mut run = Interp::with(&mut files, setup, sink, state.clone(), params.clone(), tools);
@@ -756,7 +787,7 @@ pub fn run_chunk<S: Sink>(chunk: &Chunk, state: &State, params: &Params, setup: 
     run.reading.text = chunk.text.clone();
     run.reading.scan = chunk.scan.clone();
     let mut end = End::Chunk;
-    for line in 0..chunk.scan.lines.len() as u32 {
+    for line in lines.start..lines.end.min(chunk.scan.lines.len() as u32) {
         run.next = line + 1;
         run.place.line = line;
         if let Err(fault) = run.line(&chunk.scan, &chunk.text, line) {
