@@ -535,13 +535,16 @@ impl Writer {
             }
             Step::Repeat { times, body, skip } => {
                 let o = self.label();
-                self.line(&format!("o{o} repeat [{times}]"));
+                let n = 200 + o;
+                // `continue` is known in while and do loops only.
+                let (begin, end) = if *skip {
+                    (format!("#{n}=0\no{o} do\n#{n}=[#{n}+1]"), format!("o{o} continue\nM0\no{o} while [#{n} LT {times}]"))
+                } else {
+                    (format!("o{o} repeat [{times}]"), format!("o{o} endrepeat"))
+                };
+                self.line(&begin);
                 self.body(body);
-                if *skip {
-                    self.line(&format!("o{o} continue"));
-                    self.line("M0");
-                }
-                self.line(&format!("o{o} endrepeat"));
+                self.line(&end);
                 self.settle();
             }
             Step::If { condition, yes, no } => {

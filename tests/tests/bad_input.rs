@@ -1,0 +1,246 @@
+//! Files that are no good programs: a clear error or the right result, never a crash, never half a result.
+
+use std::path::Path;
+use std::process::Command;
+use std::time::Duration;
+
+use gr_tests::oracle::{Job, Verdict, differ, gcc_robot, reference};
+use gr_tests::process::{Ended, run};
+
+const LIMIT: Duration = Duration::from_secs(60);
+
+fn robot(dir: &Path, args: &[&str]) -> Ended {
+    let out = run(Command::new(gcc_robot()).args(args).current_dir(dir), LIMIT).expect("it starts");
+    let errors = out.errors();
+    assert!(!out.timed_out, "{args:?} ran into the time limit");
+    assert!(out.status.is_some(), "{args:?} {}: {errors}", out.how());
+    assert!(out.status != Some(101) && !errors.contains("panicked"), "{args:?} panicked: {errors}");
+    out
+}
+
+/// Runs `check` and `build` on a file of these bytes. After an error nothing is left behind.
+fn both(bytes: &[u8]) -> (Ended, Ended) {
+    let dir = tempfile::tempdir().expect("a temporary folder");
+    std::fs::write(dir.path().join("part.ngc"), bytes).expect("writable");
+    let check = robot(dir.path(), &["check", "part.ngc"]);
+    let build = robot(dir.path(), &["build", "--target", "canon", "-o", "part.canon", "part.ngc"]);
+    let left: Vec<_> = std::fs::read_dir(dir.path()).expect("readable").filter_map(|e| Some(e.ok()?.file_name())).collect();
+    let written = dir.path().join("part.canon").is_file();
+    assert_eq!(written, build.status == Some(0), "{left:?}: {}", build.errors());
+    assert_eq!(left.len(), 1 + usize::from(written), "{left:?}");
+    (check, build)
+}
+
+fn fails_clearly(bytes: &[u8]) {
+    let (check, build) = both(bytes);
+    for out in [check, build] {
+        assert_ne!(out.status, Some(0), "accepted");
+        let text = out.errors() + &out.output();
+        assert!(text.contains("[E") || text.contains("error"), "no clear error: {text}");
+    }
+}
+
+fn is_built(bytes: &[u8]) {
+    let (check, build) = both(bytes);
+    assert_eq!(check.status, Some(0), "{}{}", check.errors(), check.output());
+    assert_eq!(build.status, Some(0), "{}{}", build.errors(), build.output());
+}
+
+const GOOD: &str = "G21 G90 G17 G94\nM3 S1000\nF100\nG1 X10 Y5\nG2 X20 Y5 I5 J0\nM5\nM2\n";
+
+/// Both interpreters, as bytes.
+fn agrees(bytes: Vec<u8>) {
+    let Some(rs274) = reference() else { return };
+    let verdict = differ(&Job::new(bytes.clone()), &rs274);
+    assert!(!matches!(verdict, Verdict::Differs(_)), "{verdict:?} on {}", String::from_utf8_lossy(&bytes));
+}
+
+#[test]
+fn empty() {
+    both(b"");
+    both(b"\n\n  \n");
+    agrees(b"\n".to_vec());
+}
+
+#[test]
+fn nul_bytes() {
+    both(b"G21\nG0 X1\0Y2\nM2\n");
+    both(b"\0\0\0\0");
+    agrees(b"G21\nG0 X1\0Y2\nM2\n".to_vec());
+}
+
+#[test]
+fn latin_1_comment() {
+    is_built(b"G21 (Schr\xE4gfl\xE4che)\nG0 X1\nM2\n");
+    agrees(b"G21 (Schr\xE4gfl\xE4che)\nG0 X1\nM2\n".to_vec());
+}
+
+#[test]
+fn byte_order_marks() {
+    is_built(format!("\u{feff}{GOOD}").as_bytes());
+    for big in [false, true] {
+        let mut bytes = if big { vec![0xFE, 0xFF] } else { vec![0xFF, 0xFE] };
+        for unit in GOOD.encode_utf16() {
+            bytes.extend(if big { unit.to_be_bytes() } else { unit.to_le_bytes() });
+        }
+        is_built(&bytes);
+    }
+    both(&[0xFF, 0xFE, 0x47]);
+    both(&[0xFF, 0xFE, 0x00, 0xD8]);
+}
+
+#[test]
+fn line_ends() {
+    is_built(GOOD.replace('\n', "\r\n").as_bytes());
+    agrees(GOOD.replace('\n', "\r\n").into_bytes());
+    both(GOOD.replace('\n', "\r").as_bytes());
+    is_built(GOOD.trim_end().as_bytes());
+}
+
+#[test]
+fn one_line_of_10_mb() {
+    fails_clearly(format!("G1 X{}\nM2\n", "1".repeat(10_000_000)).as_bytes());
+    both("(".repeat(10_000_000).as_bytes());
+    both("[".repeat(10_000_000).as_bytes());
+    both("#".repeat(10_000_000).as_bytes());
+}
+
+#[test]
+fn deep_nesting() {
+    both(format!("#1={}1{}\nM2\n", "[".repeat(100_000), "]".repeat(100_000)).as_bytes());
+    both(format!("#1={}1{}\nM2\n", "[".repeat(120), "]".repeat(120)).as_bytes());
+    both(format!("G0 X{}1\nM2\n", "-".repeat(200)).as_bytes());
+    both(format!("#1={}1{}\nM2\n", "SIN[".repeat(60), "]".repeat(60)).as_bytes());
+    let mut loops = String::new();
+    for i in 0..5000 {
+        loops.push_str(&format!("o{i} if [1]\n"));
+    }
+    both(loops.as_bytes());
+}
+
+#[test]
+fn binary() {
+    let mut x = 0x9E37_79B9_u32;
+    let bytes: Vec<u8> = (0..200_000)
+        .map(|_| {
+            x ^= x << 13;
+            x ^= x >> 17;
+            x ^= x << 5;
+            x as u8
+        })
+        .collect();
+    fails_clearly(&bytes);
+    fails_clearly(&std::fs::read(std::env::current_exe().expect("a test knows its file")).expect("readable")[..1_000_000]);
+}
+
+#[test]
+fn folders_and_missing_files() {
+    let dir = tempfile::tempdir().expect("a temporary folder");
+    std::fs::create_dir(dir.path().join("part.ngc")).expect("writable");
+    for args in [["build", "--target", "canon", "part.ngc"].as_slice(), &["check", "nothing.ngc"], &["build", "--target", "canon", "nothing.ngc"]] {
+        let out = robot(dir.path(), args);
+        assert_ne!(out.status, Some(0), "{args:?}");
+        assert!(!out.errors().trim().is_empty() || !out.output().trim().is_empty(), "{args:?} says nothing");
+    }
+}
+
+#[test]
+fn unreadable_file() {
+    use std::os::unix::fs::PermissionsExt;
+    let dir = tempfile::tempdir().expect("a temporary folder");
+    let file = dir.path().join("part.ngc");
+    std::fs::write(&file, GOOD).expect("writable");
+    std::fs::set_permissions(&file, std::fs::Permissions::from_mode(0o000)).expect("own file");
+    // Root reads everything: then the result must be right.
+    let readable = std::fs::read(&file).is_ok();
+    let out = robot(dir.path(), &["build", "--target", "canon", "-o", "x", "part.ngc"]);
+    assert_eq!(out.status == Some(0), readable, "{}", out.errors());
+}
+
+#[test]
+fn unwritable_result() {
+    let dir = tempfile::tempdir().expect("a temporary folder");
+    std::fs::write(dir.path().join("part.ngc"), GOOD).expect("writable");
+    let out = robot(dir.path(), &["build", "--target", "canon", "-o", "no/such/folder/x", "part.ngc"]);
+    assert_ne!(out.status, Some(0));
+    let out = robot(dir.path(), &["build", "--target", "canon", "-o", "part.ngc", "part.ngc"]);
+    assert_ne!(out.status, Some(0), "overwrote its source");
+    assert_eq!(std::fs::read_to_string(dir.path().join("part.ngc")).expect("readable"), GOOD);
+}
+
+#[test]
+fn an_error_leaves_the_old_result() {
+    let dir = tempfile::tempdir().expect("a temporary folder");
+    std::fs::write(dir.path().join("part.ngc"), "G21\nF100\nG1 X1\nG1 X[1/0]\nM2\n").expect("writable");
+    std::fs::write(dir.path().join("part.canon"), "old").expect("writable");
+    let out = robot(dir.path(), &["build", "--target", "canon", "-o", "part.canon", "part.ngc"]);
+    assert_ne!(out.status, Some(0));
+    assert_eq!(std::fs::read_to_string(dir.path().join("part.canon")).expect("readable"), "old");
+}
+
+#[test]
+fn subs_that_are_missing_or_call_themselves() {
+    fails_clearly(b"o<nowhere> call\nM2\n");
+    fails_clearly(b"o77 call\nM2\n");
+    fails_clearly(b"o1 sub\no1 call\no1 endsub\no1 call\nM2\n");
+    fails_clearly(b"M98 P5\nM2\nO5\nM98 P5\nM99\n");
+    agrees(b"o1 sub\no1 call\no1 endsub\no1 call\nM2\n".to_vec());
+}
+
+#[test]
+fn numbers_out_of_range() {
+    for line in [
+        "#1=[1/0]", "#1=[0/0]", "#1=[10**400]", "#1=SQRT[-1]", "#1=LN[-1]", "#1=[1e400]", "G0 X1e400", "#1=ASIN[2]", "#1=EXP[99999]",
+        "#1=[[-1]**0.5]", "T99999999999", "M999999999999", "G999999999999999999999 X1", "#99999999999=1", "#[1/0]=1", "G4 P-1",
+        "#[-1]=1", "#1=#99999999999", "N99999999999999999999 G0 X1", "o99999999999999999999 call", "S99999999999999999999 M3", "G81 X1 Z-1 R1 L99999999999",
+    ] {
+        let text = format!("G21\nF100\n{line}\nM2\n");
+        both(text.as_bytes());
+        if !line.contains("99999999") {
+            agrees(text.into_bytes());
+        }
+    }
+    both(format!("G21\nF100\nG1 X{}\nG1 X0\nM2\n", "9".repeat(200)).as_bytes());
+    both(b"G21 F1\nG2 X1e9 I99999999999\nG76 P0 Z0 I0 J0 K0\nM2\n");
+}
+
+#[test]
+fn runaway_programs_end() {
+    fails_clearly(b"o1 while [1]\n#1=[#1+1]\no1 endwhile\nM2\n");
+    fails_clearly(b"o1 while [1]\nG0 X1\nG0 X0\no1 endwhile\nM2\n");
+    fails_clearly(b"o1 repeat [99999999999]\nG4 P0\no1 endrepeat\nM2\n");
+    fails_clearly(b"o1 do\no1 while [1]\nM2\n");
+    both(b"G21 F100\nG81 X1 Y1 Z-1 R1 L2000000000\nM2\n");
+}
+
+/// Two gigabytes of nothing, which take no room on the disk: refused at once or read as the NUL bytes they are.
+#[test]
+fn sparse_file_of_2_gb() {
+    let dir = tempfile::tempdir().expect("a temporary folder");
+    let file = std::fs::File::create(dir.path().join("part.ngc")).expect("writable");
+    file.set_len(2 << 30).expect("sparse files");
+    drop(file);
+    let out = robot(dir.path(), &["check", "part.ngc"]);
+    let text = out.errors() + &out.output();
+    assert_ne!(out.status, Some(0), "{text}");
+    assert!(text.contains("E0823") || text.contains("error"), "{text}");
+}
+
+#[test]
+fn many_faults_are_not_too_many() {
+    let text: String = (0..20_000).map(|i| format!("G1 X{i} Q\n")).collect();
+    let (check, _) = both(text.as_bytes());
+    assert!(check.stderr.len() + check.stdout.len() < 5_000_000, "a flood of messages");
+}
+
+/// Names that are words of a shell or have blanks and other letters in them.
+#[test]
+fn odd_file_names() {
+    let dir = tempfile::tempdir().expect("a temporary folder");
+    for name in ["a b.ngc", "ä ß 漢.ngc", "$HOME;x.ngc", "'quote\".ngc"] {
+        std::fs::write(dir.path().join(name), GOOD).expect("writable");
+        assert_eq!(robot(dir.path(), &["check", name]).status, Some(0), "{name}");
+    }
+    std::fs::write(dir.path().join("-x.ngc"), GOOD).expect("writable");
+    assert_eq!(robot(dir.path(), &["check", "--", "-x.ngc"]).status, Some(0));
+}
