@@ -135,11 +135,12 @@ impl Tables {
         let silenced: Vec<Span> = self.faults[own..].iter().map(|f| f.span).collect();
         for flaw in &flaws {
             let span = line.span(flaw.at.start, flaw.at.end);
-            if !silenced.iter().any(|s| s.start <= span.start && span.end <= s.end) {
+            // Within a word that may not stand here at all, its value does not matter.
+            if !silenced.iter().any(|s| s.start < span.start && span.end <= s.end) {
                 self.flaw(line, text, flaw, span);
             }
         }
-        self.faults[own..].sort_by_key(|f| f.span.start);
+        self.faults[own..].sort_by_key(|f| (f.span.start, f.code == code::WORD_REPEATED));
         if matches!(block.items.iter().find(|i| !is_line_number(i)), Some(Item::Control { .. } | Item::Bad { letter: b'o', .. })) {
             // What follows a damaged statement is not worth a fault of its own.
             self.faults.truncate(own + 1);
