@@ -1,3 +1,58 @@
-//! The `gcc-robot` command.
+//! The `gcc-robot` command: options, rendering of diagnostics, writing of results. What programs mean is
+//! decided in the crates below.
 
-fn main() {}
+mod commands;
+mod emit;
+mod exit;
+mod options;
+mod output;
+mod pipeline;
+mod progress;
+mod project;
+mod render;
+mod setup;
+mod sources;
+
+use std::process::ExitCode;
+
+use clap::Parser as _;
+
+use exit::Exit;
+use options::{Cli, Command};
+
+fn main() -> ExitCode {
+    let mut args: Vec<std::ffi::OsString> = std::env::args_os().collect();
+    // A link of the name rs274 to this program stands in for the real one; its options are not clap's.
+    if called_as_rs274(args.first()) {
+        return commands::rs274::run(&args[0].clone(), &args.split_off(1));
+    }
+    match Cli::try_parse_from(args) {
+        Ok(cli) => run(cli),
+        Err(e) => {
+            let code = if e.use_stderr() { Exit::Usage } else { Exit::Ok };
+            // Nowhere left to complain to.
+            let _ = e.print();
+            code.into()
+        }
+    }
+}
+
+pub fn called_as_rs274(name: Option<&std::ffi::OsString>) -> bool {
+    name.is_some_and(|n| std::path::Path::new(n).file_stem().is_some_and(|s| s == "rs274"))
+}
+
+fn run(cli: Cli) -> ExitCode {
+    let global = &cli.global;
+    match cli.command {
+        Command::Check(args) => commands::check::run(global, &args).into(),
+        Command::Build(args) => commands::build::run(global, &args).into(),
+        Command::Diff(args) => commands::diff::run(global, &args).into(),
+        Command::Verify(args) => commands::diff::verify(global, &args).into(),
+        Command::Explain(args) => commands::explain::run(&args).into(),
+        Command::Target(args) => commands::target::run(&args).into(),
+        Command::Machine(args) => commands::machine::run(global, &args).into(),
+        Command::Rs274(args) => commands::rs274::run("gcc-robot rs274".as_ref(), &args.arguments),
+        Command::Init(args) => commands::init::run(global, &args).into(),
+        Command::Completions(args) => commands::completions::run(&args).into(),
+    }
+}

@@ -1,0 +1,330 @@
+//! `gcc-robot build`
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, SystemTime};
+
+use clap::Parser as _;
+use gr_machine::Machine;
+use gr_spec::TargetDef;
+use gr_text::{Severity, code};
+
+use super::check::{Checked, show};
+use super::complain;
+use crate::emit::{Built, Goal, TargetOptions, build, stem};
+use crate::exit::Exit;
+use crate::options::{BuildArgs, Global};
+use crate::output::{depfile, to_stdout, write_all};
+use crate::pipeline::open;
+use crate::progress::Progress;
+use crate::project::Project;
+use crate::render::Renderer;
+use crate::setup::{Station, station};
+use crate::sources::{Sources, reason};
+
+/// How often `--watch` looks.
+const POLL: Duration = Duration::from_millis(250);
+
+pub fn run(global: &Global, args: &BuildArgs) -> Exit {
+    let mut round = Round::new(global, args).run();
+    if !args.watch {
+        return round.exit;
+    }
+    loop {
+        if !global.quiet {
+            eprintln!("watching {} files; Ctrl-C ends", round.files.len());
+        }
+        let seen = stamps(&round.files);
+        while stamps(&round.files) == seen {
+            std::thread::sleep(POLL);
+        }
+        round = Round::new(global, args).run();
+    }
+}
+
+/// When files were changed last; a file that is not there has no time.
+fn stamps(files: &[PathBuf]) -> BTreeMap<&PathBuf, Option<SystemTime>> {
+    files.iter().map(|f| (f, std::fs::metadata(f).and_then(|m| m.modified()).ok())).collect()
+}
+
+/// One thing to make.
+struct Job {
+    source: PathBuf,
+    target: &'static TargetDef,
+    options: TargetOptions,
+    /// None: standard output.
+    goal: Option<PathBuf>,
+}
+
+/// What a round of building came to.
+struct Ended {
+    exit: Exit,
+    files: Vec<PathBuf>,
+}
+
+/// One round of building: everything is made, or nothing is written.
+struct Round<'a> {
+    global: &'a Global,
+    args: &'a BuildArgs,
+    renderer: Renderer,
+    sources: Sources,
+    exit: Exit,
+    files: Vec<PathBuf>,
+    results: Vec<(PathBuf, Vec<u8>)>,
+    rules: String,
+}
+
+impl<'a> Round<'a> {
+    fn new(global: &'a Global, args: &'a BuildArgs) -> Round<'a> {
+        let to_stdout = !args.files.is_empty() && args.output.as_deref().is_none_or(|o| o == Path::new("-"));
+        Round {
+            global,
+            args,
+            renderer: global.renderer(to_stdout),
+            sources: Sources::default(),
+            exit: Exit::Ok,
+            files: args.files.clone(),
+            results: Vec::new(),
+            rules: String::new(),
+        }
+    }
+
+    fn run(mut self) -> Ended {
+        let found = station(&self.args.setup, &self.args.lints, Path::new("."), &mut self.sources, &mut self.renderer);
+        let Some(station) = found else {
+            self.fail(Exit::Findings);
+            return self.end(false);
+        };
+        self.files.extend(station.files.iter().cloned());
+        let machine = match station.machine.as_deref().map(|name| self.machine(name)) {
+            Some(None) => return self.end(false),
+            other => other.flatten(),
+        };
+        match self.jobs(&station) {
+            Ok(jobs) => {
+                self.renderer.tally.files = jobs.iter().map(|j| &j.source).collect::<std::collections::BTreeSet<_>>().len();
+                for job in &jobs {
+                    self.job(job, &station, machine.as_ref());
+                }
+                if self.exit == Exit::Ok {
+                    self.write();
+                }
+            }
+            Err(text) => {
+                eprintln!("{text}");
+                self.fail(Exit::Usage);
+            }
+        }
+        self.end(true)
+    }
+
+    fn end(mut self, ran: bool) -> Ended {
+        let something = self.renderer.tally.errors + self.renderer.tally.warnings > 0;
+        self.renderer.finish(ran && something && !self.global.quiet);
+        Ended { exit: self.exit, files: self.files }
+    }
+
+    fn fail(&mut self, exit: Exit) {
+        self.exit = self.exit.max(exit);
+    }
+
+    /// The machine of this id or path.
+    fn machine(&mut self, name: &str) -> Option<Machine> {
+        match super::machine::load(name, &mut self.sources) {
+            Ok(machine) => Some(machine),
+            Err(found) => {
+                found.iter().for_each(|d| self.renderer.show(&self.sources, d));
+                self.fail(Exit::Findings);
+                None
+            }
+        }
+    }
+
+    fn jobs(&mut self, station: &Station) -> Result<Vec<Job>, String> {
+        if self.args.files.is_empty() {
+            let Some(project) = &station.project else {
+                return Err(format!("name the programs to build, or add them to {}", crate::project::NAME));
+            };
+            return self.project_jobs(project);
+        }
+        let target = target(self.args.target.as_deref().unwrap_or("rs274ngc"))?;
+        let several = self.args.files.len() > 1;
+        let out = self.args.output.as_deref().filter(|o| *o != Path::new("-"));
+        if several && out.is_none_or(|o| !is_folder(o)) {
+            return Err("several programs need a folder: -o FOLDER/".into());
+        }
+        let job = |source: &PathBuf| Job {
+            source: source.clone(),
+            target,
+            options: self.args.options.clone(),
+            goal: out.map(|o| if is_folder(o) { o.join(file_name(source, target)) } else { o.to_path_buf() }),
+        };
+        Ok(self.args.files.iter().map(job).collect())
+    }
+
+    fn project_jobs(&mut self, project: &Project) -> Result<Vec<Job>, String> {
+        let mut jobs = Vec::new();
+        if project.file.targets.is_empty() {
+            return Err(format!("{} has no [[targets]]", project.path.display()));
+        }
+        for row in project.file.targets.iter().filter(|t| self.args.target.as_ref().is_none_or(|id| *id == t.target)) {
+            let target = target(&row.target)?;
+            let options = options_of(&row.options).map_err(|e| format!("{}: target {}: {e}", project.path.display(), row.target))?;
+            let patterns = if row.sources.is_empty() { &project.file.project.sources } else { &row.sources };
+            let sources = project.files(patterns);
+            if sources.is_empty() {
+                let name = project.path.display().to_string();
+                complain(&mut self.renderer, &mut self.sources, &name, code::PROJECT_NOTHING_TO_DO, std::slice::from_ref(&name));
+                self.fail(Exit::Findings);
+            }
+            for source in sources {
+                let output = row.output.as_deref().unwrap_or("{name}.{extension}");
+                let name = output.replace("{name}", &stem(&source)).replace("{extension}", target.extension);
+                self.files.push(source.clone());
+                jobs.push(Job { source, target, options: options.clone(), goal: Some(project.path_of(Path::new(&name))) });
+            }
+        }
+        Ok(jobs)
+    }
+
+    fn job(&mut self, job: &Job, station: &Station, machine: Option<&Machine>) {
+        let progress = Progress::new(self.global.quiet, format!("building {} ({})", job.source.display(), job.target.id));
+        let unit = match open(&job.source, station) {
+            Ok((unit, checked)) => {
+                drop(progress);
+                show(&mut self.renderer, &checked);
+                unit
+            }
+            Err(checked) => {
+                drop(progress);
+                show(&mut self.renderer, &checked);
+                return self.fail(if checked.unreadable { Exit::Io } else { Exit::Findings });
+            }
+        };
+        let progress = Progress::new(self.global.quiet, format!("building {} ({})", job.source.display(), job.target.id));
+        let goal = Goal { target: job.target.id, options: &job.options, machine };
+        let made = build(&unit, &goal);
+        drop(progress);
+        match made {
+            Ok(built) => self.keep(job, station, built),
+            Err(text) => {
+                eprintln!("{text}");
+                self.fail(Exit::Usage);
+            }
+        }
+    }
+
+    /// Keeps a result for writing.
+    fn keep(&mut self, job: &Job, station: &Station, mut built: Built) {
+        built.found.iter_mut().for_each(|d| station.lints.harden(d));
+        let bad = built.found.iter().any(|d| d.severity == Severity::Error);
+        let checked = Checked { sources: built.sources, found: built.found, more: 0, unreadable: false };
+        show(&mut self.renderer, &checked);
+        if bad {
+            return self.fail(Exit::Findings);
+        }
+        self.files.extend(built.subs.iter().cloned());
+        let Some(goal) = &job.goal else {
+            if let Some(main) = built.artifacts.into_iter().next() {
+                self.results.push((PathBuf::from("-"), main.bytes));
+            }
+            return;
+        };
+        let mut read = vec![job.source.clone()];
+        read.extend(station.files.iter().chain(&built.subs).cloned());
+        if let Some(same) = read.iter().find(|r| same_file(r, goal)) {
+            let name = same.display().to_string();
+            complain(&mut self.renderer, &mut self.sources, &name, code::FILE_OVERWRITES_SOURCE, std::slice::from_ref(&name));
+            return self.fail(Exit::Findings);
+        }
+        self.rules.push_str(&depfile(goal, &read));
+        for artifact in built.artifacts {
+            let path = if artifact.suffix.is_empty() {
+                goal.clone()
+            } else {
+                goal.with_file_name(format!("{}{}", stem(goal), artifact.suffix))
+            };
+            self.results.push((path, artifact.bytes));
+        }
+    }
+
+    /// Everything is made: writes it.
+    fn write(&mut self) {
+        if let Some(path) = &self.args.depfile {
+            self.results.push((path.clone(), std::mem::take(&mut self.rules).into_bytes()));
+        }
+        let results = std::mem::take(&mut self.results);
+        let (stdout, files): (Vec<_>, Vec<_>) = results.into_iter().partition(|(p, _)| p == Path::new("-"));
+        let folders = files.iter().filter_map(|(p, _)| p.parent()).filter(|p| !p.as_os_str().is_empty());
+        let written = folders
+            .map(|f| std::fs::create_dir_all(f).map_err(|e| (f.to_path_buf(), e)))
+            .collect::<Result<Vec<()>, _>>()
+            .and_then(|_| write_all(&files))
+            .and_then(|()| stdout.iter().try_for_each(|(p, b)| to_stdout(b).map_err(|e| (p.clone(), e))));
+        match written {
+            Ok(()) if !self.global.quiet && self.args.files.is_empty() => eprintln!("built {} files", files.len()),
+            Ok(()) => {}
+            Err((path, e)) => {
+                let name = path.display().to_string();
+                complain(&mut self.renderer, &mut self.sources, &name, code::FILE_UNWRITABLE, &[name.clone(), reason(&e)]);
+                self.fail(Exit::Io);
+            }
+        }
+    }
+}
+
+fn target(id: &str) -> Result<&'static TargetDef, String> {
+    super::target::ready().find(|t| t.id == id).ok_or_else(|| {
+        let all: Vec<&str> = super::target::ready().map(|t| t.id).collect();
+        format!("there is no target {id}; choose one of {}", all.join(", "))
+    })
+}
+
+fn is_folder(path: &Path) -> bool {
+    path.is_dir() || path.to_string_lossy().ends_with(['/', std::path::MAIN_SEPARATOR])
+}
+
+fn file_name(source: &Path, target: &TargetDef) -> String {
+    format!("{}.{}", stem(source), target.extension)
+}
+
+fn same_file(a: &Path, b: &Path) -> bool {
+    a == b || matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
+}
+
+/// Options of a target in the project file, read like those of the command line.
+fn options_of(table: &toml::Table) -> Result<TargetOptions, String> {
+    #[derive(clap::Parser)]
+    #[command(no_binary_name = true, disable_help_flag = true)]
+    struct Line {
+        #[command(flatten)]
+        options: TargetOptions,
+    }
+    let mut line = Vec::new();
+    for (key, value) in table {
+        match value {
+            toml::Value::Boolean(true) => line.push(format!("--{key}")),
+            toml::Value::Boolean(false) => {}
+            toml::Value::String(s) => line.push(format!("--{key}={s}")),
+            other => line.push(format!("--{key}={other}")),
+        }
+    }
+    Line::try_parse_from(line).map(|l| l.options).map_err(|e| {
+        let text = e.to_string();
+        text.lines().next().unwrap_or("").trim_start_matches("error: ").to_string()
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn options_of_the_project() {
+        let table: toml::Table = "decimals = 3\nrepeat-words = true\nunits = 'inch'\narc-tolerance = 0.01\n".parse().unwrap();
+        let o = options_of(&table).unwrap();
+        assert_eq!((o.decimals, o.repeat_words, o.arc_tolerance), (Some(3), true, Some(0.01)));
+        assert!(options_of(&"decimal = 3\n".parse().unwrap()).is_err());
+        assert!(options_of(&"decimals = 'x'\n".parse().unwrap()).is_err());
+    }
+}

@@ -1,0 +1,192 @@
+//! `gcc-robot check`
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::mpsc;
+
+use gr_driver::{Options, Session};
+use gr_text::{Code, Diagnostic, FileId, code};
+
+use crate::exit::Exit;
+use crate::options::{CheckArgs, Global};
+use crate::progress::Progress;
+use crate::render::Renderer;
+use crate::setup::{Station, extensions, station};
+use crate::sources::{Sources, read, reason, walk};
+
+/// What came of one file.
+pub struct Checked {
+    /// Files that the findings point into.
+    pub sources: Sources,
+    /// The findings.
+    pub found: Vec<Diagnostic>,
+    /// Findings that are not listed.
+    pub more: usize,
+    /// It could not be read at all.
+    pub unreadable: bool,
+}
+
+pub fn run(global: &Global, args: &CheckArgs) -> Exit {
+    let mut renderer = global.renderer(false);
+    let mut sources = Sources::default();
+    let Some(station) = station(&args.setup, &args.lints, Path::new("."), &mut sources, &mut renderer) else {
+        renderer.finish(!global.quiet);
+        return Exit::Findings;
+    };
+    let (files, mut exit) = match programs(&args.paths, &station, &mut sources, &mut renderer) {
+        Some(found) => found,
+        None => {
+            eprintln!("name the programs to check, or add sources to gcc-robot.toml");
+            return Exit::Usage;
+        }
+    };
+    renderer.tally.files = files.len();
+    let jobs = args.jobs.or_else(|| std::thread::available_parallelism().ok()).map_or(1, std::num::NonZero::get);
+    let mut held = Vec::new();
+    let progress = Progress::new(global.quiet, "checking");
+    each(&files, &station, jobs, |n, checked| {
+        progress.tell(|| format!("checked {} of {} files", n + 1, files.len()));
+        // Findings and progress must not meet on one line.
+        if std::io::IsTerminal::is_terminal(&std::io::stderr()) {
+            held.push(checked);
+            return;
+        }
+        show(&mut renderer, &checked);
+        if checked.unreadable {
+            exit = Exit::Io;
+        }
+    });
+    drop(progress);
+    for checked in held {
+        show(&mut renderer, &checked);
+        if checked.unreadable {
+            exit = Exit::Io;
+        }
+    }
+    renderer.finish(!global.quiet);
+    if renderer.tally.errors > 0 { exit.max(Exit::Findings) } else { exit }
+}
+
+/// Shows the findings of a file.
+pub fn show(renderer: &mut Renderer, checked: &Checked) {
+    renderer.forget();
+    checked.found.iter().for_each(|d| renderer.show(&checked.sources, d));
+    if checked.more > 0 {
+        renderer.remark(&format!("… and {} more findings of these kinds", checked.more));
+    }
+    renderer.flush();
+}
+
+/// The programs that paths name: files, and what lies in folders. None: nothing was named at all.
+fn programs(
+    paths: &[PathBuf],
+    station: &Station,
+    sources: &mut Sources,
+    renderer: &mut Renderer,
+) -> Option<(Vec<PathBuf>, Exit)> {
+    let mut exit = Exit::Ok;
+    if paths.is_empty() {
+        let project = station.project.as_ref()?;
+        let files = project.files(&project.file.project.sources);
+        if files.is_empty() {
+            nothing(project.path.display().to_string(), sources, renderer);
+        }
+        return Some((files, exit));
+    }
+    let mut files = Vec::new();
+    for path in paths {
+        if !path.is_dir() {
+            files.push(path.clone());
+            continue;
+        }
+        let before = files.len();
+        if let Err(e) = walk(path, &extensions(station.dialect), &mut files) {
+            let name = path.display().to_string();
+            super::complain(renderer, sources, &name, code::FILE_UNREADABLE, &[name.clone(), reason(&e)]);
+            exit = Exit::Io;
+        } else if files.len() == before {
+            nothing(path.display().to_string(), sources, renderer);
+        }
+    }
+    Some((files, exit))
+}
+
+fn nothing(name: String, sources: &mut Sources, renderer: &mut Renderer) {
+    super::complain(renderer, sources, &name, code::PROJECT_NOTHING_TO_DO, std::slice::from_ref(&name));
+}
+
+/// Checks files in parallel; results arrive in the order of the files.
+fn each(files: &[PathBuf], station: &Station, jobs: usize, mut done: impl FnMut(usize, Checked)) {
+    let next = AtomicUsize::new(0);
+    let (sender, receiver) = mpsc::channel();
+    std::thread::scope(|scope| {
+        for _ in 0..jobs.min(files.len()) {
+            let (sender, next) = (sender.clone(), &next);
+            scope.spawn(move || {
+                loop {
+                    let n = next.fetch_add(1, Ordering::Relaxed);
+                    let Some(path) = files.get(n) else { return };
+                    if sender.send((n, check(path, station))).is_err() {
+                        return;
+                    }
+                }
+            });
+        }
+        drop(sender);
+        let mut early = BTreeMap::new();
+        let mut due = 0;
+        for (n, checked) in receiver {
+            early.insert(n, checked);
+            while let Some(checked) = early.remove(&due) {
+                done(due, checked);
+                due += 1;
+            }
+        }
+    });
+}
+
+/// Checks one file.
+pub fn check(path: &Path, station: &Station) -> Checked {
+    let name = if path == Path::new("-") { "<stdin>".to_string() } else { path.display().to_string() };
+    match read(path) {
+        Ok(decoded) => checked(&name, path, &decoded.text, station),
+        Err((code, args)) => unreadable(&name, code, &args),
+    }
+}
+
+/// A file that could not be read.
+pub fn unreadable(name: &str, code: Code, args: &[String]) -> Checked {
+    let mut sources = Sources::default();
+    let file = sources.add(name, "");
+    let found = vec![crate::sources::about_file(code, file, args)];
+    Checked { sources, found, more: 0, unreadable: true }
+}
+
+fn checked(name: &str, path: &Path, text: &str, station: &Station) -> Checked {
+    let mut session = Session::new();
+    let mut options = Options::new(station.setup_for(path, text));
+    station.lints.put_into(&mut options.rules);
+    let file = session.open(name, text, options);
+    let check = session.check(file);
+    let mut found = check.diagnostics;
+    found.iter_mut().for_each(|d| station.lints.harden(d));
+    Checked { sources: session_sources(&session, &found), found, more: check.more, unreadable: false }
+}
+
+/// The files that findings point into, under the numbers that the session gave them.
+pub fn session_sources(session: &Session, found: &[Diagnostic]) -> Sources {
+    let mut used = std::collections::BTreeSet::new();
+    for d in found {
+        used.extend(d.labels.iter().map(|l| l.file));
+        used.extend(d.trace.iter().map(|f| f.file));
+        used.extend(d.fixes.iter().flat_map(|f| f.edits.iter().map(|(file, ..)| *file)));
+    }
+    let mut sources = Sources::default();
+    for id in 0..used.last().map_or(0, |f: &FileId| f.0 + 1) {
+        let id = FileId(id);
+        let text = if used.contains(&id) { session.any_text(id).unwrap_or_default() } else { String::new() };
+        sources.add(session.path(id).unwrap_or_default(), text);
+    }
+    sources
+}

@@ -1,0 +1,55 @@
+//! One module per command.
+
+pub mod build;
+pub mod check;
+pub mod completions;
+pub mod diff;
+pub mod explain;
+pub mod init;
+pub mod machine;
+pub mod rs274;
+pub mod target;
+
+use std::io::IsTerminal as _;
+use std::path::Path;
+
+use gr_text::Code;
+
+use crate::exit::Exit;
+use crate::options::{Global, When};
+use crate::render::Renderer;
+use crate::sources::{Sources, about_file};
+
+impl Global {
+    /// A renderer as the options ask for it.
+    pub fn renderer(&self, stdout_is_taken: bool) -> Renderer {
+        let color = match self.color {
+            When::Always => true,
+            When::Never => false,
+            When::Auto => std::env::var_os("NO_COLOR").is_none_or(|v| v.is_empty()) && std::io::stderr().is_terminal(),
+        };
+        Renderer::new(self.message_format, color, stdout_is_taken)
+    }
+}
+
+/// Shows a finding about a file that could not be read or written, or about an option.
+pub fn complain(renderer: &mut Renderer, sources: &mut Sources, name: &str, code: Code, args: &[String]) {
+    let file = sources.add(name, "");
+    renderer.show(sources, &about_file(code, file, args));
+}
+
+/// Shows one finding and ends the log.
+pub fn refuse(global: &Global, name: &Path, code: Code, args: &[String]) -> Exit {
+    let mut renderer = global.renderer(false);
+    complain(&mut renderer, &mut Sources::default(), &name.display().to_string(), code, args);
+    renderer.finish(false);
+    if code.def().slug.starts_with("file/") { Exit::Io } else { Exit::Findings }
+}
+
+/// Prints text; only a broken disk behind standard output makes this fail.
+pub fn print(text: &str) -> Exit {
+    match crate::output::to_stdout(text.as_bytes()) {
+        Ok(()) => Exit::Ok,
+        Err(_) => Exit::Io,
+    }
+}

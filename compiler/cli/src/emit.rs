@@ -1,0 +1,277 @@
+//! Targets: motion and canonical calls become files.
+
+use std::path::{Path, PathBuf};
+
+use clap::{Args, ValueEnum};
+use gr_backends::rs274ngc;
+use gr_backends::{Texts, joint};
+use gr_canon::{Printer, Units, Version};
+use gr_ir::{Program, Source};
+use gr_machine::Machine;
+use gr_text::{Diagnostic, FileId, Span};
+
+use crate::options::UnitArg;
+use crate::pipeline::{Motion, Unit, motion, run};
+use crate::sources::Sources;
+
+/// Options of targets; `gcc-robot target show` says which target heeds which.
+#[derive(Args, Debug, Clone, Default)]
+#[command(next_help_heading = "Options of targets")]
+pub struct TargetOptions {
+    /// rs274ngc: language that is written: linuxcnc, fanuc-mill or grbl
+    #[arg(long, value_name = "DIALECT")]
+    pub to: Option<String>,
+    /// rs274ngc: length unit that is written
+    #[arg(long, value_enum, value_name = "UNIT")]
+    pub units: Option<UnitArg>,
+    /// Decimals of written numbers
+    #[arg(long, value_name = "N")]
+    pub decimals: Option<usize>,
+    /// rs274ngc: how arcs are written
+    #[arg(long, value_enum, value_name = "FORM")]
+    pub arcs: Option<ArcsArg>,
+    /// rs274ngc: planes that arcs may lie in; others become straight pieces
+    #[arg(long, value_enum, value_name = "PLANES")]
+    pub plane: Option<PlaneArg>,
+    /// Greatest distance of straight pieces from a curve, mm
+    #[arg(long, value_name = "MM")]
+    pub arc_tolerance: Option<f64>,
+    /// rs274ngc: number lines: first number and step
+    #[arg(long, value_name = "FIRST[,STEP]", num_args = 0..=1, default_missing_value = "10,10", require_equals = true)]
+    pub line_numbers: Option<String>,
+    /// rs274ngc: write words that have not changed too
+    #[arg(long)]
+    pub repeat_words: bool,
+    /// rs274ngc: leave out comments
+    #[arg(long)]
+    pub no_comments: bool,
+    /// joint-gcode: greatest time between two points, s
+    #[arg(long, value_name = "S")]
+    pub interval: Option<f64>,
+    /// joint-gcode: decimal comma
+    #[arg(long)]
+    pub decimal_comma: bool,
+    /// joint-gcode: how numbers are cut to their decimals
+    #[arg(long, value_enum, value_name = "HOW")]
+    pub round: Option<RoundArg>,
+    /// joint-gcode: greatest speed of every joint, degrees (mm) per second
+    #[arg(long, value_name = "SPEED")]
+    pub joint_speed: Option<f64>,
+    /// Reproduce a published system
+    #[arg(long, value_enum, value_name = "SYSTEM")]
+    pub reference: Option<Reference>,
+}
+
+#[expect(missing_docs, reason = "the help texts say it")]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
+pub enum ArcsArg {
+    /// I J K from the start point
+    Ijk,
+    /// I J K as absolute position
+    IjkAbsolute,
+    /// Radius
+    R,
+    /// Straight pieces
+    Lines,
+}
+
+#[expect(missing_docs, reason = "the help texts say it")]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
+pub enum PlaneArg {
+    /// XY only
+    Xy,
+    /// XY, XZ and YZ
+    All,
+}
+
+#[expect(missing_docs, reason = "the help texts say it")]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
+pub enum RoundArg {
+    /// To the nearest
+    Nearest,
+    /// Toward zero
+    Truncate,
+}
+
+#[expect(missing_docs, reason = "the help texts say it")]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
+pub enum Reference {
+    /// The joint-space compiler for a planar arm, UFMG 2008
+    Ufmg2008,
+}
+
+/// One file of a result. The first is the main one.
+pub struct Artifact {
+    /// Put behind the stem of the main file's name, extension included; empty for the main file.
+    pub suffix: &'static str,
+    /// Contents.
+    pub bytes: Vec<u8>,
+}
+
+/// A result with everything that was found on the way.
+pub struct Built {
+    /// Files; none when there were errors.
+    pub artifacts: Vec<Artifact>,
+    /// Findings of lowering and emitting.
+    pub found: Vec<Diagnostic>,
+    /// Files that the findings point into.
+    pub sources: Sources,
+    /// Subroutine files used.
+    pub subs: Vec<PathBuf>,
+}
+
+/// What a build needs besides the program.
+pub struct Goal<'a> {
+    /// Target id.
+    pub target: &'a str,
+    /// Options of the target.
+    pub options: &'a TargetOptions,
+    /// Machine, if one was chosen.
+    pub machine: Option<&'a Machine>,
+}
+
+/// Makes a target of a checked program. Usage errors come back as text.
+pub fn build(unit: &Unit, goal: &Goal<'_>) -> Result<Built, String> {
+    if goal.target == "canon" {
+        return Ok(canon(unit));
+    }
+    let motion = motion(unit, goal.machine);
+    if motion.found.iter().any(|d| d.severity == gr_text::Severity::Error) {
+        return Ok(built(motion, Vec::new(), Vec::new()));
+    }
+    let name = stem(&unit.path);
+    let made: Result<(Vec<Artifact>, Vec<Diagnostic>), Vec<Diagnostic>> = match goal.target {
+        "motion" => Ok((one(gr_ir::text::print(&motion.program, true).into_bytes()), Vec::new())),
+        "rs274ngc" => normalised(&motion, unit, goal.options, &name)?,
+        "joint-gcode" => joints(&motion, goal)?,
+        "json" => dumped(|out| gr_backends::dump::json(&motion.program, out)),
+        "csv" => dumped(|out| gr_backends::dump::csv(&motion.program, &gr_backends::dump::CsvOptions::default(), out)),
+        other => return Err(format!("the target {other} can't be made by this version")),
+    };
+    Ok(match made {
+        Ok((artifacts, notes)) => built(motion, artifacts, notes),
+        Err(found) => built(motion, Vec::new(), found),
+    })
+}
+
+fn built(motion: Motion, artifacts: Vec<Artifact>, more: Vec<Diagnostic>) -> Built {
+    let mut found = motion.found;
+    found.extend(more);
+    Built { artifacts, found, sources: motion.sources, subs: motion.subs }
+}
+
+fn one(bytes: Vec<u8>) -> Vec<Artifact> {
+    vec![Artifact { suffix: "", bytes }]
+}
+
+fn dumped(write: impl FnOnce(&mut dyn std::io::Write) -> std::io::Result<()>) -> Result<(Vec<Artifact>, Vec<Diagnostic>), Vec<Diagnostic>> {
+    let mut bytes = Vec::new();
+    write(&mut bytes).expect("memory takes everything");
+    Ok((one(bytes), Vec::new()))
+}
+
+/// Name without folder and extension.
+pub fn stem(path: &Path) -> String {
+    path.file_stem().map_or("program".into(), |s| s.to_string_lossy().into_owned())
+}
+
+fn canon(unit: &Unit) -> Built {
+    let version = if unit.setup.dialect.id == "linuxcnc-2.10" { Version::V2_10 } else { Version::V2_9 };
+    let printer = Printer::new(Vec::new(), version).latin1(unit.encoding == gr_text::Encoding::Latin1);
+    let (printer, disk) = run(unit, printer);
+    let artifacts = one(printer.into_inner());
+    Built { artifacts, found: Vec::new(), sources: disk.sources(), subs: disk.subs().cloned().collect() }
+}
+
+type Made = Result<(Vec<Artifact>, Vec<Diagnostic>), Vec<Diagnostic>>;
+
+fn normalised(motion: &Motion, unit: &Unit, options: &TargetOptions, name: &str) -> Result<Made, String> {
+    let mut o = rs274ngc::Options { name: name.to_string(), ..rs274ngc::Options::default() };
+    let to = options.to.as_deref().unwrap_or("linuxcnc");
+    o.language = rs274ngc::Language::of_dialect(to)
+        .ok_or_else(|| format!("G-code can't be written in dialect {to}; choose linuxcnc, fanuc-mill or grbl"))?;
+    if options.units == Some(UnitArg::Inch) {
+        o.units = Units::Inch;
+    }
+    o.decimals = options.decimals;
+    o.arcs = match options.arcs {
+        None | Some(ArcsArg::Ijk) => rs274ngc::Arcs::Ijk,
+        Some(ArcsArg::IjkAbsolute) => rs274ngc::Arcs::IjkAbsolute,
+        Some(ArcsArg::R) => rs274ngc::Arcs::R,
+        Some(ArcsArg::Lines) => rs274ngc::Arcs::Lines,
+    };
+    o.only_xy_arcs = options.plane == Some(PlaneArg::Xy);
+    o.arc_tolerance = options.arc_tolerance.unwrap_or(o.arc_tolerance);
+    o.numbers = options.line_numbers.as_deref().map(line_numbers).transpose()?;
+    o.repeat_words = options.repeat_words;
+    o.comments = !options.no_comments;
+    stored(&mut o, unit);
+    let texts = texts(&motion.sources);
+    Ok(rs274ngc::emit(&motion.program, &o, &texts).map(|e| (one(e.text.into_bytes()), e.notes)))
+}
+
+/// Work offsets and tools that the control has in store, in mm and rad.
+fn stored(o: &mut rs274ngc::Options, unit: &Unit) {
+    let scale = if unit.setup.machine_units == Units::Inch { 25.4 } else { 1.0 };
+    let axis = |i: usize, v: f64| if (3..6).contains(&i) { v.to_radians() } else { v * scale };
+    let param = |n: usize| unit.setup.params.get(&(n as u32)).copied().unwrap_or(0.0);
+    for n in 1..=9 {
+        let base = 5201 + 20 * n;
+        for i in 0..9 {
+            o.stored_offsets[n][i] = axis(i, param(base + i));
+        }
+        o.stored_rotations[n] = param(base + 9).to_radians();
+    }
+    for tool in unit.setup.tools.rows.iter().skip(1) {
+        let mut offset = tool.offset;
+        offset.iter_mut().enumerate().for_each(|(i, v)| *v = axis(i, *v));
+        o.tools.push((tool.number, offset));
+    }
+}
+
+/// `FIRST[,STEP]`
+fn line_numbers(text: &str) -> Result<(u32, u32), String> {
+    let (first, step) = text.split_once(',').unwrap_or((text, "10"));
+    let number = |t: &str| t.trim().parse::<u32>().map_err(|_| format!("--line-numbers {text}: whole numbers are needed"));
+    Ok((number(first)?, number(step)?))
+}
+
+fn texts(sources: &Sources) -> Texts<'_> {
+    Texts::new(sources.iter().map(|(id, f)| (id, &*f.text)))
+}
+
+fn joints(motion: &Motion, goal: &Goal<'_>) -> Result<Made, String> {
+    let o = goal.options;
+    let mut options = if o.reference == Some(Reference::Ufmg2008) { joint::Options::ufmg2008() } else { joint::Options::default() };
+    options.interval = o.interval.unwrap_or(options.interval);
+    options.decimals = o.decimals.unwrap_or(options.decimals);
+    options.comma |= o.decimal_comma;
+    options.rounding = match o.round {
+        Some(RoundArg::Nearest) => joint::Rounding::Nearest,
+        Some(RoundArg::Truncate) => joint::Rounding::Truncate,
+        None => options.rounding,
+    };
+    options.joint_speed = o.joint_speed.map(f64::to_radians).or(options.joint_speed);
+    if !(options.interval > 0.0) {
+        return Err("--interval must be above zero".into());
+    }
+    let builtin = gr_machine::builtin("ufmg/plano-3r").expect("the library has it");
+    let machine = match (goal.machine, o.reference) {
+        (Some(m), _) => m,
+        (None, Some(Reference::Ufmg2008)) => &builtin,
+        (None, None) => return Err("the target joint-gcode needs --machine; `gcc-robot machine list` shows the ids".into()),
+    };
+    let texts = texts(&motion.sources);
+    let place = |s: Source| -> (FileId, Span) { gr_backends::Sources::place(&texts, s) };
+    Ok(plan(&motion.program, machine, &options, &place))
+}
+
+fn plan(program: &Program, machine: &Machine, options: &joint::Options, place: &dyn Fn(Source) -> (FileId, Span)) -> Made {
+    let made = joint::compile(program, machine, options, place)?;
+    let artifacts = vec![
+        Artifact { suffix: "", bytes: made.gcode().into_bytes() },
+        Artifact { suffix: "-cartesian.csv", bytes: made.cartesian_csv().into_bytes() },
+        Artifact { suffix: "-joint.csv", bytes: made.joint_csv().into_bytes() },
+    ];
+    Ok((artifacts, Vec::new()))
+}

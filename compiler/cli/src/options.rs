@@ -1,0 +1,289 @@
+//! The command line as data.
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+
+use crate::render::MessageFormat;
+
+/// Compiler toolchain for G-code: checks, explains, formats, compares and translates programs.
+#[derive(Parser, Debug)]
+#[command(name = "gcc-robot", version, max_term_width = 100, arg_required_else_help = true)]
+#[command(after_help = "Exit status: 0 done, 1 errors or differences found, 2 wrong usage, 3 files can't be read or written.")]
+pub struct Cli {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+    /// For every command.
+    #[command(flatten)]
+    pub global: Global,
+}
+
+/// Options of every command.
+#[derive(Args, Debug, Clone)]
+pub struct Global {
+    /// How diagnostics are written
+    #[arg(long, global = true, value_enum, default_value_t, value_name = "FORMAT")]
+    pub message_format: MessageFormat,
+    /// When to use colors
+    #[arg(long, global = true, value_enum, default_value_t, value_name = "WHEN")]
+    pub color: When,
+    /// No summary and no progress
+    #[arg(short, long, global = true)]
+    pub quiet: bool,
+}
+
+/// When to use colors.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum, Default)]
+pub enum When {
+    /// On a terminal, unless NO_COLOR is set
+    #[default]
+    Auto,
+    /// Always
+    Always,
+    /// Never
+    Never,
+}
+
+/// The commands.
+#[derive(Subcommand, Debug)]
+pub enum Command {
+    /// Check programs and report everything that is wrong or doubtful
+    Check(CheckArgs),
+    /// Translate programs: normalised G-code, robot programs, canonical calls, dumps, plots
+    Build(Box<BuildArgs>),
+    /// Explain a diagnostic (E0203), a G-code (G83) or a word letter
+    Explain(ExplainArgs),
+    /// Compare two programs as motion: paths, tools, feeds, time
+    Diff(DiffArgs),
+    /// Prove that a translation moves the machine as its source does
+    Verify(VerifyArgs),
+    /// List and show what `build --target` can make
+    Target(TargetArgs),
+    /// List, show and check machines
+    Machine(MachineArgs),
+    /// Stand in for LinuxCNC's rs274: same options, output, messages and exit status
+    Rs274(Rs274Args),
+    /// Write a project file gcc-robot.toml
+    Init(InitArgs),
+    /// Print a completion script for a shell
+    Completions(CompletionsArgs),
+}
+
+/// The machine and its controller, as far as a program depends on them.
+#[derive(Args, Debug, Clone, Default)]
+pub struct SetupArgs {
+    /// Dialect: linuxcnc, linuxcnc-2.10, fanuc-mill, fanuc-turn, grbl, ufmg2008 [default: by extension]
+    #[arg(long, value_name = "NAME")]
+    pub dialect: Option<String>,
+    /// Machine: an id such as generic/mill3, or the path of a machine file
+    #[arg(long, value_name = "MACHINE")]
+    pub machine: Option<String>,
+    /// Tool table (.tbl)
+    #[arg(short = 't', long, value_name = "FILE")]
+    pub tools: Option<PathBuf>,
+    /// Stored parameters (.var); read only
+    #[arg(long, value_name = "FILE")]
+    pub vars: Option<PathBuf>,
+    /// INI file of the machine
+    #[arg(short = 'i', long, value_name = "FILE")]
+    pub ini: Option<PathBuf>,
+    /// Length unit of the machine: of tool table and stored parameters [default: INI file's, else mm]
+    #[arg(long, value_enum, value_name = "UNIT")]
+    pub machine_units: Option<UnitArg>,
+    /// Skip lines that begin with /
+    #[arg(long)]
+    pub block_delete: bool,
+    /// Folder with subroutine files; may be given several times
+    #[arg(long = "subs", value_name = "FOLDER")]
+    pub subs: Vec<PathBuf>,
+}
+
+/// A length unit.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
+pub enum UnitArg {
+    /// Millimetres
+    Mm,
+    /// Inches
+    Inch,
+}
+
+/// How severe findings are.
+#[derive(Args, Debug, Clone, Default)]
+pub struct LintArgs {
+    /// Warnings count as errors
+    #[arg(long)]
+    pub strict: bool,
+    /// Never mention this lint (code or slug); may be given several times
+    #[arg(long, value_name = "CODE")]
+    pub allow: Vec<String>,
+    /// Mention this lint although it is off by default; may be given several times
+    #[arg(long, value_name = "CODE")]
+    pub warn: Vec<String>,
+    /// Treat this lint as an error; may be given several times
+    #[arg(long, value_name = "CODE")]
+    pub deny: Vec<String>,
+}
+
+#[expect(missing_docs, reason = "the help texts say it")]
+#[derive(Args, Debug)]
+pub struct CheckArgs {
+    /// Programs and folders; `-` is standard input [default: the project's sources]
+    #[arg(value_name = "PATH")]
+    pub paths: Vec<PathBuf>,
+    #[command(flatten)]
+    pub setup: SetupArgs,
+    #[command(flatten)]
+    pub lints: LintArgs,
+    /// Number of files checked at a time [default: number of processors]
+    #[arg(short, long, value_name = "N")]
+    pub jobs: Option<std::num::NonZeroUsize>,
+}
+
+#[expect(missing_docs, reason = "the help texts say it")]
+#[derive(Args, Debug, Clone)]
+pub struct BuildArgs {
+    /// Programs [default: sources and targets of gcc-robot.toml]
+    #[arg(value_name = "FILE")]
+    pub files: Vec<PathBuf>,
+    /// What to make; `gcc-robot target list` shows all [default: rs274ngc]
+    #[arg(long, value_name = "TARGET")]
+    pub target: Option<String>,
+    /// Where the result goes: a file, a folder, or `-` for standard output [default: standard output]
+    #[arg(short, long, value_name = "PATH")]
+    pub output: Option<PathBuf>,
+    /// Build again whenever a source changes
+    #[arg(long)]
+    pub watch: bool,
+    /// Write a rule for make and ninja that names every file read
+    #[arg(long, value_name = "FILE")]
+    pub depfile: Option<PathBuf>,
+    #[command(flatten)]
+    pub setup: SetupArgs,
+    #[command(flatten)]
+    pub lints: LintArgs,
+    #[command(flatten)]
+    pub options: crate::emit::TargetOptions,
+}
+
+#[expect(missing_docs, reason = "the help texts say it")]
+#[derive(Args, Debug)]
+pub struct DiffArgs {
+    /// First program
+    pub a: PathBuf,
+    /// Second program
+    pub b: PathBuf,
+    /// Greatest distance between equal paths, mm
+    #[arg(long, value_name = "MM", default_value_t = 1e-6)]
+    pub tolerance: f64,
+    /// Greatest difference of feeds, speeds and times, as a share
+    #[arg(long, value_name = "SHARE", default_value_t = 1e-6)]
+    pub rate: f64,
+    /// Compare in the work frame, for programs made for other offsets
+    #[arg(long)]
+    pub work_frame: bool,
+    /// Differences listed at most
+    #[arg(long, value_name = "N", default_value_t = 20)]
+    pub limit: usize,
+    /// Dialect of the second program, when it differs
+    #[arg(long, value_name = "NAME")]
+    pub second_dialect: Option<String>,
+    #[command(flatten)]
+    pub setup: SetupArgs,
+}
+
+#[expect(missing_docs, reason = "the help texts say it")]
+#[derive(Args, Debug)]
+pub struct VerifyArgs {
+    /// Program
+    pub file: PathBuf,
+    #[command(flatten)]
+    pub setup: SetupArgs,
+    #[command(flatten)]
+    pub options: crate::emit::TargetOptions,
+}
+
+#[expect(missing_docs, reason = "the help texts say it")]
+#[derive(Args, Debug)]
+pub struct ExplainArgs {
+    /// E0203, arc/radius-mismatch, G83, M6, F …
+    #[arg(required_unless_present = "list")]
+    pub name: Option<String>,
+    /// Dialect of G-codes and words
+    #[arg(long, value_name = "NAME", default_value = "linuxcnc")]
+    pub dialect: String,
+    /// List all diagnostics
+    #[arg(long)]
+    pub list: bool,
+}
+
+#[expect(missing_docs, reason = "the help texts say it")]
+#[derive(Args, Debug)]
+pub struct TargetArgs {
+    #[command(subcommand)]
+    pub action: TargetAction,
+}
+
+#[expect(missing_docs, reason = "the help texts say it")]
+#[derive(Subcommand, Debug)]
+pub enum TargetAction {
+    /// List all targets
+    List,
+    /// Show one target and its options
+    Show { id: String },
+}
+
+#[expect(missing_docs, reason = "the help texts say it")]
+#[derive(Args, Debug)]
+pub struct MachineArgs {
+    #[command(subcommand)]
+    pub action: MachineAction,
+}
+
+#[expect(missing_docs, reason = "the help texts say it")]
+#[derive(Subcommand, Debug)]
+pub enum MachineAction {
+    /// List the machines that come with the program
+    List,
+    /// Describe a machine
+    Show {
+        /// An id, or the path of a machine file
+        machine: String,
+        /// Print the machine file itself
+        #[arg(long)]
+        toml: bool,
+    },
+    /// Check machine files
+    Check {
+        /// Machine files
+        #[arg(required = true)]
+        files: Vec<PathBuf>,
+    },
+}
+
+#[expect(missing_docs, reason = "the help texts say it")]
+#[derive(Args, Debug)]
+pub struct InitArgs {
+    /// Folder of the project
+    #[arg(default_value = ".")]
+    pub folder: PathBuf,
+    /// Overwrite an existing project file
+    #[arg(long)]
+    pub force: bool,
+}
+
+#[expect(missing_docs, reason = "the help texts say it")]
+#[derive(Args, Debug)]
+pub struct CompletionsArgs {
+    /// Shell
+    pub shell: clap_complete::Shell,
+}
+
+/// The options of the real rs274, and which LinuxCNC it stands in for.
+#[derive(Args, Debug, Clone)]
+#[command(disable_help_flag = true)]
+pub struct Rs274Args {
+    /// Options and files as for rs274, and --linuxcnc 2.9|2.10
+    #[arg(trailing_var_arg = true, allow_hyphen_values = true, value_name = "ARGUMENTS")]
+    pub arguments: Vec<std::ffi::OsString>,
+}

@@ -1,0 +1,140 @@
+//! Writing results: to standard output, or beside the goal and renamed when complete.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+/// A result on its way to a file. Dropped without [`Pending::commit`], it leaves nothing behind.
+pub struct Pending {
+    goal: PathBuf,
+    beside: PathBuf,
+    file: Option<std::fs::File>,
+}
+
+impl Pending {
+    /// Opens a file beside `goal`.
+    pub fn new(goal: &Path) -> std::io::Result<Pending> {
+        if goal.is_dir() {
+            return Err(std::io::Error::new(std::io::ErrorKind::IsADirectory, "is a folder"));
+        }
+        let name = goal.file_name().ok_or_else(|| std::io::Error::other("is not a file name"))?;
+        let mut hidden = std::ffi::OsString::from(".");
+        hidden.push(name);
+        hidden.push(format!(".{}.part", std::process::id()));
+        let beside = goal.with_file_name(hidden);
+        let file = std::fs::File::create(&beside)?;
+        Ok(Pending { goal: goal.to_path_buf(), beside, file: Some(file) })
+    }
+    /// The result is complete: puts it in its place.
+    pub fn commit(mut self) -> std::io::Result<()> {
+        self.file.take();
+        std::fs::rename(&self.beside, &self.goal)
+    }
+}
+
+impl Write for Pending {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        self.file.as_mut().map_or(Ok(bytes.len()), |f| f.write(bytes))
+    }
+    fn flush(&mut self) -> std::io::Result<()> {
+        self.file.as_mut().map_or(Ok(()), Write::flush)
+    }
+}
+
+impl Drop for Pending {
+    fn drop(&mut self) {
+        if self.file.take().is_some() {
+            // Nothing more can be done about it.
+            let _ = std::fs::remove_file(&self.beside);
+        }
+    }
+}
+
+/// Writes several files so that all of them appear or none: all beside their goals first, then renamed.
+pub fn write_all(files: &[(PathBuf, Vec<u8>)]) -> Result<(), (PathBuf, std::io::Error)> {
+    let mut pending = Vec::new();
+    for (path, bytes) in files {
+        let write = || {
+            let mut p = Pending::new(path)?;
+            p.write_all(bytes)?;
+            p.flush()?;
+            Ok(p)
+        };
+        pending.push((path, write().map_err(|e| (path.clone(), e))?));
+    }
+    for (path, p) in pending {
+        p.commit().map_err(|e| (path.clone(), e))?;
+    }
+    Ok(())
+}
+
+/// Writes to standard output. A reader that went away (`| head`) is no error.
+pub fn to_stdout(bytes: &[u8]) -> std::io::Result<()> {
+    let mut out = std::io::stdout().lock();
+    match out.write_all(bytes).and_then(|()| out.flush()) {
+        Err(e) if e.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
+        other => other,
+    }
+}
+
+/// Names of the files a result was made from, as a rule for make and ninja.
+pub fn depfile(goal: &Path, sources: &[PathBuf]) -> String {
+    let escape = |p: &Path| {
+        let text = p.display().to_string();
+        let mut out = String::new();
+        for c in text.chars() {
+            match c {
+                ' ' | '#' => out.extend(['\\', c]),
+                '$' => out.push_str("$$"),
+                c => out.push(c),
+            }
+        }
+        out
+    };
+    let mut text = format!("{}:", escape(goal));
+    for source in sources {
+        text.push_str(" \\\n  ");
+        text.push_str(&escape(source));
+    }
+    text.push('\n');
+    // A source that is gone must not stop make.
+    for source in sources {
+        text.push_str(&format!("\n{}:\n", escape(source)));
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nothing_half_written() {
+        let folder = tempfile::tempdir().unwrap();
+        let goal = folder.path().join("a.ngc");
+        std::fs::write(&goal, "old").unwrap();
+        let mut p = Pending::new(&goal).unwrap();
+        p.write_all(b"new").unwrap();
+        drop(p);
+        assert_eq!(std::fs::read_to_string(&goal).unwrap(), "old");
+        let mut p = Pending::new(&goal).unwrap();
+        p.write_all(b"new").unwrap();
+        p.commit().unwrap();
+        assert_eq!(std::fs::read_to_string(&goal).unwrap(), "new");
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+        assert!(Pending::new(folder.path()).is_err());
+    }
+
+    #[test]
+    fn all_or_none() {
+        let folder = tempfile::tempdir().unwrap();
+        let files = [(folder.path().join("a"), vec![1]), (folder.path().join("no/b"), vec![2])];
+        assert!(write_all(&files).is_err());
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+    }
+
+    #[test]
+    fn rule_for_make() {
+        let text = depfile(Path::new("out file.ngc"), &["a$.ngc".into(), "b#.tbl".into()]);
+        assert_eq!(text, "out\\ file.ngc: \\\n  a$$.ngc \\\n  b\\#.tbl\n\na$$.ngc:\n\nb\\#.tbl:\n");
+    }
+}

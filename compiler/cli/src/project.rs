@@ -1,0 +1,224 @@
+//! The project file `gcc-robot.toml`, schema 1 (spec/config/gcc-robot.schema.json).
+
+use std::path::{Path, PathBuf};
+
+use gr_text::{Diagnostic, FileId, Span, code};
+use serde::Deserialize;
+
+/// Name of the file.
+pub const NAME: &str = "gcc-robot.toml";
+/// The version of the format that is read.
+const SCHEMA: i64 = 1;
+
+/// A project file and where it lies.
+#[derive(Debug, Default)]
+pub struct Project {
+    /// Folder that its names are relative to.
+    pub folder: PathBuf,
+    /// The file.
+    pub path: PathBuf,
+    /// What it says.
+    pub file: ProjectFile,
+}
+
+#[expect(missing_docs, reason = "spec/config describes the keys")]
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ProjectFile {
+    pub schema: i64,
+    #[serde(default)]
+    pub project: Section,
+    #[serde(default)]
+    pub dialects: Vec<DialectRule>,
+    #[serde(default)]
+    pub lints: Lints,
+    #[serde(default)]
+    pub targets: Vec<Target>,
+}
+
+#[expect(missing_docs, reason = "spec/config describes the keys")]
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
+pub struct Section {
+    pub sources: Vec<String>,
+    pub dialect: Option<String>,
+    pub machine: Option<String>,
+    pub tools: Option<PathBuf>,
+    pub vars: Option<PathBuf>,
+    pub ini: Option<PathBuf>,
+    pub machine_units: Option<String>,
+    pub block_delete: bool,
+    pub subs: Vec<PathBuf>,
+    pub reference: Option<String>,
+}
+
+#[expect(missing_docs, reason = "spec/config describes the keys")]
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DialectRule {
+    pub files: String,
+    pub dialect: String,
+}
+
+#[expect(missing_docs, reason = "spec/config describes the keys")]
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Lints {
+    pub strict: bool,
+    pub allow: Vec<String>,
+    pub warn: Vec<String>,
+    pub deny: Vec<String>,
+}
+
+#[expect(missing_docs, reason = "spec/config describes the keys")]
+#[derive(Debug, Deserialize)]
+pub struct Target {
+    pub target: String,
+    pub output: Option<String>,
+    #[serde(default)]
+    pub sources: Vec<String>,
+    #[serde(flatten)]
+    pub options: toml::Table,
+}
+
+impl Project {
+    /// The project file of `from` or of the nearest folder above it.
+    pub fn find(from: &Path) -> Option<PathBuf> {
+        let absolute = std::path::absolute(from).ok()?;
+        absolute.ancestors().map(|f| f.join(NAME)).find(|p| p.is_file())
+    }
+
+    /// Reads the text of a project file.
+    pub fn parse(path: &Path, file: FileId, text: &str) -> Result<Project, Box<Diagnostic>> {
+        // The version first: a later one may have keys that this program does not know.
+        let schema = text.parse::<toml::Table>().ok().and_then(|t| t.get("schema").and_then(toml::Value::as_integer));
+        if let Some(other) = schema.filter(|s| *s != SCHEMA) {
+            let at = text.find("schema").unwrap_or(0) as u32;
+            return Err(Box::new(Diagnostic::new(code::PROJECT_SCHEMA, file, Span::new(at, at + 6), &[other.to_string()])));
+        }
+        match toml::from_str::<ProjectFile>(text) {
+            Ok(parsed) => {
+                let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
+                Ok(Project { folder, path: path.to_path_buf(), file: parsed })
+            }
+            Err(e) => {
+                let range = e.span().unwrap_or(0..0);
+                let span = Span::new(range.start as u32, range.end as u32);
+                let message = e.message().replace('\n', " ");
+                Err(Box::new(Diagnostic::new(code::PROJECT_SYNTAX, file, span, &[message])))
+            }
+        }
+    }
+
+    /// A name in the file as a path from here.
+    pub fn path_of(&self, name: &Path) -> PathBuf {
+        self.folder.join(name)
+    }
+
+    /// Dialect that the rules give a file.
+    pub fn dialect_of(&self, path: &Path) -> Option<&str> {
+        let absolute = std::path::absolute(path).ok()?;
+        let folder = std::path::absolute(&self.folder).ok()?;
+        let name = absolute.strip_prefix(folder).ok()?.to_string_lossy().replace('\\', "/");
+        let rule = self.file.dialects.iter().find(|r| matches(&r.files, &name));
+        rule.map(|r| r.dialect.as_str()).or(self.file.project.dialect.as_deref())
+    }
+
+    /// Files that patterns name, in order and each once.
+    pub fn files(&self, patterns: &[String]) -> Vec<PathBuf> {
+        let mut found = Vec::new();
+        for pattern in patterns {
+            if !pattern.contains(['*', '?']) {
+                found.push(self.folder.join(pattern));
+                continue;
+            }
+            let mut all = Vec::new();
+            list(&self.folder, "", pattern, &mut all);
+            found.extend(all.into_iter().map(|name| self.folder.join(name)));
+        }
+        let mut seen = std::collections::BTreeSet::new();
+        found.retain(|p| seen.insert(p.clone()));
+        found
+    }
+}
+
+fn list(folder: &Path, prefix: &str, pattern: &str, found: &mut Vec<String>) {
+    let Ok(entries) = std::fs::read_dir(folder) else { return };
+    let mut names: Vec<String> = entries.flatten().filter_map(|e| e.file_name().into_string().ok()).collect();
+    names.sort();
+    for name in names.iter().filter(|n| !n.starts_with('.')) {
+        let path = folder.join(name);
+        let full = format!("{prefix}{name}");
+        if path.is_dir() && !path.is_symlink() {
+            list(&path, &format!("{full}/"), pattern, found);
+        } else if matches(pattern, &full) {
+            found.push(full);
+        }
+    }
+}
+
+/// Whether `name` fits a pattern: `*` and `?` within a folder, `**` across folders.
+pub fn matches(pattern: &str, name: &str) -> bool {
+    fn go(p: &[u8], n: &[u8]) -> bool {
+        match p {
+            [] => n.is_empty(),
+            [b'*', b'*', b'/', rest @ ..] => {
+                go(rest, n) || n.iter().enumerate().any(|(i, b)| *b == b'/' && go(rest, &n[i + 1..]))
+            }
+            [b'*', b'*', rest @ ..] => (0..=n.len()).any(|i| go(rest, &n[i..])),
+            [b'*', rest @ ..] => {
+                let segment = n.iter().position(|b| *b == b'/').unwrap_or(n.len());
+                (0..=segment).any(|i| go(rest, &n[i..]))
+            }
+            [b'?', rest @ ..] => n.first().is_some_and(|b| *b != b'/') && go(rest, &n[1..]),
+            [b, rest @ ..] => n.first() == Some(b) && go(rest, &n[1..]),
+        }
+    }
+    go(pattern.trim_start_matches("./").as_bytes(), name.as_bytes())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn patterns() {
+        for (pattern, name, fits) in [
+            ("*.ngc", "a.ngc", true),
+            ("*.ngc", "d/a.ngc", false),
+            ("./*.ngc", "a.ngc", true),
+            ("**/*.ngc", "a.ngc", true),
+            ("**/*.ngc", "d/e/a.ngc", true),
+            ("d/**", "d/e/a", true),
+            ("a?.nc", "ab.nc", true),
+            ("a?.nc", "a.nc", false),
+        ] {
+            assert_eq!(matches(pattern, name), fits, "{pattern} {name}");
+        }
+    }
+
+    #[test]
+    fn the_template_is_read() {
+        let text = include_str!("../../../spec/config/template.toml");
+        let project = Project::parse(Path::new("p/gcc-robot.toml"), FileId(0), text).unwrap();
+        assert_eq!(project.file.targets[0].target, "rs274ngc");
+        let everything: String = text
+            .lines()
+            .map(|l| l.strip_prefix("# ").filter(|r| r.contains(" = ") || r.starts_with('[')).unwrap_or(l).to_string() + "\n")
+            .filter(|l| !l.starts_with("for") && !l.contains("Without"))
+            .collect();
+        let project = Project::parse(Path::new("p/gcc-robot.toml"), FileId(0), &everything).unwrap();
+        assert_eq!(project.file.dialects[0].dialect, "fanuc-mill");
+        assert_eq!(project.file.targets[0].options["decimals"].as_integer(), Some(4));
+        assert!(project.file.lints.strict && !project.file.project.block_delete);
+    }
+
+    #[test]
+    fn faults_have_places() {
+        let d = Project::parse(Path::new("x"), FileId(0), "schema = 2\nnew = 1\n").unwrap_err();
+        assert_eq!(d.code, code::PROJECT_SCHEMA);
+        let text = "schema = 1\n[project]\nsorces = []\n";
+        let d = Project::parse(Path::new("x"), FileId(0), text).unwrap_err();
+        assert_eq!((d.code, &text[d.primary().1.range()]), (code::PROJECT_SYNTAX, "sorces"));
+    }
+}

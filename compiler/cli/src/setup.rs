@@ -1,0 +1,265 @@
+//! From options, project file and the files they name to what a run of the interpreter starts from.
+
+use std::path::{Path, PathBuf};
+
+use gr_canon::{Units, Version};
+use gr_driver::{Level, Rules};
+use gr_interp::Setup;
+use gr_spec::Dialect;
+use gr_text::{Code, Diagnostic, Severity, code};
+
+use crate::commands::complain;
+use crate::options::{LintArgs, SetupArgs, UnitArg};
+use crate::project::Project;
+use crate::render::Renderer;
+use crate::sources::{Sources, read};
+
+/// Everything a run needs that does not depend on the program.
+pub struct Station {
+    /// What the interpreter starts from; the dialect may still depend on the file.
+    pub setup: Setup,
+    /// Asked for by an option.
+    pub dialect: Option<&'static Dialect>,
+    /// Machine id or path.
+    pub machine: Option<String>,
+    /// Files it was made of, for dep-files and `--watch`.
+    pub files: Vec<PathBuf>,
+    /// Project file, if one was found.
+    pub project: Option<Project>,
+    /// How severe lints are.
+    pub lints: Levels,
+}
+
+/// Severity of lints as options and project want it.
+#[derive(Clone, Debug, Default)]
+pub struct Levels {
+    /// Warnings count as errors.
+    pub strict: bool,
+    /// Never mentioned.
+    pub allow: Vec<Code>,
+    /// Mentioned although off by default.
+    pub warn: Vec<Code>,
+    /// Errors.
+    pub deny: Vec<Code>,
+}
+
+impl Levels {
+    /// As rules for the driver.
+    pub fn put_into(&self, rules: &mut Rules) {
+        self.warn.iter().for_each(|c| rules.set(*c, Level::Warning));
+        self.deny.iter().for_each(|c| rules.set(*c, Level::Error));
+        self.allow.iter().for_each(|c| rules.set(*c, Level::Off));
+    }
+    /// The severity that a finding has in the end.
+    pub fn harden(&self, d: &mut Diagnostic) {
+        if self.strict && d.severity == Severity::Warning {
+            d.severity = Severity::Error;
+        }
+    }
+}
+
+/// Reads all files that the options and the project name. Findings go to `renderer`; none when there are errors.
+pub fn station(
+    args: &SetupArgs,
+    lints: &LintArgs,
+    from: &Path,
+    sources: &mut Sources,
+    renderer: &mut Renderer,
+) -> Option<Station> {
+    let errors = renderer.tally.errors;
+    let mut reader = Reader { sources, renderer, files: Vec::new() };
+    let project = reader.project(from);
+    let section = project.as_ref().map(|p| &p.file.project);
+    let named = |option: &Option<PathBuf>, key: Option<&PathBuf>| {
+        option.clone().or_else(|| key.map(|k| project.as_ref().map_or(k.clone(), |p| p.path_of(k))))
+    };
+    let mut setup = Setup::default();
+    if let Some(path) = named(&args.ini, section.and_then(|s| s.ini.as_ref())) {
+        reader.ini(&path, &mut setup);
+    }
+    setup.machine_units = units(args, section).or(setup.ini.machine_units()).unwrap_or(Units::Mm);
+    if let Some(path) = named(&args.tools, section.and_then(|s| s.tools.as_ref())).or_else(|| ini_path(&setup, "EMCIO", "TOOL_TABLE")) {
+        reader.tools(&path, &mut setup);
+    } else {
+        setup.tools = gr_interp::no_tools();
+    }
+    if let Some(path) = named(&args.vars, section.and_then(|s| s.vars.as_ref())).or_else(|| ini_path(&setup, "RS274NGC", "PARAMETER_FILE")) {
+        reader.vars(&path, &mut setup);
+    }
+    setup.block_delete = args.block_delete || section.is_some_and(|s| s.block_delete);
+    subs(args, project.as_ref(), &mut setup);
+    let dialect = args.dialect.as_deref().and_then(|name| reader.dialect(name));
+    for rule in project.iter().flat_map(|p| &p.file.dialects) {
+        reader.dialect(&rule.dialect);
+    }
+    let machine = args.machine.clone().or_else(|| section.and_then(|s| s.machine.clone()));
+    let lints = reader.levels(lints, project.as_ref());
+    let Reader { files, .. } = reader;
+    (renderer.tally.errors == errors).then_some(Station { setup, dialect, machine, files, project, lints })
+}
+
+fn units(args: &SetupArgs, section: Option<&crate::project::Section>) -> Option<Units> {
+    let of_project = || match section?.machine_units.as_deref()? {
+        "inch" => Some(Units::Inch),
+        _ => Some(Units::Mm),
+    };
+    match args.machine_units {
+        Some(UnitArg::Mm) => Some(Units::Mm),
+        Some(UnitArg::Inch) => Some(Units::Inch),
+        None => of_project(),
+    }
+}
+
+/// A file that the INI file names, if it is there: a program can be checked without the machine's own files.
+fn ini_path(setup: &Setup, section: &str, key: &str) -> Option<PathBuf> {
+    let name = setup.ini.get(section, key)?;
+    let path = setup.ini.folder.clone().unwrap_or_default().join(name);
+    path.is_file().then_some(path)
+}
+
+/// Folders with subroutines come first on the INI file's own search path.
+fn subs(args: &SetupArgs, project: Option<&Project>, setup: &mut Setup) {
+    let mut folders: Vec<PathBuf> = args.subs.clone();
+    folders.extend(project.iter().flat_map(|p| p.file.project.subs.iter().map(|s| p.path_of(s))));
+    let mut path: Vec<String> =
+        folders.iter().filter_map(|f| std::path::absolute(f).ok()).map(|f| f.to_string_lossy().into_owned()).collect();
+    path.extend(setup.ini.get("RS274NGC", "SUBROUTINE_PATH").map(str::to_string));
+    if !path.is_empty() {
+        setup.ini.values.insert(("rs274ngc".into(), "subroutine_path".into()), vec![path.join(":")]);
+    }
+}
+
+impl Station {
+    /// The dialect of a file: option, modeline, project, extension, default. Faults are shown once by the caller.
+    pub fn dialect_of(&self, path: &Path, text: &str) -> &'static Dialect {
+        self.dialect
+            .or_else(|| modeline(text))
+            .or_else(|| self.project.as_ref().and_then(|p| p.dialect_of(path)).and_then(Dialect::find))
+            .or_else(|| by_extension(path))
+            .unwrap_or_else(Dialect::linuxcnc)
+    }
+    /// The setup for a file.
+    pub fn setup_for(&self, path: &Path, text: &str) -> Setup {
+        let mut setup = self.setup.clone();
+        setup.dialect = self.dialect_of(path, text);
+        setup.version = version_of(setup.dialect);
+        setup
+    }
+}
+
+/// The spelling and behaviour that goes with a dialect.
+pub fn version_of(dialect: &Dialect) -> Version {
+    if dialect.id == "linuxcnc-2.10" { Version::V2_10 } else { Version::V2_9 }
+}
+
+/// `; gcc-robot: dialect=grbl` (or in parentheses) in one of the first five lines.
+pub fn modeline(text: &str) -> Option<&'static Dialect> {
+    text.lines().take(5).find_map(|line| {
+        let (_, rest) = line.split_once("gcc-robot:")?;
+        let (_, name) = rest.split_once("dialect=")?;
+        let name: String = name.trim_start().chars().take_while(|c| c.is_alphanumeric() || "-.".contains(*c)).collect();
+        Dialect::find(&name)
+    })
+}
+
+fn by_extension(path: &Path) -> Option<&'static Dialect> {
+    let extension = path.extension()?.to_str()?.to_ascii_lowercase();
+    Dialect::all().iter().find(|d| d.extensions.contains(&extension.as_str()))
+}
+
+/// Extensions of all dialects, or of the one that was asked for.
+pub fn extensions(dialect: Option<&'static Dialect>) -> Vec<&'static str> {
+    match dialect {
+        Some(d) if !d.extensions.is_empty() => d.extensions.to_vec(),
+        _ => Dialect::all().iter().flat_map(|d| d.extensions.iter().copied()).collect(),
+    }
+}
+
+struct Reader<'a> {
+    sources: &'a mut Sources,
+    renderer: &'a mut Renderer,
+    files: Vec<PathBuf>,
+}
+
+impl Reader<'_> {
+    /// Reads a file; what is wrong with that is shown.
+    fn text(&mut self, path: &Path) -> Option<(gr_text::FileId, String)> {
+        let name = path.display().to_string();
+        match read(path) {
+            Ok(d) => {
+                self.files.push(path.to_path_buf());
+                Some((self.sources.add(name, d.text.clone()), d.text))
+            }
+            Err((code, args)) => {
+                complain(self.renderer, self.sources, &name, code, &args);
+                None
+            }
+        }
+    }
+    fn show(&mut self, found: &[Diagnostic]) {
+        found.iter().for_each(|d| self.renderer.show(self.sources, d));
+    }
+    fn project(&mut self, from: &Path) -> Option<Project> {
+        let path = Project::find(from)?;
+        let (file, text) = self.text(&path)?;
+        Project::parse(&path, file, &text).map_err(|d| self.show(&[*d])).ok()
+    }
+    fn ini(&mut self, path: &Path, setup: &mut Setup) {
+        let Some((file, text)) = self.text(path) else { return };
+        let folder = path.parent().unwrap_or(Path::new(""));
+        let mut included = Vec::new();
+        let mut load = |p: &Path| {
+            let text = read(p).ok()?.text;
+            included.push(p.to_path_buf());
+            Some(text)
+        };
+        let (ini, found) = gr_interp::read_ini(&text, file, Some(folder), Some(&mut load));
+        self.files.extend(included);
+        self.show(&found);
+        setup.ini = ini;
+    }
+    fn tools(&mut self, path: &Path, setup: &mut Setup) {
+        let Some((file, text)) = self.text(path) else { return };
+        let (tools, found) = gr_interp::read_tools(&text, file);
+        self.show(&found);
+        setup.tools = tools;
+    }
+    fn vars(&mut self, path: &Path, setup: &mut Setup) {
+        let Some((file, text)) = self.text(path) else { return };
+        match gr_interp::read_parameters(&text, file) {
+            Ok(params) => setup.params = params,
+            Err(d) => self.show(&[*d]),
+        }
+    }
+    fn dialect(&mut self, name: &str) -> Option<&'static Dialect> {
+        let found = Dialect::find(name);
+        if found.is_none() {
+            let args = [name.to_string(), crate::commands::explain::dialects()];
+            complain(self.renderer, self.sources, "", code::PROJECT_UNKNOWN_DIALECT, &args);
+        }
+        found
+    }
+    fn levels(&mut self, args: &LintArgs, project: Option<&Project>) -> Levels {
+        let lints = project.map(|p| &p.file.lints);
+        let both = |option: &[String], key: Option<&Vec<String>>| [option, key.map_or(&[], Vec::as_slice)].concat();
+        Levels {
+            strict: args.strict || lints.is_some_and(|l| l.strict),
+            allow: self.codes(&both(&args.allow, lints.map(|l| &l.allow)), true),
+            warn: self.codes(&both(&args.warn, lints.map(|l| &l.warn)), false),
+            deny: self.codes(&both(&args.deny, lints.map(|l| &l.deny)), false),
+        }
+    }
+    fn codes(&mut self, names: &[String], only_lints: bool) -> Vec<Code> {
+        let mut codes = Vec::new();
+        for name in names {
+            match Code::find(name) {
+                Some(c) if only_lints && c.def().severity == Severity::Error => {
+                    complain(self.renderer, self.sources, "", code::PROJECT_LINT_LEVEL, &[name.clone()]);
+                }
+                Some(c) => codes.push(c),
+                None => complain(self.renderer, self.sources, "", code::PROJECT_UNKNOWN_LINT, &[name.clone()]),
+            }
+        }
+        codes
+    }
+}

@@ -1,0 +1,152 @@
+//! The files of one run of the command: their names and texts, for reading and for showing diagnostics.
+
+use std::io::Read as _;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use gr_text::{Decoded, Diagnostic, Encoding, FileId, LineIndex, Span, code, decode};
+
+/// A program has fewer bytes than this.
+const MAX_BYTES: u64 = i32::MAX as u64;
+
+/// A file as diagnostics show it.
+#[derive(Clone, Debug)]
+pub struct SourceFile {
+    /// As the user named it.
+    pub name: String,
+    /// Decoded text; empty when the file could not be read.
+    pub text: Arc<str>,
+}
+
+/// All files that diagnostics of a run may point into.
+#[derive(Clone, Debug, Default)]
+pub struct Sources {
+    files: Vec<SourceFile>,
+}
+
+impl Sources {
+    /// Adds a file.
+    pub fn add(&mut self, name: impl Into<String>, text: impl Into<Arc<str>>) -> FileId {
+        self.files.push(SourceFile { name: name.into(), text: text.into() });
+        FileId(self.files.len() as u32 - 1)
+    }
+    /// A file.
+    pub fn get(&self, id: FileId) -> Option<&SourceFile> {
+        self.files.get(id.0 as usize)
+    }
+    /// All files with their numbers.
+    pub fn iter(&self) -> impl Iterator<Item = (FileId, &SourceFile)> {
+        self.files.iter().enumerate().map(|(i, f)| (FileId(i as u32), f))
+    }
+    /// Its name.
+    pub fn name(&self, id: FileId) -> &str {
+        self.get(id).map_or("", |f| f.name.as_str())
+    }
+}
+
+/// Line index of the file that was asked for last: findings come in order of files.
+#[derive(Default)]
+pub struct Positions {
+    last: Option<(FileId, LineIndex)>,
+}
+
+impl Positions {
+    /// Line and column (in characters) of an offset, both from 1.
+    pub fn of(&mut self, sources: &Sources, file: FileId, offset: u32) -> (u32, u32) {
+        let Some(source) = sources.get(file) else { return (1, 1) };
+        let index = self.index(source, file);
+        let (line, _) = index.position(offset.min(source.text.len() as u32));
+        let start = index.start(line as usize) as usize;
+        let end = floor(&source.text, (offset as usize).min(source.text.len()));
+        let column = source.text.get(start..end).map_or(0, |s| s.chars().count());
+        (line + 1, column as u32 + 1)
+    }
+    /// The index of a file's lines.
+    pub fn index(&mut self, source: &SourceFile, file: FileId) -> &LineIndex {
+        if self.last.as_ref().is_none_or(|(f, _)| *f != file) {
+            self.last = Some((file, LineIndex::new(source.text.as_bytes())));
+        }
+        &self.last.as_ref().expect("just set").1
+    }
+}
+
+/// The character boundary at or before `at`.
+pub fn floor(text: &str, mut at: usize) -> usize {
+    at = at.min(text.len());
+    while !text.is_char_boundary(at) {
+        at -= 1;
+    }
+    at
+}
+
+/// A finding about a file as a whole.
+pub fn about_file(code: gr_text::Code, file: FileId, args: &[String]) -> Diagnostic {
+    Diagnostic::new(code, file, Span::default(), args)
+}
+
+/// Reads a program; `-` is standard input. The finding, if any, points at a file that holds only the name.
+pub fn read(path: &Path) -> Result<Decoded, (gr_text::Code, Vec<String>)> {
+    let name = path.display().to_string();
+    let bytes = read_bytes(path).map_err(|(code, mut args)| {
+        args.insert(0, name);
+        (code, args)
+    })?;
+    Ok(decode(bytes))
+}
+
+fn read_bytes(path: &Path) -> Result<Vec<u8>, (gr_text::Code, Vec<String>)> {
+    let unreadable = |e: std::io::Error| match e.kind() {
+        std::io::ErrorKind::NotFound => (code::FILE_MISSING, vec![]),
+        std::io::ErrorKind::IsADirectory => (code::FILE_DIRECTORY, vec![]),
+        _ => (code::FILE_UNREADABLE, vec![reason(&e)]),
+    };
+    let too_big = |len: u64| (code::FILE_TOO_BIG, vec![len.to_string()]);
+    let mut bytes = Vec::new();
+    if path == Path::new("-") {
+        std::io::stdin().lock().take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(unreadable)?;
+    } else {
+        let meta = std::fs::metadata(path).map_err(unreadable)?;
+        if meta.is_dir() {
+            return Err((code::FILE_DIRECTORY, vec![]));
+        }
+        if meta.is_file() && meta.len() > MAX_BYTES {
+            return Err(too_big(meta.len()));
+        }
+        let file = std::fs::File::open(path).map_err(unreadable)?;
+        bytes.reserve_exact(meta.len() as usize + 1);
+        file.take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(unreadable)?;
+    }
+    if bytes.len() as u64 > MAX_BYTES { Err(too_big(bytes.len() as u64)) } else { Ok(bytes) }
+}
+
+/// What the operating system says, without its error number.
+pub fn reason(e: &std::io::Error) -> String {
+    let text = e.to_string();
+    text.split(" (os error").next().unwrap_or("").to_lowercase()
+}
+
+/// Whether a text was spelled in Latin-1.
+pub fn is_latin1(d: &Decoded) -> bool {
+    d.encoding == Encoding::Latin1
+}
+
+/// All programs below `folder`, in order: files whose extension belongs to a dialect. Hidden ones are left out.
+pub fn walk(folder: &Path, extensions: &[&str], found: &mut Vec<PathBuf>) -> std::io::Result<()> {
+    let mut entries: Vec<PathBuf> = std::fs::read_dir(folder)?.map(|e| e.map(|e| e.path())).collect::<Result<_, _>>()?;
+    entries.sort();
+    for path in entries {
+        let hidden = path.file_name().is_some_and(|n| n.to_string_lossy().starts_with('.'));
+        if hidden {
+            continue;
+        }
+        // A link to a folder could lead in circles.
+        if path.is_dir() && !path.is_symlink() {
+            walk(&path, extensions, found)?;
+        } else if let Some(ext) = path.extension().and_then(|e| e.to_str())
+            && extensions.iter().any(|x| x.eq_ignore_ascii_case(ext))
+        {
+            found.push(path);
+        }
+    }
+    Ok(())
+}
