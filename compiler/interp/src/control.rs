@@ -838,7 +838,7 @@ impl<S: Sink> Interp<'_, S> {
         }
         for (keyword, label, line, span) in open {
             let fault = Fault::own(code::FLOW_UNCLOSED).arg(format!("{label} {}", op_name(keyword)));
-            self.findings.push(crate::run::Finding { file: id, line, frame: FrameId::MAIN, fault, span: Some(span) });
+            self.findings.push(crate::run::Finding { file: id, line, frame: FrameId::MAIN, fault, span: Some(span), text: "".into() });
         }
     }
 
@@ -978,11 +978,17 @@ impl<S: Sink> Interp<'_, S> {
         let base = self.level();
         self.call(Label { scope: GLOBAL, name }, CallKind::Oword, [0.0; ARGS], 0, None)?;
         let saved = (self.place, self.reading.clone());
-        while self.level() > base {
-            self.contour_line(reader)?;
+        self.in_contour = true;
+        let mut done = Ok(());
+        while done.is_ok() && self.level() > base {
+            done = self.contour_line(reader);
         }
+        self.in_contour = false;
+        done?;
         self.place = saved.0;
-        self.reading = saved.1;
+        // Faults belong to the block of the cycle, but the line read last stays the contour's.
+        let (text, start, end) = (self.reading.text.clone(), self.reading.start, self.reading.end);
+        self.reading = crate::run::Reading { text, start, end, ..saved.1 };
         Ok(())
     }
 
@@ -990,15 +996,14 @@ impl<S: Sink> Interp<'_, S> {
         let from = if self.skip.is_some() { self.next_control(self.next) } else { self.next };
         let file = self.files.file(self.place.file);
         let Some((c, l)) = file.locate(from) else {
-            let rs = if self.skip.is_some() { rs274::RT_O_EOF_SEEKING } else { rs274::RT_NO_PERCENT_OR_END };
-            return Err(Fault::new(code::SUB_NOT_FOUND, rs).arg("of the contour"));
+            return Err(self.end_fault());
         };
         let chunk = file.chunks[c].clone();
         self.next = from + 1;
         self.place.line = from;
         self.reading.line = l;
         let span = chunk.scan.line_span(&chunk.text, l);
-        (self.reading.start, self.reading.end) = (span.start, span.end);
+        (self.reading.begin, self.reading.start, self.reading.end) = (span.start, span.start, span.end);
         (self.reading.text, self.reading.scan) = (chunk.text.clone(), chunk.scan.clone());
         let (scan, words) = (&chunk.scan, chunk.scan.words(l));
         if scan.lines[l as usize].deleted && self.setup.block_delete {

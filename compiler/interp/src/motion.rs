@@ -128,7 +128,6 @@ impl<S: Sink> Interp<'_, S> {
 
     /// G53: the words are machine coordinates.
     fn ends_in_machine_frame(&mut self) -> Res<Axes> {
-        self.emit(Call::Comment("interpreter: offsets temporarily suspended".into()));
         let m = &self.m;
         let b = &self.block;
         if b.has_any_of(POLAR) {

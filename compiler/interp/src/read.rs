@@ -239,7 +239,8 @@ impl<S: Sink> Interp<'_, S> {
                 }
                 self.block.set(letter, f64::from(to_int(value)));
             }
-            b'a' | b'b' | b'c' | b'd' | b'e' | b'i' | b'j' | b'k' | b'r' | b'u' | b'v' | b'w' => self.put(letter, value)?,
+            b'a' | b'b' | b'c' | b'd' | b'e' | b'i' | b'j' | b'k' | b'r' => self.put(letter, value)?,
+            b'u' | b'v' | b'w' if self.setup.uvw || self.in_contour => self.put(letter, value)?,
             _ => {
                 let shown = upper(letter).to_string();
                 return Err(Fault::new(code::SYNTAX_BAD_CHARACTER, rs274::BAD_CHARACTER)

@@ -62,6 +62,8 @@ pub struct Finding {
     pub fault: Box<Fault>,
     /// The narrowest place known, relative to the start of the line.
     pub span: Option<Span>,
+    /// Text of the line that the controller read last, as the real `rs274` shows it.
+    pub text: Box<str>,
 }
 
 /// Why a run ended.
@@ -153,6 +155,9 @@ pub(crate) struct Reading {
     pub text: Arc<str>,
     pub scan: Arc<Scan>,
     pub line: u32,
+    /// First byte of the line, for places in it.
+    pub begin: u32,
+    /// The text that `At::now` shows; usually the line.
     pub start: u32,
     pub end: u32,
 }
@@ -213,6 +218,10 @@ pub struct Interp<'a, S: Sink> {
     pub(crate) loops: Vec<Loop>,
     pub(crate) remaps: Vec<Remapped>,
     pub(crate) m98: bool,
+    /// The contour of a roughing cycle is being read: U and W are increments there.
+    pub(crate) contour: bool,
+    /// A contour is being read: U and W are words there on every machine.
+    pub(crate) in_contour: bool,
     // Totals.
     pub(crate) frames: u32,
     pub(crate) blocks: u64,
@@ -297,6 +306,8 @@ impl<'a, S: Sink> Interp<'a, S> {
             loops: Vec::new(),
             remaps: Vec::new(),
             m98: false,
+            contour: false,
+            in_contour: false,
             frames: 0,
             blocks: 0,
             emitted: 0,
@@ -497,7 +508,7 @@ impl<'a, S: Sink> Interp<'a, S> {
     /// Takes down a finding of the present block.
     pub(crate) fn found(&mut self, fault: Box<Fault>) {
         let reading = &self.reading;
-        let start = reading.start;
+        let start = reading.begin;
         let known = (reading.line as usize) < reading.scan.lines.len();
         let span = match (fault.span, fault.letter) {
             (Some(span), _) => Some(span),
@@ -511,11 +522,22 @@ impl<'a, S: Sink> Interp<'a, S> {
         };
         let span = span.map(|s| Span::new(s.start.saturating_sub(start), s.end.saturating_sub(start)));
         let p = self.place;
-        self.findings.push(Finding { file: p.file, line: p.line, frame: p.frame, fault, span });
+        let text = self.line_text();
+        let text = text.char_indices().nth(255).map_or(text, |(i, _)| &text[..i]).trim_end().into();
+        self.findings.push(Finding { file: p.file, line: p.line, frame: p.frame, fault, span, text });
     }
 
     fn end_of_file(&mut self) -> Option<End> {
-        let fault = match &self.skip {
+        let fault = self.end_fault();
+        self.found(fault);
+        self.unwind();
+        Some(End::Fault)
+    }
+
+    /// What is wrong when a file ends.
+    pub(crate) fn end_fault(&mut self) -> Box<Fault> {
+        self.show_last_line();
+        match &self.skip {
             Some(skip) if skip.to_sub => {
                 let name = self.symbols.name(skip.label.name).to_string();
                 let path = self.files.file(self.place.file).path.to_string();
@@ -523,14 +545,24 @@ impl<'a, S: Sink> Interp<'a, S> {
                 if let Some(place) = skip.from {
                     self.place = place;
                 }
-                Fault::new(code::SUB_NOT_FOUND, rs274::RT_O_EOF_SEEKING).arg(&name).arg(path).arg(start)
+                Fault::new(code::SUB_NOT_FOUND, rs274::RT_O_EOF_SEEKING).arg(path).arg(&name).arg(start).named(name)
             }
             _ if self.m.percent != 0 => Fault::new(code::PROGRAM_ENDS_EARLY, rs274::RT_NO_PERCENT),
             _ => Fault::new(code::PROGRAM_ENDS_EARLY, rs274::RT_NO_PERCENT_OR_END),
-        };
-        self.found(fault);
-        self.unwind();
-        Some(End::Fault)
+        }
+    }
+
+    /// The file's last line becomes the line read last.
+    fn show_last_line(&mut self) {
+        let file = self.files.file(self.place.file);
+        let Some((c, l)) = file.locate(file.line_count().wrapping_sub(1)) else { return };
+        let chunk = &file.chunks[c];
+        let span = chunk.scan.line_span(&chunk.text, l);
+        self.reading.text = chunk.text.clone();
+        (self.reading.start, self.reading.end) = (span.start, span.end);
+        self.place.line = file.line_count() - 1;
+        self.reading.scan = chunk.scan.clone();
+        (self.reading.line, self.reading.begin) = (l, span.start);
     }
 
     /// Reads and executes one line.
@@ -539,6 +571,7 @@ impl<'a, S: Sink> Interp<'a, S> {
         let at = scan.lines[line as usize];
         let end = scan.lines.get(line as usize + 1).map_or(text.len() as u32, |l| l.start);
         self.reading.line = line;
+        self.reading.begin = at.start;
         self.reading.start = at.start;
         self.reading.end = trim_end(text.as_bytes(), at.start, end);
         if self.m.probed | self.m.tool_changed | self.m.input_wanted != 0 {

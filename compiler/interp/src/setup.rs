@@ -24,6 +24,8 @@ pub struct Setup {
     pub budgets: Budgets,
     /// M100 … M199 exist on this machine. The real `rs274` has none.
     pub user_m_codes: bool,
+    /// The machine has axes U, V and W. The real `rs274` has not.
+    pub uvw: bool,
     /// M99 in the main program begins it again, as on the machine; `rs274` ends.
     pub loop_on_main_m99: bool,
     /// Go on after an error as `rs274 -n 0` does; `check` does too, to find more than one.
@@ -42,6 +44,7 @@ impl Default for Setup {
             block_delete: false,
             budgets: Budgets::default(),
             user_m_codes: true,
+            uvw: true,
             loop_on_main_m99: false,
             keep_going: false,
         }
