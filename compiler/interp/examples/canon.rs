@@ -41,7 +41,7 @@ impl Files for Disk {
 }
 
 fn main() -> std::process::ExitCode {
-    let mut setup = Setup { machine_units: Units::Inch, user_m_codes: false, uvw: false, ..Setup::default() };
+    let mut setup = Setup { machine_units: Units::Inch, user_m_codes: false, uvw: false, startup_code: false, ..Setup::default() };
     let mut main = None;
     let mut discard = false;
     let mut args = std::env::args().skip(1);

@@ -234,7 +234,7 @@ impl<S: Sink> Interp<'_, S> {
         if self.m.units() == units {
             return;
         }
-        let factor = if units == Units::Inch { 0.039_370_078_740_16 } else { 25.4 };
+        let factor = if units == Units::Inch { 1.0 / 25.4 } else { 25.4 };
         let m = &mut self.m;
         m.units = units as u8;
         let lengths = |axes: &mut Axes| {

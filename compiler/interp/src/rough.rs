@@ -459,6 +459,8 @@ pub(crate) struct Contour {
     pub segments: Vec<Segment>,
     /// 1: Z mirrored, 2: X mirrored, 4: turned.
     turned: u8,
+    /// Segments that turned round when the contour was moved, as the real `rs274` tells them.
+    notes: Vec<String>,
 }
 
 /// Words of G71, G72.
@@ -481,6 +483,12 @@ pub(crate) struct Roughing {
 impl Contour {
     fn ends(&self) -> Trouble<(&Segment, &Segment)> {
         self.segments.first().zip(self.segments.last()).ok_or_else(|| "Not monotonic".into())
+    }
+
+    /// Corner words lose their meaning in a copy.
+    fn copy(&self) -> Contour {
+        let segments = self.segments.iter().map(Segment::plain).collect();
+        Contour { segments, turned: self.turned, notes: Vec::new() }
     }
 
     fn turn(&mut self) {
@@ -604,6 +612,8 @@ impl Contour {
                 if i == 0 {
                     return Err("Not monotonic".into());
                 }
+                let back = self.segments[i].start - self.segments[i].end;
+                self.notes.push(format!("Oops ({},{})", general(back.z, 6), general(back.x, 6)));
                 let smaller = self.segments[i].size() < self.segments[i - 1].size();
                 self.segments.remove(if smaller { i } else { i - 1 });
                 i = 0;
@@ -623,12 +633,10 @@ impl Contour {
     }
 
     /// G70: along the contour, `passes` times, from distance `far` to `near`.
-    pub(crate) fn finish(mut self, start: Zx, far: f64, near: f64, passes: f64, out: &mut Vec<Cut>) -> Trouble {
+    pub(crate) fn finish(&mut self, start: Zx, far: f64, near: f64, passes: f64, out: &mut Vec<Cut>) -> Trouble {
         self.segments.first_mut().ok_or("Not monotonic")?.start = start;
-        let mut trial = Contour {
-            segments: self.segments.iter().skip(1).map(Segment::plain).collect(),
-            turned: self.turned,
-        };
+        let mut trial = self.copy();
+        trial.segments.remove(0);
         trial.face()?;
         if !trial.segments.iter().all(Segment::monotonic) {
             trial.turn();
@@ -644,9 +652,10 @@ impl Contour {
         let mut pass = passes as i32;
         while pass > 0 {
             let distance = f64::from(pass - 1) * (far - near) / passes + near;
-            let mut path =
-                Contour { segments: self.segments.iter().map(Segment::plain).collect(), turned: self.turned };
-            path.add_distance(distance)?;
+            let mut path = self.copy();
+            let moved = path.add_distance(distance);
+            self.notes.append(&mut path.notes);
+            moved?;
             let first = path.segments[0];
             out.push(self.restored(Cut::Rapid(first.start)));
             out.push(self.restored(Cut::Rapid(first.end)));
@@ -657,7 +666,7 @@ impl Contour {
     }
 
     /// G71, G72: removes the stock between the start point and the contour.
-    pub(crate) fn rough(mut self, job: &Roughing, out: &mut Vec<Cut>) -> Trouble {
+    pub(crate) fn rough(&mut self, job: &Roughing, out: &mut Vec<Cut>) -> Trouble {
         self.segments.first_mut().ok_or("Not monotonic")?.start = job.start;
         if job.facing {
             self.turn();
@@ -975,7 +984,10 @@ impl<S: Sink> Interp<'_, S> {
             return Ok(());
         }
         let mut cuts = Vec::new();
-        let done = self.rough_cuts(cycle, kind, &words, start, reader.contour, &mut cuts)?;
+        let done = self.rough_cuts(cycle, kind, &words, start, &mut reader.contour, &mut cuts)?;
+        for note in &reader.contour.notes {
+            self.sink.print(note);
+        }
         self.block.clear();
         for cut in cuts {
             self.make_cut(cut)?;
@@ -999,7 +1011,7 @@ impl<S: Sink> Interp<'_, S> {
         kind: u8,
         words: &crate::Block,
         start: Zx,
-        contour: Contour,
+        contour: &mut Contour,
         cuts: &mut Vec<Cut>,
     ) -> Res<Trouble> {
         let word = |letter: u8, default: f64| words.get(letter).unwrap_or(default);
@@ -1057,7 +1069,7 @@ mod tests {
                 Segment::line(p(0.0, 4.0), p(-10.0, 4.0)),
                 Segment::line(p(-10.0, 4.0), p(-12.0, 10.0)),
             ],
-            turned: 0,
+            ..Contour::default()
         }
     }
 

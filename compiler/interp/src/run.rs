@@ -218,8 +218,6 @@ pub struct Interp<'a, S: Sink> {
     pub(crate) loops: Vec<Loop>,
     pub(crate) remaps: Vec<Remapped>,
     pub(crate) m98: bool,
-    /// The contour of a roughing cycle is being read: U and W are increments there.
-    pub(crate) contour: bool,
     /// A contour is being read: U and W are words there on every machine.
     pub(crate) in_contour: bool,
     // Totals.
@@ -306,7 +304,6 @@ impl<'a, S: Sink> Interp<'a, S> {
             loops: Vec::new(),
             remaps: Vec::new(),
             m98: false,
-            contour: false,
             in_contour: false,
             frames: 0,
             blocks: 0,
@@ -380,14 +377,25 @@ impl<'a, S: Sink> Interp<'a, S> {
 
     /// What the controller says before it opens a program.
     pub fn init(&mut self) {
-        let startup = self.config.clone();
         self.start_modal();
         self.emit(Call::UseLengthUnits(self.m.units()));
         self.emit(Call::SetG5xOffset(self.m.origin_index as u8, self.m.origin));
         self.emit(Call::SetG92Offset(self.m.g92));
         self.emit(Call::SetXyRotation(self.m.rotation));
         self.emit(Call::SetFeedReferenceXyz);
-        let _ = startup;
+        self.run_startup();
+    }
+
+    /// Runs [RS274NGC]RS274NGC_STARTUP_CODE.
+    fn run_startup(&mut self) {
+        let Some(code) = self.setup.ini.get("rs274ngc", "rs274ngc_startup_code").filter(|_| self.setup.startup_code) else {
+            return;
+        };
+        let text = format!("{}\n", code.trim());
+        let scan = Arc::new(gr_gcode::scan(&text, self.setup.dialect));
+        let _ = self.mdi(&Chunk { text: text.into(), scan });
+        self.reading = Reading::default();
+        self.flow = Flow::Next;
     }
 
     /// Opens the main program: the file's first line decides about `%`.

@@ -26,6 +26,8 @@ pub struct Setup {
     pub user_m_codes: bool,
     /// The machine has axes U, V and W. The real `rs274` has not.
     pub uvw: bool,
+    /// [RS274NGC]RS274NGC_STARTUP_CODE runs before the program, as on the machine; `rs274` ignores it.
+    pub startup_code: bool,
     /// M99 in the main program begins it again, as on the machine; `rs274` ends.
     pub loop_on_main_m99: bool,
     /// Go on after an error as `rs274 -n 0` does; `check` does too, to find more than one.
@@ -45,6 +47,7 @@ impl Default for Setup {
             budgets: Budgets::default(),
             user_m_codes: true,
             uvw: true,
+            startup_code: true,
             loop_on_main_m99: false,
             keep_going: false,
         }
