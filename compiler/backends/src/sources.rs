@@ -66,7 +66,7 @@ pub struct Words {
 }
 
 /// Codes that [`Words`] looks for, times ten.
-const CODES: [u32; 13] = [530, 280, 300, 281, 301, 400, 410, 420, 411, 421, 490, 520, 921];
+const CODES: [u32; 16] = [530, 280, 300, 281, 301, 400, 410, 420, 411, 421, 490, 520, 920, 921, 922, 923];
 
 impl Words {
     /// Reads a line.

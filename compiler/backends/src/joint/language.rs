@@ -146,13 +146,18 @@ impl Reader<'_> {
     }
 
     fn numbers(&self, all: Span) -> Result<(), Wrong> {
-        if let Some(w) = self.words().find(|w| w.form != Form::Literal || !w.value.is_finite()) {
+        let faults = self.scan.faults_of(self.line);
+        // Words given twice have a check of their own.
+        let twice = |w: &Word| {
+            let at = self.span(w);
+            faults.iter().any(|f| f.code == code::WORD_REPEATED && f.span.start < at.end && at.start < f.span.end)
+        };
+        let bad = |w: &&Word| w.form != Form::Literal || !w.value.is_finite();
+        if let Some(w) = self.words().filter(|w| !twice(w)).find(bad) {
             return Err((code::UFMG_BAD_VALUE, self.span(w), char::from(w.letter.to_ascii_uppercase()).into()));
         }
-        // What the scan could not read, apart from words given twice, which have a check of their own.
-        let repeated = self.repeated().is_some();
-        match self.scan.faults_of(self.line).first() {
-            Some(fault) if !repeated => {
+        match faults.iter().find(|f| f.code != code::WORD_REPEATED) {
+            Some(fault) => {
                 let letter = self.words().find(|w| self.span(w).end >= fault.span.start).or(self.words().last());
                 let letter = letter.map_or('?', |w| char::from(w.letter.to_ascii_uppercase()));
                 let span = if fault.span.start < fault.span.end { fault.span } else { all };

@@ -85,10 +85,14 @@ impl Emitter<'_> {
             }
             return self.write(view, &start, &end, plane, turns, &c);
         }
-        if depth < 3 && turns.abs() == 1 && sweep.angle().abs() * (to - from) > 1e-3 {
-            let middle = 0.5 * (from + to);
-            self.part(view, sweep, plane, (from, middle), turns, depth + 1);
-            self.part(view, sweep, plane, (middle, to), turns, depth + 1);
+        let angle = sweep.angle().abs() * (to - from);
+        if depth < 3 && angle > 1e-3 {
+            // Pieces well below a half turn, so that no rounding can turn one into a full circle.
+            let parts = libm::ceil(angle / 2.5).clamp(2.0, 100_000.0);
+            for k in 0..parts as usize {
+                let at = |k: usize| from + (to - from) * (k as f64 / parts);
+                self.part(view, sweep, plane, (at(k), at(k + 1)), turns.signum(), depth + 1);
+            }
         } else {
             self.arc_as_lines(view, sweep, from, to);
         }
@@ -166,18 +170,19 @@ impl Emitter<'_> {
         let (start, end) = (Pose::at(self.at), Pose::at(c.end));
         let read = Sweep::new(&start, &end, &arc);
         let own = meant.sweep.mismatch();
-        let room = if self.linuxcnc() { RADIUS_ROOM.max(own * 1.0001 + self.w.step()) } else { RADIUS_ROOM };
+        let room = if self.linuxcnc() { RADIUS_ROOM.max(own * 1.0001 + 1e-6) } else { RADIUS_ROOM };
         if read.mismatch() > room {
             return false;
         }
         if (read.angle() - meant.angle()).abs() > 0.5 {
             return false;
         }
-        let allowed = 1.6 * self.w.step() + 1e-9;
+        // The ends are off by up to √3/2 of the last decimal already.
+        let allowed = 1.25 * self.w.step() + 1e-9;
         [0.25, 0.5, 0.75].into_iter().all(|share| {
-            let (p, q) = (read.at(share), meant.at(share));
-            // Along the way both may differ by what the ends differ; across it they must agree.
-            (0..3).all(|i| (p.axes[i] - q.axes[i]).abs() <= allowed)
+            let (p, q) = (read.at(share).axes, meant.at(share).axes);
+            let square: f64 = (0..3).map(|i| (p[i] - q[i]) * (p[i] - q[i])).sum();
+            square <= allowed * allowed
         })
     }
 

@@ -141,7 +141,7 @@ impl<'a> Emitter<'a> {
     fn end(&mut self, index: usize) {
         let before = index.checked_sub(1).and_then(|i| self.program.get(i)).map(|s| s.op);
         let pallet = matches!(before, Some(Op::Stop(Stop::Pallet)));
-        self.w.block(if pallet || self.options.language == Language::FanucMill { "M30" } else { "M2" });
+        self.w.block(if pallet { "M30" } else { "M2" });
     }
 
     /// The operation after this index.

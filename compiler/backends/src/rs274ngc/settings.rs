@@ -117,6 +117,12 @@ impl Emitter<'_> {
     fn local_offset(&mut self, offset: &Axes, view: &View<'_, '_>) {
         let old = self.frame.local_offset;
         self.move_frame(view.state);
+        // Where the source says so it is said again: the control may know more than the simulation.
+        let asked = [920, 921, 922, 923, 520].into_iter();
+        let asked = self.words(view.source).is_some_and(|w| asked.clone().any(|g| w.g(g)));
+        if *offset == old && !asked {
+            return;
+        }
         let inserted = view.source.line == crate::from_line::INSERTED;
         let shift = match self.options.language {
             Language::FanucMill => true,

@@ -1,0 +1,482 @@
+//! Written programs move as their sources do: read again by our interpreter, and where LinuxCNC is installed, by
+//! the real one.
+
+use gr_backends::rs274ngc::{Arcs, Language, Options, emit};
+use gr_backends::{Texts, from_line};
+use gr_canon::{Axes, FileId, Units};
+use gr_gcode::{Chunk, File, scan};
+use gr_interp::{Files, Interp, Setup, Tool};
+use gr_ir::diff::{Tolerance, diff};
+use gr_ir::{Lowering, Program};
+use gr_spec::Dialect;
+use std::sync::Arc;
+
+struct One(File);
+
+impl Files for One {
+    fn file(&self, _: FileId) -> &File {
+        &self.0
+    }
+    fn find_sub(&mut self, _: &str) -> Option<FileId> {
+        None
+    }
+}
+
+fn setup(dialect: &'static Dialect) -> Setup {
+    let tool = |number: i32, z: f64| {
+        let mut offset: Axes = [0.0; 9];
+        offset[2] = z;
+        Tool { number, pocket: number, offset, diameter: 6.0, ..Tool::default() }
+    };
+    let mut setup = Setup { dialect, ..Setup::default() };
+    setup.tools.rows = vec![tool(0, 0.0), tool(1, 50.0), tool(2, 62.5), tool(3, 0.0)];
+    setup
+}
+
+fn tools() -> Vec<(i32, Axes)> {
+    let setup = setup(Dialect::linuxcnc());
+    setup.tools.rows.iter().skip(1).map(|t| (t.number, t.offset)).collect()
+}
+
+fn run_as(text: &str, dialect: &str) -> Result<Program, String> {
+    let dialect = Dialect::find(dialect).expect("a dialect");
+    let mut files = One(File::new("a.ngc", vec![Chunk { text: text.into(), scan: Arc::new(scan(text, dialect)) }]));
+    let setup = setup(dialect);
+    let mut interp = Interp::new(&mut files, &setup, Lowering::new());
+    let outcome = interp.run(FileId(0));
+    if !outcome.ok() {
+        return Err(format!("{:?}\n{text}", outcome.findings));
+    }
+    Ok(interp.into_sink().finish())
+}
+
+fn run(text: &str) -> Program {
+    run_as(text, "linuxcnc").unwrap_or_else(|e| panic!("{e}"))
+}
+
+fn options(language: Language) -> Options {
+    Options { language, tools: tools(), ..Options::default() }
+}
+
+fn write(text: &str, options: &Options) -> String {
+    let program = run(text);
+    match emit(&program, options, &Texts::new([(FileId(0), text)])) {
+        Ok(e) => e.text,
+        Err(e) => panic!("{e:?}\n{text}"),
+    }
+}
+
+fn errors(text: &str, language: Language) -> Vec<(&'static str, String)> {
+    let program = run(text);
+    let texts = Texts::new([(FileId(0), text)]);
+    let found = emit(&program, &options(language), &texts).expect_err("not expressible");
+    found.iter().map(|d| (d.code.def().slug, text[d.primary().1.range()].to_string())).collect()
+}
+
+/// The program written with these options, read again, moves like the source.
+fn same(text: &str, options: &Options, length: f64) {
+    let written = write(text, options);
+    let dialect = match options.language {
+        Language::Linuxcnc => "linuxcnc",
+        Language::FanucMill => "fanuc-mill",
+        Language::Grbl => "grbl",
+    };
+    let again = run_as(&written, dialect).unwrap_or_else(|e| panic!("{e}\n--- from\n{text}"));
+    let tolerance = Tolerance { length, angle: length, rate: 2e-3, ..Tolerance::default() };
+    let found = diff(&run(text), &again, &tolerance);
+    assert!(found.is_empty(), "{:#?}\n{text}\n--- written\n{written}", found.differences);
+}
+
+/// How far apart the ways may be: one unit of the last decimal.
+fn unit(o: &Options) -> f64 {
+    let mm = if o.units == Units::Inch { 25.4 } else { 1.0 };
+    if o.places() >= 7 { 1e-6 * mm } else { 1.8 * mm * 10f64.powi(-(o.places() as i32)) }
+}
+
+const PLAIN: &str = "\
+G21 G17 G90
+(first contour)
+G54
+M3 S1200
+M8
+G0 X0 Y0 Z5
+G1 Z-1.25 F100
+X40
+G3 X50 Y10 I0 J10
+G2 X60 Y20 R10
+G1 Y40.12345 F250.5
+X0
+Y0
+G0 Z5
+M9
+M5
+M2
+";
+
+const STRUCTURED: &str = "\
+G21 G90 G17
+#31=10
+o100 sub
+G1 X[#31*2] F[#32]
+Y#31
+X0
+Y0
+o100 endsub
+#32=300
+G0 X0 Y0 Z2
+o101 while [#31 LT 13]
+o100 call
+#31=[#31+1]
+o101 endwhile
+G81 X10 Y10 Z-3 R1 F80
+X20
+G98 G83 X30 Z-9 R2 Q3
+G80
+G0 X0 Y0 Z10
+G91
+G1 X1 Y1
+X1 Y1
+G90
+G0 @10 ^30
+G1 @10 ^60 F100
+M2
+";
+
+const COMPENSATED: &str = "\
+G21 G90 G17 F200
+G0 X-10 Y-10 Z0
+G42 D1 G1 X0 Y0
+X50
+Y30
+G2 X40 Y40 I-10 J0
+G1 X0
+Y0
+G40 X-10 Y-10
+M2
+";
+
+const TOOLS: &str = "\
+G21 G90
+T1 M6
+G43 H1
+S1000 M3
+G0 Z10
+X10 Y10
+G1 Z-2 F100
+G53 G0 Z0
+T2 M6
+G43 H2
+G0 X20 Y20
+Z5
+G1 Z-1
+G49
+G28 Z20
+M30
+";
+
+const OFFSETS: &str = "\
+G21 G90 G17
+G10 L2 P2 X10 Y20 Z-5
+G55
+G0 X1 Y1 Z1
+G1 X5 F100
+G92 X0 Y0
+G1 X3 Y3
+G92.1
+G1 X1
+G52 X2
+X1
+G52 X0
+G54
+G0 X0 Y0 Z3
+M2
+";
+
+const ODD: &str = "\
+G20 G90 G17
+G0 X1 Y1 Z.1
+G4 P1.5
+G64 P0.001
+G18
+G2 X2 Z0.1 I0.5 K0 F12
+G19
+G3 Y2 Z0.1 J0.5 K0
+G17
+G2 X2 Y2 I1 J1
+G3 X2 Y2 Z-1 I.5 J0 P3
+G61
+G1 X1.23456
+M0
+M1
+M2
+";
+
+const EVENTS: &str = "\
+G21 G90 G17
+M3 S500
+M7
+M8
+G1 X1 F100
+M9
+M62 P1
+M64 P2
+G1 X2
+M67 E1 Q2.5
+M65 P2
+M50 P0
+M52 P1
+(MSG,look here)
+M19 R45 Q3
+M4 S300
+G33 Z-5 K1.5
+G0 Z5
+G33.1 Z-5 K1
+G95 F0.1
+G1 X5
+G94 F100
+G5 X20 Y0 I3 J3 P-3 Q3
+G1 A10 B5
+G1 A20 F45
+G38.2 Z-10 F50
+M30
+";
+
+#[test]
+fn snapshots() {
+    let all = [
+        ("plain", PLAIN),
+        ("structured", STRUCTURED),
+        ("compensated", COMPENSATED),
+        ("tools", TOOLS),
+        ("offsets", OFFSETS),
+        ("odd", ODD),
+    ];
+    for (name, text) in all {
+        for (to, language) in
+            [("linuxcnc", Language::Linuxcnc), ("fanuc", Language::FanucMill), ("grbl", Language::Grbl)]
+        {
+            let program = run(text);
+            let out = match emit(&program, &options(language), &Texts::new([(FileId(0), text)])) {
+                Ok(e) => e.text + &e.notes.iter().map(|d| format!("{:?}: {}\n", d.severity, d.message)).collect::<String>(),
+                Err(e) => e.iter().map(|d| format!("{:?}: {}\n", d.code, d.message)).collect(),
+            };
+            insta::assert_snapshot!(format!("{name}_{to}"), out);
+        }
+    }
+    insta::assert_snapshot!("events_linuxcnc", write(EVENTS, &options(Language::Linuxcnc)));
+    let many = Options {
+        units: Units::Inch,
+        decimals: Some(3),
+        arcs: Arcs::R,
+        numbers: Some((10, 10)),
+        repeat_words: true,
+        comments: false,
+        ..options(Language::Linuxcnc)
+    };
+    insta::assert_snapshot!("plain_options", write(PLAIN, &many));
+}
+
+#[test]
+fn every_program_moves_the_same() {
+    for text in [PLAIN, STRUCTURED, COMPENSATED, TOOLS, OFFSETS, ODD, EVENTS] {
+        for units in [Units::Mm, Units::Inch] {
+            for decimals in [None, Some(3), Some(8)] {
+                for arcs in [Arcs::Ijk, Arcs::IjkAbsolute, Arcs::R] {
+                    let o = Options { units, decimals, arcs, ..options(Language::Linuxcnc) };
+                    same(text, &o, unit(&o));
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn other_languages_move_the_same() {
+    for text in [PLAIN, STRUCTURED, COMPENSATED] {
+        for language in [Language::Grbl, Language::FanucMill] {
+            for arcs in [Arcs::Ijk, Arcs::R] {
+                let o = Options { arcs, ..options(language) };
+                same(text, &o, unit(&o));
+            }
+        }
+    }
+}
+
+#[test]
+fn arcs_as_lines() {
+    let o = Options { arcs: Arcs::Lines, arc_tolerance: 0.01, decimals: Some(6), ..options(Language::Linuxcnc) };
+    let written = write(PLAIN, &o);
+    assert!(!written.contains("G2 ") && !written.contains("G3 "));
+    same(PLAIN, &o, 0.011);
+}
+
+#[test]
+fn nothing_is_dropped_silently() {
+    assert_eq!(
+        errors("G21 G90\nM64 P1\nM2\n", Language::Grbl),
+        [("emit/not-expressible", "M64 P1".to_string())]
+    );
+    assert_eq!(
+        errors("G21 G90 F100\nG1 A10\nM2\n", Language::Grbl),
+        [("emit/not-expressible", "G1 A10".to_string())]
+    );
+    assert_eq!(errors("G21 G90 M3 S100\nG33 Z-3 K1\nM2\n", Language::Grbl)[0].1, "G33 Z-3 K1");
+    assert_eq!(errors("G21 G90 M3 S100\nG95 F1\nG1 X1\nM2\n", Language::Grbl)[0].1, "G1 X1");
+    assert_eq!(errors("G21 G90 F100\nG38.2 Z-1\nM2\n", Language::FanucMill)[0].1, "G38.2 Z-1");
+}
+
+#[test]
+fn machine_positions_stay_machine_positions() {
+    let written = write(TOOLS, &options(Language::Linuxcnc));
+    assert!(written.contains("G53 G0 Z0\n"), "{written}");
+    assert!(written.contains("G28 Z20\n"), "{written}");
+    assert!(written.contains("G43 H2\n"), "{written}");
+}
+
+#[test]
+fn rounding_does_not_add_up() {
+    // A thousand steps of a third: each word comes from the absolute position.
+    let text = "G21 G90 G0 X0 Y0 Z0\no1 repeat [1000]\nG91 G1 X[1/3] F100\no1 endrepeat\nM2\n";
+    let o = Options { decimals: Some(3), ..options(Language::Linuxcnc) };
+    let written = write(text, &o);
+    assert!(written.contains("X333.333\n"), "{}", &written[written.len() - 200..]);
+    same(text, &o, 0.0006);
+}
+
+#[test]
+fn coarse_arcs_still_make_circles() {
+    let text = "G21 G90 G17 F100\nG0 X0.1234 Y0.5678 Z0\nG3 X10.7777 Y3.3333 R7.123\nG2 X12.3456 Y2.3456 R50.5\nM2\n";
+    for decimals in [1, 2, 3] {
+        for arcs in [Arcs::Ijk, Arcs::R] {
+            for language in [Language::Linuxcnc, Language::Grbl] {
+                let o = Options { decimals: Some(decimals), arcs, ..options(language) };
+                same(text, &o, unit(&o));
+            }
+        }
+    }
+}
+
+#[test]
+fn starts_from_a_line() {
+    let from = |text: &str, line: u32| {
+        let program = run(text);
+        let texts = Texts::new([(FileId(0), text)]);
+        let o = from_line::Options { safe_z: Some(25.0) };
+        from_line::from_line(&program, FileId(0), line, &o, &texts).map(|r| {
+            let slugs: Vec<_> = r.notes.iter().map(|d| d.code.def().slug).collect();
+            (emit(&r.program, &options(Language::Linuxcnc), &texts).expect("written").text, slugs)
+        })
+    };
+    let slug = |r: Result<_, Vec<gr_text::Diagnostic>>| -> &'static str {
+        r.map(|_: (String, Vec<&str>)| ()).expect_err("no start")[0].code.def().slug
+    };
+    let (text, notes) = from(PLAIN, 11).unwrap();
+    assert!(notes.is_empty());
+    insta::assert_snapshot!("from_line_plain", text);
+    run(&text);
+    insta::assert_snapshot!("from_line_tools", from(TOOLS, 13).unwrap().0);
+    insta::assert_snapshot!("from_line_offsets", from(OFFSETS, 7).unwrap().0);
+    assert_eq!(slug(from(COMPENSATED, 5)), "from-line/inside-compensation");
+    assert!(from(COMPENSATED, 3).is_ok());
+    assert_eq!(slug(from(PLAIN, 99)), "from-line/nothing-left");
+    assert_eq!(from(STRUCTURED, 4).unwrap().1, ["from-line/inside-loop"]);
+}
+
+mod oracle {
+    use super::*;
+    use std::process::{Command, Stdio};
+
+    fn canon(text: &str) -> Option<Vec<String>> {
+        let rs274 = std::path::Path::new("/usr/bin/rs274");
+        if !rs274.exists() {
+            return None;
+        }
+        let home = tempfile::tempdir().expect("a folder");
+        let (program, out) = (home.path().join("a.ngc"), home.path().join("out"));
+        let table = home.path().join("t.tbl");
+        std::fs::write(&program, text).expect("written");
+        // rs274 is an inch machine.
+        let inch = |mm: f64| mm / 25.4;
+        let row = |n: i32, z: f64| format!("T{n} P{n} Z{:.12} D{:.12}\n", inch(z), inch(6.0));
+        std::fs::write(&table, row(1, 50.0) + &row(2, 62.5) + &row(3, 0.0)).expect("written");
+        let status = Command::new(rs274)
+            .arg("-g")
+            .arg("-t")
+            .arg(&table)
+            .arg(&program)
+            .arg(&out)
+            .env("HOME", home.path())
+            .env("LC_ALL", "C")
+            .stdin(Stdio::null())
+            .stdout(Stdio::null())
+            .output()
+            .expect("rs274 runs");
+        assert!(status.status.success(), "{}\n{text}", String::from_utf8_lossy(&status.stderr));
+        let moves = ["STRAIGHT_", "ARC_FEED", "NURBS", "RIGID_TAP", "DWELL"];
+        let out = std::fs::read_to_string(out).expect("output");
+        let call = |l: &str| l.splitn(3, ' ').nth(2).unwrap_or("").trim().replace("-0.0000", "0.0000");
+        let calls = out.lines().map(|l| call(l.trim_start()));
+        Some(calls.filter(|c| moves.iter().any(|m| c.starts_with(m))).collect())
+    }
+
+    #[test]
+    fn rs274_moves_the_same() {
+        let o = Options { decimals: Some(9), ..options(Language::Linuxcnc) };
+        for text in [PLAIN, STRUCTURED, COMPENSATED, TOOLS, OFFSETS] {
+            let written = write(text, &o);
+            let (Some(a), Some(b)) = (canon(text), canon(&written)) else { return };
+            assert_eq!(a, b, "{text}\n--- written\n{written}");
+        }
+        // What rs274 takes without a word of complaint.
+        for text in [ODD, EVENTS] {
+            canon(&write(text, &options(Language::Linuxcnc)));
+        }
+    }
+}
+
+mod property {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn block() -> impl Strategy<Value = String> {
+        let n = || (-50_000i32..50_000).prop_map(|v| format!("{}", f64::from(v) / 997.0));
+        prop_oneof![
+            4 => (n(), n(), n()).prop_map(|(x, y, z)| format!("G1 X{x} Y{y} Z{z}")),
+            2 => n().prop_map(|x| format!("G0 X{x}")),
+            1 => n().prop_map(|x| format!("G1 Z{x} F{}", 100.0)),
+            2 => (1i32..5000, any::<bool>(), n()).prop_map(|(r, cw, z)| {
+                let r = f64::from(r) / 83.0;
+                format!("G91 G{} X{r} Y{r} Z{z} I{r} J0\nG90", if cw { 2 } else { 3 })
+            }),
+            1 => (1i32..5000, any::<bool>(), 1..4).prop_map(|(r, cw, p)| {
+                format!("G{} I{} J{} P{p}", if cw { 2 } else { 3 }, f64::from(r) / 83.0, f64::from(r) / 31.0)
+            }),
+            1 => (n(), n()).prop_map(|(x, y)| format!("G10 L2 P2 X{x} Y{y}\nG55")),
+            1 => (n(), n()).prop_map(|(x, y)| format!("G92 X{x} Y{y}")),
+            1 => (1i32..3000).prop_map(|r| {
+                let r = f64::from(r) / 83.0;
+                format!("G18 G91 G2 X{r} Z{r} I{r} K0\nG17 G90")
+            }),
+            1 => Just("G54".to_string()),
+            1 => n().prop_map(|z| format!("G43.1 Z{z}")),
+            1 => Just("G49".to_string()),
+        ]
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(200))]
+        #[test]
+        fn written_programs_move_the_same(
+            blocks in prop::collection::vec(block(), 1..25),
+            inch in any::<bool>(),
+            decimals in 3usize..10,
+            arcs in prop_oneof![Just(Arcs::Ijk), Just(Arcs::IjkAbsolute), Just(Arcs::R)],
+            repeat in any::<bool>(),
+        ) {
+            let text = format!("G21 G90 G17 F100\n{}\nM2\n", blocks.join("\n"));
+            let units = if inch { Units::Inch } else { Units::Mm };
+            let o = Options { units, decimals: Some(decimals), arcs, repeat_words: repeat, ..options(Language::Linuxcnc) };
+            same(&text, &o, unit(&o));
+        }
+    }
+}
