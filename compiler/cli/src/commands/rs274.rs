@@ -319,7 +319,10 @@ fn execute(choice: &Choice) -> Result<u8, Quit> {
                 return Err(Quit(1));
             }
             let code = from_file(&mut run, choice);
-            run.reset();
+            // With an INI file the real command puts off closing the program, and then forgets it.
+            if !choice.ini.as_ref().is_some_and(|p| p.exists()) {
+                run.reset();
+            }
             code
         }
     };
@@ -396,6 +399,8 @@ fn setup(choice: &Choice, tools: ToolTable) -> Setup {
         dialect: dialect(choice.version),
         version: choice.version,
         machine_units: Units::Inch,
+        user_m_codes: false,
+        uvw: false,
         tools,
         block_delete: choice.block_delete,
         keep_going: choice.on_error != OnError::Stop,
@@ -487,8 +492,7 @@ fn report(run: &mut Interp<'_, Out>, findings: &[Finding], stack: bool) -> bool 
         run.sink().flush();
         let def = fault.code.def();
         let way = if stack { vec![format!("{} {}, line {}", def.code, def.slug, finding.line + 1)] } else { Vec::new() };
-        let line = run.line_text().to_string();
-        report_fault(&text, &line, &way);
+        report_fault(&text, &finding.text, &way);
     }
     bad
 }
