@@ -108,10 +108,6 @@ pub(crate) struct RunOptions {
     pub(crate) disk_revision: u64,
 }
 
-/// A dialect as a query argument.
-#[derive(Clone, Copy)]
-pub(crate) struct DialectKey(pub(crate) &'static Dialect);
-
 /// Tables of a chunk.
 #[salsa::tracked(returns(clone), no_eq)]
 pub(crate) fn scanned(db: &dyn Db, chunk: ChunkText, run: RunOptions) -> Arc<Scan> {
@@ -128,10 +124,10 @@ pub(crate) struct Shape {
     pub(crate) bytes: u32,
     /// Whether the first line that is not blank is `%`; none = all lines are blank.
     pub(crate) first_text: Option<bool>,
-    /// The first line with words defines a subroutine.
-    pub(crate) begins_with_sub: bool,
-    /// Has words outside of subroutine definitions that begin and end in this chunk.
-    pub(crate) main_motion: bool,
+    /// The first line that is `%`.
+    pub(crate) first_percent: Option<u32>,
+    /// How blocks and subroutine definitions follow each other.
+    pub(crate) outline: Box<[Outline]>,
     /// Has a line that could not be read.
     pub(crate) damaged: bool,
     /// Something that may send execution elsewhere: the chunk can't be run alone.
@@ -144,6 +140,17 @@ pub(crate) struct Shape {
     pub(crate) computed: bool,
     /// Has a jump to an N number.
     pub(crate) jumps: bool,
+}
+
+/// What a stretch of a chunk is.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Outline {
+    /// Blocks, one or many.
+    Blocks,
+    /// A subroutine definition begins.
+    Sub,
+    /// It ends.
+    Endsub,
 }
 
 /// A label of a chunk.
@@ -200,25 +207,31 @@ fn comment_acts(text: &str) -> bool {
 pub(crate) fn shape_of(scan: &Scan, text: &str, dialect: &'static Dialect) -> Shape {
     let mut shape = Shape { lines: scan.lines.len() as u32, bytes: text.len() as u32, damaged: !scan.faults.is_empty(), ..Shape::default() };
     let mut labels = Vec::new();
-    let (mut depth, mut first_words) = (0, true);
+    let mut outline = Vec::new();
+    // Names that begin with `_` may speak of the run itself: its line, its call depth.
+    shape.control = scan.names.iter().any(|n| n.starts_with('_'));
     let macros = dialect.family == gr_spec::Family::Fanuc;
     for (n, line) in scan.lines.iter().enumerate() {
         let n = n as u32;
         if shape.first_text.is_none() && !text.get(scan.line_span(text, n).range()).unwrap_or("").trim().is_empty() {
             shape.first_text = Some(line.kind == LineKind::Percent);
         }
+        if line.kind == LineKind::Percent && shape.first_percent.is_none() {
+            shape.first_percent = Some(n);
+        }
         if line.kind == LineKind::Blank && scan.words(n).is_empty() {
             continue;
         }
         let words = scan.words(n);
         let keyword = words.iter().find(|w| w.form == Form::Control).and_then(|w| scan.controls.get(w.index())).map(|c| c.keyword);
-        let is_sub = keyword == Some(Keyword::Sub);
-        depth += i32::from(is_sub) - i32::from(keyword == Some(Keyword::Endsub));
-        let speaks = words.iter().any(|w| w.form != Form::Comment);
-        if speaks && first_words {
-            (shape.begins_with_sub, first_words) = (is_sub, false);
+        let kind = match keyword {
+            Some(Keyword::Sub) => Outline::Sub,
+            Some(Keyword::Endsub) => Outline::Endsub,
+            _ => Outline::Blocks,
+        };
+        if words.iter().any(|w| w.form != Form::Comment) && (kind != Outline::Blocks || outline.last() != Some(&kind)) {
+            outline.push(kind);
         }
-        shape.main_motion |= speaks && depth == 0 && keyword.is_none();
         for word in words {
             match word.letter {
                 b'o' if word.form == Form::Control => {
@@ -249,6 +262,7 @@ pub(crate) fn shape_of(scan: &Scan, text: &str, dialect: &'static Dialect) -> Sh
         }
     }
     shape.labels = labels.into();
+    shape.outline = outline.into();
     shape
 }
 

@@ -86,9 +86,3 @@ pub(crate) fn file_of(path: &str, text: &str, lines_per_chunk: usize, dialect: &
         .collect();
     File::new(path, chunks)
 }
-
-/// Where an external subroutine may be: beside the main program, and along `[RS274NGC] SUBROUTINE_PATH`.
-pub(crate) fn candidates(setup: &gr_interp::Setup, main: &str, name: &str) -> Vec<PathBuf> {
-    let file = format!("{name}.ngc");
-    gr_interp::subroutine_paths(setup, Path::new(main)).into_iter().map(|folder| folder.join(&file)).collect()
-}

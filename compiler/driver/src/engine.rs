@@ -5,11 +5,11 @@ use std::sync::Arc;
 
 use gr_canon::{At, Call, CallFrame, Discard, FileId, FrameId, Mark, Sink};
 use gr_gcode::{Chunk, File, LineKind};
-use gr_interp::{Files, Finding, Interp, Modal, Params, State, run_chunk};
+use gr_interp::{Files, Finding, Interp, Modal, Params, State, run_lines};
 use gr_spec::code;
 
 use crate::Options;
-use crate::db::{Db, Shape};
+use crate::db::{Db, Outline, Shape};
 use crate::lints::{Flags, Found, Lints, Summary, Where, left_on};
 
 /// State between two chunks: the interpreter's, and what lints remember.
@@ -165,29 +165,28 @@ impl Files for Single {
     }
 }
 
-/// The chunk without its opening `%`, and whether the opening is still to come after it.
-fn opened(chunk: &Chunk) -> (Chunk, bool) {
-    let mut scan = (*chunk.scan).clone();
-    match scan.lines.iter_mut().find(|l| l.kind == LineKind::Percent) {
-        Some(line) => line.kind = LineKind::Blank,
-        None => return (chunk.clone(), true),
+/// First line to run in a chunk, and whether the opening `%` is still to come after it.
+fn opened(chunk: &Chunk) -> (u32, bool) {
+    match chunk.scan.lines.iter().position(|l| l.kind == LineKind::Percent) {
+        Some(line) => (line as u32 + 1, false),
+        None => (chunk.scan.lines.len() as u32, true),
     }
-    (Chunk { text: chunk.text.clone(), scan: Arc::new(scan) }, false)
 }
 
 /// Interprets a chunk that has no control flow.
 pub(crate) fn step(chunk: &Chunk, entry: &Boundary, env: Option<&Environment>, options: &Options) -> StepOutcome {
-    let (chunk, opening) = if entry.opening { opened(chunk) } else { (chunk.clone(), false) };
+    let (first, opening) = if entry.opening { opened(chunk) } else { (0, false) };
     let mut lints = LastLine { inner: Lints::new(&options.rules, &entry.state.modal, entry.flags), line: 0 };
     let nothing = Params::default();
     let params = env.map_or(&nothing, |e| &e.params);
-    let exit = run_chunk(&chunk, &entry.state, params, &options.setup, &mut lints);
+    let lines = first..chunk.scan.lines.len() as u32;
+    let exit = run_lines(chunk, lines, &entry.state, params, &options.setup, &mut lints);
     let touched = exit.open_ended || !exit.reads.is_empty() || !exit.writes.is_empty();
     let mut found: Vec<Found> = exit.findings.iter().filter_map(|f| of_finding(f, options)).collect();
     let fault_line = exit.findings.last().map_or(0, |f| f.line);
     let line = match exit.end {
         gr_interp::End::Fault => fault_line,
-        gr_interp::End::Percent => percent_line(&chunk),
+        gr_interp::End::Percent => percent_line(chunk, first),
         _ => lints.line,
     };
     found.extend(lints.inner.found);
@@ -202,8 +201,9 @@ pub(crate) fn step(chunk: &Chunk, entry: &Boundary, env: Option<&Environment>, o
     }
 }
 
-fn percent_line(chunk: &Chunk) -> u32 {
-    chunk.scan.lines.iter().position(|l| l.kind == LineKind::Percent).unwrap_or(0) as u32
+fn percent_line(chunk: &Chunk, from: u32) -> u32 {
+    let lines = chunk.scan.lines.iter().enumerate().skip(from as usize);
+    lines.filter(|(_, l)| l.kind == LineKind::Percent).map(|(i, _)| i as u32).next().unwrap_or(0)
 }
 
 fn of_finding(f: &Finding, options: &Options) -> Option<Found> {
@@ -222,15 +222,13 @@ fn of_finding(f: &Finding, options: &Options) -> Option<Found> {
     })
 }
 
-/// What a stretch with control flow gave.
+/// What the rest of a program from its first control flow on gave.
 pub(crate) struct FlowOutcome {
     pub(crate) boundary: Boundary,
-    pub(crate) environment: Environment,
     pub(crate) found: Vec<Found>,
     pub(crate) frames: Vec<(FrameId, CallFrame)>,
     pub(crate) summary: Summary,
     pub(crate) end: Option<End>,
-    pub(crate) resume: Option<u32>,
 }
 
 /// Where a run with control flow begins.
@@ -238,10 +236,10 @@ pub(crate) struct Stretch<'a> {
     pub(crate) db: &'a dyn Db,
     pub(crate) main: FileId,
     pub(crate) file: Arc<File>,
-    /// First chunk.
-    pub(crate) chunk: usize,
-    /// Chunks that can be run alone.
-    pub(crate) alone: &'a [bool],
+    /// First line.
+    pub(crate) line: u32,
+    /// Line of the opening `%`, 0 without one.
+    pub(crate) shift: u32,
     pub(crate) entry: &'a Boundary,
     pub(crate) env: &'a Environment,
     pub(crate) options: &'a Options,
@@ -271,8 +269,7 @@ impl Files for Library<'_> {
         self.found.iter().find(|(i, _)| *i == id).map_or(&self.empty, |(_, f)| f)
     }
     fn find_sub(&mut self, name: &str) -> Option<FileId> {
-        let main = self.db.disk().path(self.main).unwrap_or_default();
-        let candidates = crate::disk::candidates(&self.options.setup, &main, name);
+        let candidates = gr_interp::subroutine_paths(&self.options.setup, name);
         let (id, file) = self.db.disk().find(&candidates, self.options.setup.dialect)?;
         if id != self.main && !self.found.iter().any(|(i, _)| *i == id) {
             self.found.push((id, file));
@@ -308,62 +305,50 @@ impl<S: Sink> Sink for Watch<'_, S> {
     }
 }
 
-/// Runs the program from the start of a chunk until it may be taken chunk by chunk again.
+/// Runs the program from the start of a chunk to its end.
 pub(crate) fn flow(stretch: &Stretch<'_>) -> FlowOutcome {
-    let Stretch { db, main, file, chunk, alone, entry, env, options } = stretch;
-    let mut file = file.clone();
-    if entry.opening {
-        file = Arc::new(without_opening(&file));
-    }
-    let first_lines = file.first_lines.clone();
-    let mut library = Library::new(*db, options, *main, file);
+    let Stretch { db, main, file, line, shift, entry, env, options } = stretch;
+    let mut library = Library::new(*db, options, *main, file.clone());
     let lints = Lints::new(&options.rules, &entry.state.modal, entry.flags);
     let watch = Watch { inner: LastLine { inner: lints, line: 0 }, db: *db, frames: Vec::new(), calls: 0 };
-    let state = (*entry.state).clone();
-    let mut interp = Interp::resume(&mut library, &options.setup, watch, state, env.params.clone(), *main, first_lines[*chunk]);
-    let (mut end, mut resume) = (None, None);
-    while end.is_none() {
-        end = interp.run_to_border();
-        let border = interp.next_line();
-        if end.is_none()
-            && interp.is_outside()
-            && let Ok(next) = first_lines.binary_search(&border)
-            && next > *chunk
-            && alone.get(next) == Some(&true)
-        {
-            resume = Some(next as u32);
-            break;
-        }
-    }
+    let state = ((*entry.state).clone(), env.params.clone());
+    let from = if entry.opening { (*line).max(shift + 1) } else { *line };
+    let mut interp = Interp::resume(&mut library, &options.setup, watch, state, *main, (from, *shift as i32));
+    let why = interp.run_open();
     let state = interp.state();
-    let params = interp.params().clone();
-    let findings = interp.take_findings();
-    let watch = interp.into_sink();
-    let LastLine { inner: lints, line } = watch.inner;
+    let mut findings = interp.finish(why).findings;
+    let Watch { inner: LastLine { inner: lints, line: last_line }, frames, .. } = interp.into_sink();
+    let early = findings.iter().any(|f| f.fault.code == code::PROGRAM_ENDS_EARLY);
+    // Whether that is a mistake depends on the dialect and on what the file is: see `finish`.
+    findings.retain(|f| f.fault.code != code::PROGRAM_ENDS_EARLY);
+    let fault_line = findings.iter().rev().find(|f| f.fault.rs.is_some() && f.file == *main).map_or(last_line, |f| f.line);
+    let end = match why {
+        gr_interp::End::Fault if early => None,
+        gr_interp::End::Fault => End::of(why, fault_line),
+        gr_interp::End::Percent => End::of(why, percent_after(file, from)),
+        _ => End::of(why, last_line),
+    };
+    if let Some(end) = end.filter(|e| !e.stopped) {
+        // What stands behind the end is not looked at.
+        findings.retain(|f| f.fault.code != code::FLOW_UNCLOSED || f.file != *main || f.line <= end.line);
+    }
     let mut found: Vec<Found> = findings.iter().filter_map(|f| of_finding(f, options)).collect();
     found.extend(lints.found);
-    let line = if end == Some(gr_interp::End::Fault) { findings.last().map_or(line, |f| f.line) } else { line };
-    FlowOutcome {
-        boundary: Boundary::new(state, lints.flags, false),
-        environment: Environment { params },
-        found,
-        frames: watch.frames,
-        summary: lints.summary,
-        end: end.and_then(|e| End::of(e, line)),
-        resume,
-    }
+    FlowOutcome { boundary: Boundary::new(state, lints.flags, false), found, frames, summary: lints.summary, end }
 }
 
-fn without_opening(file: &File) -> File {
-    let mut file = file.clone();
-    for chunk in &mut file.chunks {
-        let (blanked, still) = opened(chunk);
-        *chunk = blanked;
-        if !still {
-            break;
+/// Line of the closing `%`.
+fn percent_after(file: &File, from: u32) -> u32 {
+    let mut first = 0;
+    for chunk in &file.chunks {
+        for (l, line) in chunk.scan.lines.iter().enumerate() {
+            if line.kind == LineKind::Percent && first + l as u32 >= from {
+                return first + l as u32;
+            }
         }
+        first += chunk.scan.lines.len() as u32;
     }
-    file
+    first.saturating_sub(1)
 }
 
 /// What is known when every chunk was looked at.
@@ -411,5 +396,5 @@ fn no_end(context: &Finish<'_>, line: u32) -> Option<Found> {
 
 /// A file of subroutines: it begins with one.
 fn only_subs(shapes: &[&Shape]) -> bool {
-    shapes.iter().find(|s| s.first_text.is_some()).is_some_and(|s| s.begins_with_sub)
+    shapes.iter().flat_map(|s| s.outline.iter()).next() == Some(&Outline::Sub)
 }

@@ -2,8 +2,8 @@
 //!
 //! A chunk without control flow is interpreted on its own ([`step`]), and the result is remembered for the
 //! chunk, the state it is entered in and, if it touches them, the parameters. Most edits leave the state after
-//! the chunk as it was, and then nothing below is done again. From a chunk with control flow on, the program is
-//! run as a whole until it is back at a chunk border outside of any subroutine and loop ([`flow`]).
+//! the chunk as it was, and then nothing below is done again. From the first chunk with control flow on, the
+//! program is run as a whole ([`flow`]).
 
 use std::sync::Arc;
 
@@ -80,15 +80,11 @@ pub(crate) struct Flow<'db> {
     pub(crate) summary: Summary,
     #[salsa_value(unsafe(prove(Option<End>: 'static)))]
     pub(crate) end: Option<End>,
-    /// Chunk at which execution is outside of everything again.
-    pub(crate) resume: Option<u32>,
-    /// State there.
+    /// State at the end.
     pub(crate) exit: Entry<'db>,
-    /// Parameters and tools there.
-    pub(crate) env: Env<'db>,
 }
 
-/// Runs the program from the start of a chunk until it may be taken chunk by chunk again.
+/// Runs the program from the start of a chunk to its end.
 #[salsa::tracked(returns(ref), no_eq)]
 pub(crate) fn flow<'db>(db: &'db dyn Db, document: Document, chunk: u32, entry: Entry<'db>, env: Env<'db>) -> Flow<'db> {
     db.count(Counted::Flow);
@@ -97,13 +93,26 @@ pub(crate) fn flow<'db>(db: &'db dyn Db, document: Document, chunk: u32, entry: 
     let options = run.options(db);
     let chunks = document.chunks(db);
     let file = whole(db, document);
-    let alone: Vec<bool> = chunks.iter().map(|c| !shape(db, *c, run).control).collect();
+    let (mut line, mut shift) = (0, None);
+    for (i, c) in chunks.iter().enumerate() {
+        if i == chunk as usize {
+            break;
+        }
+        line += shape(db, *c, run).lines;
+    }
+    if entry.boundary(db).modal().percent != 0 {
+        let mut first = 0;
+        for c in chunks.iter() {
+            shift = shift.or_else(|| Some(first + shape(db, *c, run).first_percent?));
+            first += shape(db, *c, run).lines;
+        }
+    }
     let stretch = engine::Stretch {
         db,
         main: gr_canon::FileId(document.id(db)),
         file,
-        chunk: chunk as usize,
-        alone: &alone,
+        line,
+        shift: shift.unwrap_or(0),
         entry: entry.boundary(db),
         env: env.environment(db),
         options,
@@ -114,9 +123,7 @@ pub(crate) fn flow<'db>(db: &'db dyn Db, document: Document, chunk: u32, entry: 
         frames: outcome.frames.into(),
         summary: outcome.summary,
         end: outcome.end,
-        resume: outcome.resume,
         exit: Entry::new(db, outcome.boundary),
-        env: Env::new(db, outcome.environment),
     }
 }
 
@@ -230,8 +237,8 @@ fn fold<'db>(db: &'db dyn Db, document: Document, last_line: u32) -> Timeline<'d
                 groups.push(Group { first_line: 0, found: flow.found.clone(), frames: Some(flow.frames.clone()) });
             }
             end = flow.end;
-            (entry, env) = (flow.exit, flow.env);
-            at = flow.resume.map_or(chunks.len(), |c| (c as usize).max(at + 1));
+            entry = flow.exit;
+            at = chunks.len();
         } else {
             let touched = shapes[at].environment.then_some(env);
             let mut outcome = step(db, chunks[at], run, entry, touched);

@@ -6,7 +6,7 @@ use gr_spec::{Code, Family, code};
 
 use super::{Found, Where};
 use crate::Options;
-use crate::db::{Label, LabelKind, Shape};
+use crate::db::{Label, LabelKind, Outline, Shape};
 
 /// Looks through the labels of all chunks.
 pub(crate) fn labels(shapes: &[&Shape], starts: &[(u32, u32)], options: &Options, found: &mut Vec<Found>) {
@@ -46,7 +46,7 @@ fn unused_subs<'a>(
         }
     }
     // A library of subroutines is called from elsewhere, and a computed label may be any.
-    if shapes.iter().any(|s| s.computed) || !shapes.iter().any(|s| s.main_motion) {
+    if shapes.iter().any(|s| s.computed) || !has_main(shapes) {
         return;
     }
     let mut unused: Vec<_> = subs.into_iter().filter(|(name, _)| !calls.contains(name)).collect();
@@ -54,4 +54,17 @@ fn unused_subs<'a>(
     for (name, line) in unused {
         report(code::SUB_UNUSED, line, b'o', &format!("o{name}"));
     }
+}
+
+/// Whether there are blocks outside of subroutine definitions.
+fn has_main(shapes: &[&Shape]) -> bool {
+    let mut depth = 0;
+    shapes.iter().flat_map(|s| s.outline.iter()).any(|kind| {
+        match kind {
+            Outline::Sub => depth += 1,
+            Outline::Endsub => depth -= 1,
+            Outline::Blocks => {}
+        }
+        depth <= 0 && *kind == Outline::Blocks
+    })
 }

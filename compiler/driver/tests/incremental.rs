@@ -1,0 +1,259 @@
+//! Incremental = from scratch: whatever the chunk size and the order of edits, the answers are those of a fresh
+//! session over the same text.
+
+use gr_driver::{Check, Options, Session};
+use gr_interp::Setup;
+use gr_text::Diagnostic;
+use proptest::prelude::*;
+
+fn options(chunk: usize) -> Options {
+    let mut options = Options::new(Setup::default());
+    options.chunk_lines = Some(chunk);
+    options
+}
+
+fn scratch(text: &str, chunk: usize) -> Check {
+    let mut session = Session::new();
+    let file = session.open("part.ngc", text, options(chunk));
+    session.check(file)
+}
+
+/// What people see: easier to read in a failure than the whole structure.
+fn shown(text: &str, all: &[Diagnostic]) -> Vec<String> {
+    let line = |at: u32| text[..at as usize].matches('\n').count() + 1;
+    all.iter()
+        .map(|d| {
+            let span = d.primary().1;
+            format!("{}:{}..{} {:?} {:?} {} {:?} {:?}", line(span.start), span.start, span.end, d.severity, d.code, d.message, d.notes, d.trace)
+        })
+        .collect()
+}
+
+fn line() -> impl Strategy<Value = String> {
+    let plain = prop_oneof![
+        Just("G0 X1 Y2"),
+        Just("G1 X3 F100"),
+        Just("X4 Y-1"),
+        Just("G2 X1 Y1 I1"),
+        Just("G3 X0 Y0 R5"),
+        Just("G91"),
+        Just("G90"),
+        Just("G20"),
+        Just("G21"),
+        Just("G18"),
+        Just("G17"),
+        Just("Z-3"),
+        Just("G0 Z-5"),
+        Just("G0 Z5"),
+        Just("S1000 M3"),
+        Just("M5"),
+        Just("M8"),
+        Just("G95 F100"),
+        Just("G94"),
+        Just("G93"),
+        Just("G64 P0.001"),
+        Just("G81 X1 Z-1 R1"),
+        Just("G80"),
+        Just("G41.1 D1"),
+        Just("G40"),
+        Just("G92 X1"),
+        Just("G54"),
+        Just("G55"),
+        Just("G10 L2 P2 X5"),
+        Just("G43.1 Z1"),
+        Just("G28.1"),
+        Just("G28"),
+    ];
+    let odd = prop_oneof![
+        Just("(a comment)"),
+        Just("; note"),
+        Just("(unclosed"),
+        Just("G1 X"),
+        Just("X[1+"),
+        Just("G99999"),
+        Just("M2"),
+        Just("%"),
+        Just(""),
+        Just("  "),
+        Just("N10 G1 X1"),
+        Just("(debug,#1)"),
+        Just("G1 X#1"),
+        Just("#1=5"),
+        Just("#1=[#1+1]"),
+        Just("#<depth>=2"),
+        Just("G1 Z#<depth>"),
+        Just("é\u{1F600}"),
+        Just("/G0 X9"),
+    ];
+    let control = prop_oneof![
+        Just("o1 if [#1 GT 2]"),
+        Just("o1 else"),
+        Just("o1 endif"),
+        Just("o2 repeat [2]"),
+        Just("o2 endrepeat"),
+        Just("o3 sub"),
+        Just("o3 endsub"),
+        Just("o3 call [1]"),
+        Just("o4 while [#1 LT 3]"),
+        Just("o4 endwhile"),
+        Just("M98 P3"),
+    ];
+    prop_oneof![8 => plain, 3 => odd, 1 => control].prop_map(str::to_string)
+}
+
+fn text() -> impl Strategy<Value = String> {
+    let ends = prop_oneof![6 => Just("\n"), 1 => Just("\r\n"), 1 => Just("\r")];
+    proptest::collection::vec((line(), ends), 0..40)
+        .prop_map(|lines| lines.into_iter().map(|(l, e)| l + e).collect::<String>())
+}
+
+#[derive(Clone, Debug)]
+struct Edit {
+    at: usize,
+    len: usize,
+    new: String,
+}
+
+fn edit() -> impl Strategy<Value = Edit> {
+    let new = prop_oneof![
+        3 => text().prop_map(|t| t.chars().take(60).collect()),
+        2 => line(),
+        2 => Just(String::new()),
+        2 => prop_oneof![Just("\n"), Just("\r"), Just("("), Just("1"), Just("G91"), Just("o"), Just("M2\n")].prop_map(str::to_string),
+    ];
+    (0usize..1000, prop_oneof![3 => Just(0usize), 3 => 0usize..4, 1 => 0usize..200], new)
+        .prop_map(|(at, len, new)| Edit { at, len, new })
+}
+
+fn apply(text: &mut String, edit: &Edit) -> std::ops::Range<u32> {
+    let boundary = |mut at: usize| {
+        at = at.min(text.len());
+        while !text.is_char_boundary(at) {
+            at -= 1;
+        }
+        at
+    };
+    let from = boundary(edit.at * (text.len() + 1) / 1000);
+    let to = boundary(from + edit.len).max(from);
+    text.replace_range(from..to, &edit.new);
+    from as u32..to as u32
+}
+
+fn assert_same(text: &str, got: &Check, expected: &Check, what: &str) {
+    let (got_lines, expected_lines) = (shown(text, &got.diagnostics), shown(text, &expected.diagnostics));
+    let extra: Vec<_> = got_lines.iter().filter(|l| !expected_lines.contains(l)).collect();
+    let missing: Vec<_> = expected_lines.iter().filter(|l| !got_lines.contains(l)).collect();
+    assert!(got_lines == expected_lines, "{what}: too much {extra:#?}, missing {missing:#?} in\n{text}");
+    assert!(got == expected, "{what}: labels, help or fixes differ\n{text}");
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: cases(), ..ProptestConfig::default() })]
+
+    #[test]
+    fn chunk_size_is_invisible(text in text(), chunk in 1usize..9) {
+        assert_same(&text, &scratch(&text, chunk), &scratch(&text, 256), "chunks");
+    }
+
+    #[test]
+    fn edits_are_invisible(text in text(), edits in proptest::collection::vec(edit(), 1..8), chunk in prop_oneof![1usize..9, Just(256)]) {
+        let mut expected = text;
+        let mut session = Session::new();
+        let file = session.open("part.ngc", &expected, options(chunk));
+        for edit in &edits {
+            let range = apply(&mut expected, edit);
+            session.edit(file, range, &edit.new);
+            let text = session.text(file);
+            prop_assert_eq!(text.as_deref(), Some(expected.as_str()));
+            assert_same(&expected, &session.check(file), &scratch(&expected, 256), "edits");
+        }
+    }
+
+    #[test]
+    fn a_range_is_a_part_of_the_whole(text in text(), chunk in 1usize..9, from in 0u32..40, len in 1u32..10) {
+        let mut session = Session::new();
+        let file = session.open("part.ngc", &text, options(chunk));
+        // Nothing that only the rest of the file can tell may be in it.
+        let whole = session.check(file).diagnostics;
+        for d in session.check_range(file, from..from + len) {
+            let line = text[..d.primary().1.start as usize].matches('\n').count() as u32;
+            prop_assert!(text.contains('\r') || (from..=from + len).contains(&line));
+            prop_assert!(whole.iter().any(|w| w.code == d.code && w.primary() == d.primary()), "{:?} is not in {:?}", d, whole);
+        }
+    }
+}
+
+/// More cases on request: `GCC_ROBOT_CASES=20000 cargo test`.
+fn cases() -> u32 {
+    std::env::var("GCC_ROBOT_CASES").ok().and_then(|v| v.parse().ok()).unwrap_or(256)
+}
+
+fn program(lines: usize) -> String {
+    let moves: String = (0..lines).map(|i| format!("G1 X{}.5 Y{}\n", i % 97, i % 89)).collect();
+    format!("G21 G90 G17\nS1000 M3\nF100\n{moves}M5\nM2\n")
+}
+
+#[test]
+fn a_keystroke_scans_and_interprets_one_chunk() {
+    let mut text = program(4000);
+    let mut session = Session::new();
+    let file = session.open("part.ngc", &text, options(100));
+    assert_eq!(session.check(file).diagnostics, vec![]);
+    for (from, to, new) in [(".5", ".25", "coordinate"), ("Y", "F200 Y", "feed"), ("G1", "(x)\nG1", "comment line")].map(|(a, b, n)| (a, b, n)) {
+        let before = session.executed();
+        let at = text[20_000..].find(from).unwrap() + 20_000;
+        text.replace_range(at..at + from.len(), to);
+        session.edit(file, at as u32..(at + from.len()) as u32, to);
+        session.check(file);
+        let after = session.executed();
+        assert_eq!(after.scans - before.scans, 1, "{new}");
+        let steps = after.steps - before.steps;
+        // A feed word changes the state of everything below; the rest converges at the next chunk.
+        assert!(steps <= 2 || new == "feed", "{new}: {steps} steps");
+    }
+}
+
+#[test]
+fn a_line_above_moves_diagnostics_and_interprets_nothing_below() {
+    let text = program(2000).replace("X50.5 Y1\n", "X50.5 Y1 G99999\n");
+    let mut session = Session::new();
+    let file = session.open("part.ngc", &text, options(50));
+    let first = session.check(file).diagnostics;
+    assert!(!first.is_empty());
+    let before = session.executed();
+    session.edit(file, 12..12, "(one more line)\n");
+    let second = session.check(file).diagnostics;
+    assert!(session.executed().steps - before.steps <= 1);
+    let moved: Vec<_> = first.iter().map(|d| d.primary().1.start + 16).collect();
+    assert_eq!(second.iter().map(|d| d.primary().1.start).collect::<Vec<_>>(), moved);
+}
+
+#[test]
+fn visible_lines_first() {
+    let text = program(20_000);
+    let mut session = Session::new();
+    let file = session.open("part.ngc", &text, options(100));
+    session.check(file);
+    session.edit(file, 0..0, "G91\n");
+    let before = session.executed();
+    session.check_range(file, 0..500);
+    let steps = session.executed().steps - before.steps;
+    assert!(steps <= 7, "{steps} steps for 500 lines");
+}
+
+#[test]
+fn an_edit_cancels_a_snapshot() {
+    let text = program(200_000);
+    let mut session = Session::new();
+    let file = session.open("part.ngc", &text, options(100));
+    let snapshot = session.snapshot();
+    let worker = std::thread::spawn(move || {
+        let result = snapshot.check(file);
+        drop(snapshot);
+        result
+    });
+    session.edit(file, 0..0, "G91\n");
+    // Either it was done already, or it was cut short; it never blocks the edit.
+    let _ = worker.join().expect("no panic comes out of a snapshot");
+    assert_eq!(session.check(file), scratch(&session.text(file).unwrap(), 1024));
+}
