@@ -142,7 +142,7 @@ impl Formatter<'_> {
         let ending = &self.text[span.end as usize..next];
         let depth = self.nesting(line);
         // `;py,` is a command to LinuxCNC only at the very start of a line.
-        if self.scan.lines[line as usize].faulty || source.starts_with(";py,") {
+        if self.scan.lines[line as usize].faulty || source.starts_with(";py,") || self.name_hides_the_rest(line) {
             self.out.push_str(source);
         } else {
             let body = self.body(line);
@@ -158,6 +158,15 @@ impl Formatter<'_> {
             }
         }
         self.out.push_str(ending);
+    }
+
+    /// A `;` inside a name makes blanks count up to the end of the line.
+    fn name_hides_the_rest(&self, line: u32) -> bool {
+        let structured = |w: &&Word| matches!(w.form, Form::Expr | Form::Setting | Form::Control);
+        self.scan.lines[line as usize].kind == LineKind::Structured
+            && self.scan.words(line).iter().filter(structured).any(|w| {
+                self.text[self.scan.word_span(self.text, line, w).range()].contains(';')
+            })
     }
 
     /// Keeps the stack of open blocks; gives the level at which this line stands.

@@ -313,6 +313,15 @@ proptest! {
 }
 
 #[test]
+fn format_regressions() {
+    for text in ["o<;a call [1] (c) q>;x\n", "#<a ; b> = 3\n", "X#<a;b >Y1 ;c\n", "#<a(b c)d>=3 (e)\n"] {
+        for dialect in every_dialect() {
+            check_format(text, dialect, &FormatOptions::default());
+        }
+    }
+}
+
+#[test]
 fn format_of_the_fixture() {
     let text: String = fixture().map(|(line, _)| format!("{line}\n")).collect();
     for dialect in every_dialect() {
