@@ -665,6 +665,21 @@ impl Contour {
         Ok(())
     }
 
+    /// More cuts than any sound job has: every level once through every pocket. The real controller goes round
+    /// for ever on some unsound contours.
+    fn most_cuts(&self, begin: Zx, step: f64) -> usize {
+        let (low, high) = self.segments.iter().fold((begin.x, begin.x), |(low, high), s| {
+            let radius = match s.shape {
+                Shape::Line => 0.0,
+                Shape::Arc { .. } => s.size(),
+            };
+            let (a, b) = min_max(s.start.x, s.end.x);
+            (min_max(low, a - radius).0, min_max(high, b + radius).1)
+        });
+        let levels = ((high - low) / step).min(1e9) as usize;
+        64 + 16 * (levels + 2) * (self.segments.len() + 2)
+    }
+
     /// G71, G72: removes the stock between the start point and the contour.
     pub(crate) fn rough(&mut self, job: &Roughing, out: &mut Vec<Cut>) -> Trouble {
         self.segments.first_mut().ok_or("Not monotonic")?.start = job.start;
@@ -688,7 +703,7 @@ impl Contour {
             step,
             escape: Zx::new(job.retract, job.retract),
             starts: vec![begin],
-            limit: job.limit,
+            limit: self.most_cuts(begin, step).min(job.limit),
         };
         let done = pockets.cut(job.kind, begin, &mut cuts);
         out.extend(cuts.into_iter().map(|c| self.restored(c)));
