@@ -382,6 +382,42 @@ fn starts_from_a_line() {
     assert_eq!(from(STRUCTURED, 4).unwrap().1, ["from-line/inside-loop"]);
 }
 
+#[test]
+fn rows_of_the_registry() {
+    let mut tried = 0;
+    for row in gr_spec::Code::all().map(gr_spec::Code::def) {
+        if row.options != Some("build --target rs274ngc --to grbl") {
+            continue;
+        }
+        let found = |text: &str| -> Vec<&'static str> {
+            let program = run(text);
+            let out = emit(&program, &options(Language::Grbl), &Texts::new([(FileId(0), text)]));
+            let found = match out {
+                Ok(e) => e.notes,
+                Err(e) => e,
+            };
+            found.iter().map(|d| d.code.def().code).collect()
+        };
+        assert_eq!(found(row.bad.expect("an example")), [row.code]);
+        assert!(found(row.good.expect("an example")).is_empty(), "{}", row.code);
+        tried += 1;
+    }
+    assert_eq!(tried, 2);
+}
+
+#[test]
+fn an_unmeasured_tool_keeps_its_offset_word() {
+    let written = write("G21 G90\nT3 M6\nG43 H3\nG0 Z5\nG49\nM2\n", &options(Language::Linuxcnc));
+    assert!(written.contains("G43 H3\n") && written.contains("G49\n"), "{written}");
+}
+
+#[test]
+fn after_a_probe_only_named_axes_are_written() {
+    let text = "G21 G90 F100\nG0 X0 Y0 Z10\nG38.2 Z-10\nG0 X5\nG0 Z20\nM2\n";
+    let written = write(text, &options(Language::Linuxcnc));
+    assert!(written.contains("G38.2 Z-10 F100\nG0 X5\nZ20\n"), "{written}");
+}
+
 mod oracle {
     use super::*;
     use std::process::{Command, Stdio};
@@ -434,6 +470,54 @@ mod oracle {
     }
 }
 
+/// Every program of the folder `GCC_ROBOT_CORPUS` that our interpreter takes.
+#[test]
+fn corpus() {
+    let Some(folder) = std::env::var_os("GCC_ROBOT_CORPUS") else { return };
+    let mut folders = vec![std::path::PathBuf::from(folder)];
+    let (mut tried, mut bad) = (0, 0);
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+            let path = entry.path();
+            if path.is_dir() {
+                folders.push(path);
+                continue;
+            }
+            if path.extension().is_none_or(|e| e != "ngc") {
+                continue;
+            }
+            let Ok(text) = std::fs::read_to_string(&path) else { continue };
+            let Ok(program) = run_as(&text, "linuxcnc") else { continue };
+            let o = Options { decimals: Some(8), ..options(Language::Linuxcnc) };
+            tried += 1;
+            let written = match emit(&program, &o, &Texts::new([(FileId(0), text.as_str())])) {
+                Ok(e) => e.text,
+                Err(e) => {
+                    println!("{}: {:?} {}", path.display(), e[0].code, e[0].message);
+                    continue;
+                }
+            };
+            let tolerance = Tolerance { length: 1e-6, angle: 1e-6, rate: 1e-3, limit: 3, ..Tolerance::default() };
+            match run_as(&written, "linuxcnc") {
+                Ok(again) => {
+                    let found = diff(&program, &again, &tolerance);
+                    if !found.is_empty() {
+                        bad += 1;
+                        let all: Vec<_> = found.differences.iter().map(|d| (&d.message, d.a, d.b)).collect();
+                        println!("{}: {all:?}", path.display());
+                    }
+                }
+                Err(e) => {
+                    bad += 1;
+                    println!("{}: {}", path.display(), &e[..e.len().min(300)]);
+                }
+            }
+        }
+    }
+    println!("{tried} programs, {bad} differ");
+    assert_eq!(bad, 0);
+}
+
 mod property {
     use super::*;
     use proptest::prelude::*;
@@ -464,7 +548,6 @@ mod property {
     }
 
     proptest! {
-        #![proptest_config(ProptestConfig::with_cases(200))]
         #[test]
         fn written_programs_move_the_same(
             blocks in prop::collection::vec(block(), 1..25),

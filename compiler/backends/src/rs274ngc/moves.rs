@@ -114,7 +114,6 @@ impl Emitter<'_> {
         let goal = view.state.machine(&view.end.axes);
         let from = view.state.machine(&view.start.axes);
         let mut reached = self.frame.machine(&self.at);
-        self.w.begin();
         let feed = if code == "G1" { self.feed_words(view.state, view.start, view.end, view.source) } else { Vec::new() };
         let mut words = Vec::new();
         for i in 0..9 {
@@ -268,10 +267,10 @@ impl Emitter<'_> {
                 self.cannot("a feed per revolution", source);
                 return out;
             }
-            out.push(match mode {
-                FeedMode::PerTime => "G94".to_string(),
-                FeedMode::PerRev => "G95".to_string(),
-                FeedMode::Inverse => "G93".to_string(),
+            self.w.block(match mode {
+                FeedMode::PerTime => "G94",
+                FeedMode::PerRev => "G95",
+                FeedMode::Inverse => "G93",
             });
             self.feed_mode = mode;
             self.feed.clear();

@@ -161,8 +161,9 @@ impl Emitter<'_> {
 
     fn tool_offset(&mut self, offset: &Axes, view: &View<'_, '_>) {
         let words = self.words(view.source);
-        let off = words.is_some_and(|w| w.g(490));
         let zero = offset.iter().all(|v| *v == 0.0);
+        // A tool that has not been measured has a length of 0 too, so for 0 the source decides.
+        let off = words.is_some_and(|w| w.g(490)) || (zero && !words.is_some_and(|w| w.g(430)));
         let named = self.tool_with(offset, view.state.tool);
         let block = match (named, self.options.language) {
             _ if off || (zero && named.is_none()) => "G49".to_string(),
@@ -195,7 +196,7 @@ impl Emitter<'_> {
 
     fn tool_change(&mut self, view: &View<'_, '_>) {
         if self.options.language == Language::Grbl {
-            let what = format!("the change to tool {}", view.state.tool);
+            let what = format!("change to tool {}", view.state.tool);
             self.as_comment(&what, view.source);
             return self.w.block("M0");
         }
@@ -321,6 +322,11 @@ impl Emitter<'_> {
 
     fn path_mode(&mut self, mode: PathMode, view: &View<'_, '_>) {
         let source = view.source;
+        let asked = self.words(source).is_none_or(|w| [610, 611, 640].into_iter().any(|g| w.g(g)));
+        if !asked && !self.linuxcnc() {
+            // LinuxCNC's cycles switch to exact path by themselves; elsewhere that is the cycle's own affair.
+            return;
+        }
         match (mode, self.options.language) {
             (PathMode::ExactStop, Language::Linuxcnc) => self.w.block("G61.1"),
             (PathMode::ExactPath, Language::Linuxcnc | Language::Grbl) => self.w.block("G61"),
