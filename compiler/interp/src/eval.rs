@@ -5,6 +5,7 @@ use gr_canon::{Sink, Version};
 use gr_gcode::{Binary, ExprId, Node, Scan, Unary};
 use gr_spec::{Rs274, code, rs274};
 
+use crate::angle::sin_cos2;
 use crate::{Fault, Interp, Res};
 
 /// Deeper nesting than any line of a controller allows; keeps the stack small on hostile input.
@@ -88,25 +89,30 @@ fn degrees(x: f64) -> f64 {
 /// Sine of an angle in degrees.
 pub(crate) fn sin_degrees(x: f64) -> f64 {
     let (high, low) = radians(x);
-    libm::sin(high) + low * libm::cos(high)
+    sin_cos2(high, low).0
 }
 
 /// Cosine of an angle in degrees.
 pub(crate) fn cos_degrees(x: f64) -> f64 {
     let (high, low) = radians(x);
-    libm::cos(high) - low * libm::sin(high)
+    sin_cos2(high, low).1
 }
 
 fn tan_degrees(x: f64) -> f64 {
     let (high, low) = radians(x);
     let t = libm::tan(high);
     // Where the tangent is huge the linear correction does not hold.
-    if t.abs() < 1e6 { t + low * (1.0 + t * t) } else { sin_degrees(x) / cos_degrees(x) }
+    if t.abs() < 1e6 {
+        t + low * (1.0 + t * t)
+    } else {
+        let (s, c) = sin_cos2(high, low);
+        s / c
+    }
 }
 
 /// Arc tangent of y/x in degrees.
 pub(crate) fn atan_degrees(y: f64, x: f64) -> f64 {
-    degrees(libm::atan2(y, x))
+    degrees(crate::angle::atan2(y, x))
 }
 
 fn domain(rs: Rs274, what: &str, value: f64) -> Box<Fault> {

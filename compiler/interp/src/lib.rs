@@ -16,6 +16,7 @@
 //! Lengths are in program units throughout, as in the controller, so that results agree to the last bit
 //! that matters; the motion IR converts.
 
+mod angle;
 mod arc;
 mod block;
 mod comp;

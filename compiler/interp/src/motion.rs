@@ -6,19 +6,24 @@ use gr_spec::{code, rs274};
 use crate::block::{AXES, AXIS_LETTERS, Group, letters};
 use crate::check::polar_said;
 use crate::exec::not_with_comp;
+use crate::angle::{atan2, hypot, sin_cos};
 use crate::{Fault, Interp, Res};
 
 const POLAR: u32 = letters(b"@^");
 
 /// Turns a point about the origin by an angle in degrees.
 pub(crate) fn rotate(x: &mut f64, y: &mut f64, degrees: f64) {
-    let t = degrees * (std::f64::consts::PI / 180.0);
-    let (c, s) = (libm::cos(t), libm::sin(t));
+    let (s, c) = sin_cos(to_radians(degrees));
     (*x, *y) = (*x * c - *y * s, *x * s + *y * c);
 }
 
 fn to_radians(degrees: f64) -> f64 {
     degrees * (std::f64::consts::PI / 180.0)
+}
+
+fn at_angle(radius: f64, angle: f64) -> (f64, f64) {
+    let (s, c) = sin_cos(angle);
+    (radius * c, radius * s)
 }
 
 /// Length of a straight move as feeds see it: XYZ, or else UVW, or else ABC.
@@ -99,17 +104,17 @@ impl<S: Sink> Interp<'_, S> {
                 if at_origin(x, y) {
                     return Err(polar_said(rs274::RT_POLAR_INCREMENTAL_ORIGIN, "no direction at the origin"));
                 }
-                let t = libm::atan2(y, x);
-                let r = libm::hypot(y, x) + r;
-                (x, y) = (r * libm::cos(t), r * libm::sin(t));
+                let t = atan2(y, x);
+                let r = hypot(y, x) + r;
+                (x, y) = at_angle(r, t);
             }
             if let Some(t) = theta {
                 if at_origin(x, y) {
                     return Err(polar_said(rs274::RT_POLAR_G91_ORIGIN, "no direction at the origin"));
                 }
-                let t = libm::atan2(y, x) + to_radians(t);
-                let r = libm::hypot(y, x);
-                (x, y) = (r * libm::cos(t), r * libm::sin(t));
+                let t = atan2(y, x) + to_radians(t);
+                let r = hypot(y, x);
+                (x, y) = at_angle(r, t);
             }
         } else {
             let (r, t) = match (radius, theta) {
@@ -117,10 +122,10 @@ impl<S: Sink> Interp<'_, S> {
                 (Some(_), None) if at_origin(x, y) => {
                     return Err(polar_said(rs274::RT_POLAR_ANGLE_AT_ORIGIN, "the angle ^ is needed at the origin"));
                 }
-                (Some(r), None) => (r, libm::atan2(y, x)),
-                (None, t) => (libm::hypot(y, x), to_radians(t.unwrap_or(0.0))),
+                (Some(r), None) => (r, atan2(y, x)),
+                (None, t) => (hypot(y, x), to_radians(t.unwrap_or(0.0))),
             };
-            (x, y) = (r * libm::cos(t), r * libm::sin(t));
+            (x, y) = at_angle(r, t);
         }
         (end[0], end[1]) = (x, y);
         Ok(())

@@ -178,14 +178,18 @@ impl<S: Sink> Interp<'_, S> {
         if let Some(value) = self.params.named(self.level(), name) {
             return Some(value);
         }
-        let rest = name.strip_prefix("_ini[")?;
-        let (section, key) = rest.split_once(']')?;
+        self.ini_value(name)
+    }
+
+    /// `_ini[section]key`
+    fn ini_value(&self, name: &str) -> Option<f64> {
+        let (section, key) = name.strip_prefix("_ini[")?.split_once(']')?;
         self.setup.ini.number(section, key)
     }
 
     /// Whether a program can't assign to this name.
     pub(crate) fn is_read_only(&self, name: &str) -> bool {
-        name.starts_with('_') && (self.predefined(name).is_some() || name.starts_with("_ini["))
+        name.starts_with('_') && (self.predefined(name).is_some() || self.ini_value(name).is_some())
     }
 
     /// Names that the controller itself keeps.

@@ -638,11 +638,11 @@ impl<'a, S: Sink> Interp<'a, S> {
             }
         }
         if at.kind == LineKind::Percent && self.m.percent != 0 && !at.deleted {
+            self.emit(Call::Finish);
             if let Some(skip) = &self.skip {
                 let name = self.symbols.name(skip.label.name).to_string();
                 return Err(Fault::new(code::SUB_NOT_FOUND, rs274::RT_O_EOF_SUB).arg(name));
             }
-            self.emit(Call::Finish);
             self.flow = Flow::End(End::Percent);
             return Ok(());
         }
