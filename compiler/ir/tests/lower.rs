@@ -328,3 +328,56 @@ fn pieces_join_to_the_whole() {
     first.append(&rest.finish());
     assert_eq!(first, whole);
 }
+
+mod shapes {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// A path of lines and half circles; `cut` gives every piece a middle stop.
+    fn path(corners: &[(f64, f64, bool)], cut: Option<f64>, bump: f64) -> Program {
+        let mut calls = vec![Call::SetFeedRate(100.0), Call::StraightTraverse(at(0.0, 0.0, 0.0))];
+        let mut here = (0.0, 0.0);
+        for &(x, y, round) in corners {
+            let center = ((here.0 + x) / 2.0, (here.1 + y) / 2.0);
+            let side = (center.0 - (y - here.1) / 2.0, center.1 + (x - here.0) / 2.0);
+            match (round, cut) {
+                (true, Some(_)) => {
+                    calls.push(arc(side.0, side.1, center.0, center.1, -1, 0.0));
+                    calls.push(arc(x, y, center.0, center.1, -1, 0.0));
+                }
+                (true, None) => calls.push(arc(x, y, center.0, center.1, -1, 0.0)),
+                (false, cut) => {
+                    if let Some(t) = cut {
+                        let there = (here.0 + (x - here.0) * t, here.1 + (y - here.1) * t);
+                        calls.push(Call::StraightFeed(at(there.0, there.1, bump)));
+                    }
+                    calls.push(Call::StraightFeed(at(x, y, 0.0)));
+                }
+            }
+            here = (x, y);
+        }
+        lower(&calls)
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(60))]
+
+        #[test]
+        fn cutting_moves_changes_nothing(
+            corners in prop::collection::vec((-50.0..50.0f64, -50.0..50.0f64, any::<bool>()), 1..8),
+            t in 0.1..0.9f64,
+            bump in 0.01..1.0f64,
+        ) {
+            let tolerance = Tolerance { length: 1e-4, ..Tolerance::default() };
+            let whole = path(&corners, None, 0.0);
+            let same = diff(&whole, &path(&corners, Some(t), 0.0), &tolerance);
+            prop_assert!(same.is_empty(), "{:?}", same);
+            if corners.iter().any(|c| !c.2) {
+                let other = diff(&whole, &path(&corners, Some(t), bump), &tolerance);
+                prop_assert!(other.differs(Aspect::Path));
+                let turned = diff(&path(&corners, Some(t), bump), &whole, &tolerance);
+                prop_assert!(turned.differs(Aspect::Path));
+            }
+        }
+    }
+}

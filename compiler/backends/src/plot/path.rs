@@ -49,6 +49,9 @@ impl Class {
     }
 }
 
+/// More points than this are not kept: beyond it curves become their chords.
+const MOST_POINTS: usize = 30_000_000;
+
 /// Points joined by lines; one run has one class.
 pub struct Path {
     /// Class and index of the first point of each run.
@@ -134,7 +137,8 @@ impl Path {
             self.points.push(single(start));
             self.extent.add(start);
         }
-        flatten(&view.op, view.start, view.end, tolerance, |p| {
+        let op = if self.points.len() < MOST_POINTS { view.op } else { Op::Linear };
+        flatten(&op, view.start, view.end, tolerance, |p| {
             let p = common.place(p);
             self.extent.add(p);
             self.points.push(single(p));
