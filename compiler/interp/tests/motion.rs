@@ -140,7 +140,7 @@ const FAULTS: &[(&str, &str)] = &[
     ),
     ("G41.1 D8\nG1 X20\nG3 X23 Y3 J3", "Tool radius not less than arc radius with comp"),
     (
-        "G42.1 D10\nG1 X20\nX21 Y3\nX20 Y20\nG40",
+        "G41.1 D10\nG1 X20\nX21 Y3\nX20 Y20\nG40",
         "Straight feed in concave corner cannot be reached by the tool without gouging",
     ),
     (
@@ -226,7 +226,28 @@ fn doubts() {
 /// The real controller goes round for ever here.
 #[test]
 fn a_roughing_contour_that_never_ends_is_refused() {
-    let text = "G21 G18 F100\no1 sub\nG1 X10 Z0\nZ-14\nX3\nX7 Z-22\no1 endsub\nG71.1 Q1 X15 Z0 D0.04 I0.5 R1\nM2\n";
+    let text = "G21 G18 F100\no1 sub\nG1 X10 Z0\nX10 Z-14\nX3\nX7 Z-22\no1 endsub\nG71.2 Q1 X15 Z0 D0.04 I0.5 R1\nM2\n";
     let (_, outcome) = run(text);
     assert_eq!(errors(&outcome), ["G7X error: too many passes"]);
+}
+
+/// The registry's examples: the bad one raises its code alone, the good one nothing.
+#[test]
+fn examples_of_the_registry() {
+    let mine = |code: &str| code == "E0203" || ("E0260"..="E0279").contains(&code);
+    let mut wrong = Vec::new();
+    for code in gr_spec::Code::all().filter(|c| mine(c.def().code)) {
+        let def = code.def();
+        let found = |program: Option<&str>| {
+            let (_, outcome) = run(program.expect("both examples are there"));
+            let mut found: Vec<_> = outcome.findings.iter().map(|f| f.fault.code.def().slug).collect();
+            found.dedup();
+            found
+        };
+        let (bad, good) = (found(def.bad), found(def.good));
+        if bad != [def.slug] || !good.is_empty() {
+            wrong.push(format!("{}: bad {bad:?}, good {good:?}", def.code));
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong:#?}");
 }
