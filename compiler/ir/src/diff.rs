@@ -245,7 +245,8 @@ impl Event {
     }
 }
 
-/// What matters of an operation.
+/// What matters of an operation. One at a time is held, so its size does not matter.
+#[allow(clippy::large_enum_variant)]
 #[derive(Clone, Copy, Debug)]
 enum Item {
     Move { conditions: Conditions, end: Axes, middle: Option<[f64; 3]> },
@@ -330,7 +331,7 @@ fn same_item(
                 (None, None) => 0.0,
                 _ => f64::INFINITY,
             });
-            if !(far <= tolerance.length) || turned(end, e) > tolerance.angle || c.class != d.class {
+            if far.is_nan() || far > tolerance.length || turned(end, e) > tolerance.angle || c.class != d.class {
                 return false;
             }
             out.deviation = out.deviation.max(far);

@@ -53,7 +53,7 @@ fn short(out: &mut String, v: f32) {
         }
     }
     out.extend(digits[at..].iter().map(|d| char::from(*d)));
-    if tenths % 10 != 0 {
+    if !tenths.is_multiple_of(10) {
         out.push('.');
         out.push(char::from(b'0' + (tenths % 10) as u8));
     }

@@ -7,7 +7,8 @@ use super::{
 use crate::Cursor;
 use crate::geometry::flatten;
 
-/// A chord or an event.
+/// A chord or an event. One at a time is held, so its size does not matter.
+#[allow(clippy::large_enum_variant)]
 #[derive(Clone, Copy, Debug)]
 enum Piece {
     Chord(Conditions, Axes),
@@ -134,7 +135,7 @@ fn side_by_side<'p>(
     let share = nearest(&long.here, end, corner);
     let there = between(&long.here, end, share);
     let gap = distance(&there, corner);
-    if !(gap <= tolerance.length) || turned(&there, corner) > tolerance.angle {
+    if gap.is_nan() || gap > tolerance.length || turned(&there, corner) > tolerance.angle {
         return false;
     }
     out.deviation = out.deviation.max(gap);
