@@ -436,7 +436,7 @@ impl<S: Sink> Interp<'_, S> {
                 .arg(code_name(hole.g))
                 .arg(plane_name(hole.plane)));
         };
-        let (feed_override, speed_override) = (self.m.feed_override, self.m.speed_override[0]);
+        let (feed_held, speed_held) = (self.world.feed_held != 0, self.world.speed_held != 0);
         self.emit(Call::DisableFeedOverride);
         self.emit(Call::DisableSpeedOverride(hole.spindle));
         let back = hole.g == 740;
@@ -450,10 +450,10 @@ impl<S: Sink> Interp<'_, S> {
                 self.emit(Call::Dwell(hole.dwell));
             }
         }
-        if feed_override != 0 {
+        if !feed_held {
             self.emit(Call::EnableFeedOverride);
         }
-        if speed_override != 0 {
+        if !speed_held {
             self.emit(Call::EnableSpeedOverride(hole.spindle));
         }
         Ok(())

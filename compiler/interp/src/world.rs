@@ -24,7 +24,11 @@ pub struct World {
     pub naivecam: f64,
     units: u8,
     plane: u8,
-    pad: [u8; 6],
+    /// The feed override was switched off last, not on.
+    pub feed_held: u8,
+    /// The speed override was switched off last, not on (of whichever spindle).
+    pub speed_held: u8,
+    pad: [u8; 4],
 }
 
 impl World {
@@ -79,6 +83,10 @@ impl World {
             Call::SetMotionControlMode(mode) => {
                 self.tolerance = if let PathMode::Continuous(t) = mode { *t } else { 0.0 };
             }
+            Call::EnableFeedOverride => self.feed_held = 0,
+            Call::DisableFeedOverride => self.feed_held = 1,
+            Call::EnableSpeedOverride(_) => self.speed_held = 0,
+            Call::DisableSpeedOverride(_) => self.speed_held = 1,
             Call::SetNaivecamTolerance(t) => self.naivecam = *t,
             Call::UseToolLengthOffset(offset) => self.tool_offset = *offset,
             _ => {}
