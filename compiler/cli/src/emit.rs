@@ -62,7 +62,6 @@ pub struct TargetOptions {
     pub reference: Option<Reference>,
 }
 
-#[expect(missing_docs, reason = "the help texts say it")]
 #[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
 pub enum ArcsArg {
     /// I J K from the start point
@@ -75,7 +74,6 @@ pub enum ArcsArg {
     Lines,
 }
 
-#[expect(missing_docs, reason = "the help texts say it")]
 #[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
 pub enum PlaneArg {
     /// XY only
@@ -84,7 +82,6 @@ pub enum PlaneArg {
     All,
 }
 
-#[expect(missing_docs, reason = "the help texts say it")]
 #[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
 pub enum RoundArg {
     /// To the nearest
@@ -93,7 +90,6 @@ pub enum RoundArg {
     Truncate,
 }
 
-#[expect(missing_docs, reason = "the help texts say it")]
 #[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
 pub enum Reference {
     /// The joint-space compiler for a planar arm, UFMG 2008
@@ -128,14 +124,22 @@ pub struct Goal<'a> {
     pub options: &'a TargetOptions,
     /// Machine, if one was chosen.
     pub machine: Option<&'a Machine>,
+    /// Begin at this line (from 1), with this height of approach.
+    pub from_line: Option<(u32, Option<f64>)>,
 }
 
 /// Makes a target of a checked program. Usage errors come back as text.
 pub fn build(unit: &Unit, goal: &Goal<'_>) -> Result<Built, String> {
     if goal.target == "canon" {
+        if goal.from_line.is_some() {
+            return Err("--from-line goes with targets that are made of motion, not with canon".into());
+        }
         return Ok(canon(unit));
     }
-    let motion = motion(unit, goal.machine);
+    let mut motion = motion(unit, goal.machine);
+    if let Some((line, safe_z)) = goal.from_line {
+        restart(&mut motion, line, safe_z);
+    }
     if motion.found.iter().any(|d| d.severity == gr_text::Severity::Error) {
         return Ok(built(motion, Vec::new(), Vec::new()));
     }
@@ -146,6 +150,8 @@ pub fn build(unit: &Unit, goal: &Goal<'_>) -> Result<Built, String> {
         "joint-gcode" => joints(&motion, goal)?,
         "json" => dumped(|out| gr_backends::dump::json(&motion.program, out)),
         "csv" => dumped(|out| gr_backends::dump::csv(&motion.program, &gr_backends::dump::CsvOptions::default(), out)),
+        "svg" | "png" | "html" => one_picture(&motion.program, goal.target, &name)?,
+        "sheet" | "sheet-json" | "sheet-html" => Ok((one(sheet(&motion.program, goal.target, &name)), Vec::new())),
         other => return Err(format!("the target {other} can't be made by this version")),
     };
     Ok(match made {
@@ -158,6 +164,48 @@ fn built(motion: Motion, artifacts: Vec<Artifact>, more: Vec<Diagnostic>) -> Bui
     let mut found = motion.found;
     found.extend(more);
     Built { artifacts, found, sources: motion.sources, subs: motion.subs }
+}
+
+/// Lets the program begin later.
+fn restart(motion: &mut Motion, line: u32, safe_z: Option<f64>) {
+    let options = gr_backends::from_line::Options { safe_z };
+    let made = {
+        let texts = texts(&motion.sources);
+        gr_backends::from_line::from_line(&motion.program, FileId(0), line, &options, &texts)
+    };
+    match made {
+        Ok(restart) => {
+            motion.program = restart.program;
+            motion.found.extend(restart.notes);
+        }
+        Err(found) => motion.found.extend(found),
+    }
+}
+
+fn one_picture(program: &Program, kind: &str, name: &str) -> Result<Made, String> {
+    let options = gr_backends::plot::Options { title: name.to_string(), ..gr_backends::plot::Options::default() };
+    Ok(Ok((one(picture(program, kind, &options)?), Vec::new())))
+}
+
+/// A picture of this kind: svg, png or html.
+pub fn picture(program: &Program, kind: &str, options: &gr_backends::plot::Options) -> Result<Vec<u8>, String> {
+    Ok(match kind {
+        "png" => gr_backends::plot::png(program, options)?,
+        "svg" => gr_backends::plot::svg(program, options).into_bytes(),
+        "html" => gr_backends::plot::html(program, options).into_bytes(),
+        other => return Err(format!("pictures are .svg, .png or .html, not .{other}")),
+    })
+}
+
+fn sheet(program: &Program, kind: &str, name: &str) -> Vec<u8> {
+    let options = gr_backends::sheet::Options { title: name.to_string(), ..gr_backends::sheet::Options::default() };
+    let sheet = gr_backends::sheet::sheet(program, &options);
+    let text = match kind {
+        "sheet-json" => sheet.json(),
+        "sheet-html" => sheet.html(),
+        _ => sheet.text(),
+    };
+    text.into_bytes()
 }
 
 fn one(bytes: Vec<u8>) -> Vec<Artifact> {

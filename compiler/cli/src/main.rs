@@ -37,6 +37,7 @@ fn main() -> ExitCode {
     }
 }
 
+/// Whether the program was called under the name of the real command.
 pub fn called_as_rs274(name: Option<&std::ffi::OsString>) -> bool {
     name.is_some_and(|n| std::path::Path::new(n).file_stem().is_some_and(|s| s == "rs274"))
 }
@@ -46,6 +47,9 @@ fn run(cli: Cli) -> ExitCode {
     match cli.command {
         Command::Check(args) => commands::check::run(global, &args).into(),
         Command::Build(args) => commands::build::run(global, &args).into(),
+        Command::Fmt(args) => commands::fmt::run(global, &args).into(),
+        Command::Renumber(args) => commands::fmt::renumber(global, &args).into(),
+        Command::Preview(args) => commands::preview::run(global, &args).into(),
         Command::Diff(args) => commands::diff::run(global, &args).into(),
         Command::Verify(args) => commands::diff::verify(global, &args).into(),
         Command::Explain(args) => commands::explain::run(&args).into(),

@@ -54,6 +54,12 @@ pub enum Command {
     Build(Box<BuildArgs>),
     /// Explain a diagnostic (E0203), a G-code (G83) or a word letter
     Explain(ExplainArgs),
+    /// Format programs: case, blanks, indentation; comments stay
+    Fmt(FmtArgs),
+    /// Give lines new N numbers
+    Renumber(RenumberArgs),
+    /// Draw the path of the tool
+    Preview(PreviewArgs),
     /// Compare two programs as motion: paths, tools, feeds, time
     Diff(DiffArgs),
     /// Prove that a translation moves the machine as its source does
@@ -125,7 +131,6 @@ pub struct LintArgs {
     pub deny: Vec<String>,
 }
 
-#[expect(missing_docs, reason = "the help texts say it")]
 #[derive(Args, Debug)]
 pub struct CheckArgs {
     /// Programs and folders; `-` is standard input [default: the project's sources]
@@ -140,7 +145,6 @@ pub struct CheckArgs {
     pub jobs: Option<std::num::NonZeroUsize>,
 }
 
-#[expect(missing_docs, reason = "the help texts say it")]
 #[derive(Args, Debug, Clone)]
 pub struct BuildArgs {
     /// Programs [default: sources and targets of gcc-robot.toml]
@@ -164,9 +168,116 @@ pub struct BuildArgs {
     pub lints: LintArgs,
     #[command(flatten)]
     pub options: crate::emit::TargetOptions,
+    /// Begin at this line of the program: what was in force there is set, and the tool approaches from above
+    #[arg(long, value_name = "LINE")]
+    pub from_line: Option<u32>,
+    /// Height of the approach for --from-line, mm in the work frame [default: highest point of the program]
+    #[arg(long, value_name = "MM", requires = "from_line")]
+    pub safe_z: Option<f64>,
 }
 
-#[expect(missing_docs, reason = "the help texts say it")]
+#[derive(Args, Debug)]
+pub struct FmtArgs {
+    /// Programs and folders; `-` reads standard input and writes standard output
+    #[arg(required = true, value_name = "PATH")]
+    pub paths: Vec<PathBuf>,
+    /// Write nothing; say which files would change (exit status 1 if any)
+    #[arg(long)]
+    pub check: bool,
+    /// Dialect [default: by extension]
+    #[arg(long, value_name = "NAME")]
+    pub dialect: Option<String>,
+    #[command(flatten)]
+    pub style: StyleArgs,
+}
+
+/// How programs are laid out.
+#[derive(Args, Debug, Clone)]
+pub struct StyleArgs {
+    /// Case of words and functions
+    #[arg(long, value_enum, default_value = "upper", value_name = "CASE")]
+    pub case: CaseArg,
+    /// Case of O-words and their keywords
+    #[arg(long, value_enum, default_value = "lower", value_name = "CASE")]
+    pub o_word_case: CaseArg,
+    /// No blanks between words
+    #[arg(long)]
+    pub no_spaces: bool,
+    /// Blanks per level of nesting
+    #[arg(long, default_value_t = 2, value_name = "N")]
+    pub indent: usize,
+    /// Zeros in front of numbers
+    #[arg(long, value_enum, default_value = "keep", value_name = "HOW")]
+    pub leading_zeros: ZerosArg,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
+pub enum CaseArg {
+    Keep,
+    Upper,
+    Lower,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
+pub enum ZerosArg {
+    Keep,
+    Strip,
+    Pad,
+}
+
+#[derive(Args, Debug)]
+pub struct RenumberArgs {
+    /// Program; `-` is standard input
+    pub file: PathBuf,
+    /// First number
+    #[arg(long, default_value_t = 10)]
+    pub start: u32,
+    /// Distance of numbers
+    #[arg(long, default_value_t = 10)]
+    pub step: u32,
+    /// Number lines that have no number yet, too
+    #[arg(long)]
+    pub all: bool,
+    /// Where the result goes; the program's own name is allowed [default: standard output]
+    #[arg(short, long, value_name = "PATH")]
+    pub output: Option<PathBuf>,
+    /// Dialect [default: by extension]
+    #[arg(long, value_name = "NAME")]
+    pub dialect: Option<String>,
+}
+
+#[derive(Args, Debug)]
+pub struct PreviewArgs {
+    /// Program
+    pub file: PathBuf,
+    /// Picture: .svg, .png or .html
+    #[arg(short, long, value_name = "PATH")]
+    pub output: PathBuf,
+    /// What is shown
+    #[arg(long, value_enum, default_value = "all")]
+    pub view: ViewArg,
+    /// Width in pixels
+    #[arg(long, default_value_t = 1400)]
+    pub width: u32,
+    /// Height in pixels
+    #[arg(long, default_value_t = 900)]
+    pub height: u32,
+    /// Leave out rapids
+    #[arg(long)]
+    pub no_rapids: bool,
+    #[command(flatten)]
+    pub setup: SetupArgs,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
+pub enum ViewArg {
+    All,
+    Isometric,
+    Top,
+    Front,
+    Right,
+}
+
 #[derive(Args, Debug)]
 pub struct DiffArgs {
     /// First program
@@ -192,7 +303,6 @@ pub struct DiffArgs {
     pub setup: SetupArgs,
 }
 
-#[expect(missing_docs, reason = "the help texts say it")]
 #[derive(Args, Debug)]
 pub struct VerifyArgs {
     /// Program
@@ -203,7 +313,6 @@ pub struct VerifyArgs {
     pub options: crate::emit::TargetOptions,
 }
 
-#[expect(missing_docs, reason = "the help texts say it")]
 #[derive(Args, Debug)]
 pub struct ExplainArgs {
     /// E0203, arc/radius-mismatch, G83, M6, F …
@@ -217,14 +326,12 @@ pub struct ExplainArgs {
     pub list: bool,
 }
 
-#[expect(missing_docs, reason = "the help texts say it")]
 #[derive(Args, Debug)]
 pub struct TargetArgs {
     #[command(subcommand)]
     pub action: TargetAction,
 }
 
-#[expect(missing_docs, reason = "the help texts say it")]
 #[derive(Subcommand, Debug)]
 pub enum TargetAction {
     /// List all targets
@@ -233,14 +340,12 @@ pub enum TargetAction {
     Show { id: String },
 }
 
-#[expect(missing_docs, reason = "the help texts say it")]
 #[derive(Args, Debug)]
 pub struct MachineArgs {
     #[command(subcommand)]
     pub action: MachineAction,
 }
 
-#[expect(missing_docs, reason = "the help texts say it")]
 #[derive(Subcommand, Debug)]
 pub enum MachineAction {
     /// List the machines that come with the program
@@ -261,7 +366,6 @@ pub enum MachineAction {
     },
 }
 
-#[expect(missing_docs, reason = "the help texts say it")]
 #[derive(Args, Debug)]
 pub struct InitArgs {
     /// Folder of the project
@@ -272,7 +376,6 @@ pub struct InitArgs {
     pub force: bool,
 }
 
-#[expect(missing_docs, reason = "the help texts say it")]
 #[derive(Args, Debug)]
 pub struct CompletionsArgs {
     /// Shell

@@ -21,11 +21,12 @@ pub struct Project {
     pub file: ProjectFile,
 }
 
-#[expect(missing_docs, reason = "spec/config describes the keys")]
 #[derive(Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ProjectFile {
-    pub schema: i64,
+    /// Version of the format; checked before anything else.
+    #[serde(rename = "schema")]
+    pub _schema: i64,
     #[serde(default)]
     pub project: Section,
     #[serde(default)]
@@ -36,7 +37,6 @@ pub struct ProjectFile {
     pub targets: Vec<Target>,
 }
 
-#[expect(missing_docs, reason = "spec/config describes the keys")]
 #[derive(Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case", default)]
 pub struct Section {
@@ -52,7 +52,6 @@ pub struct Section {
     pub reference: Option<String>,
 }
 
-#[expect(missing_docs, reason = "spec/config describes the keys")]
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DialectRule {
@@ -60,7 +59,6 @@ pub struct DialectRule {
     pub dialect: String,
 }
 
-#[expect(missing_docs, reason = "spec/config describes the keys")]
 #[derive(Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Lints {
@@ -70,7 +68,6 @@ pub struct Lints {
     pub deny: Vec<String>,
 }
 
-#[expect(missing_docs, reason = "spec/config describes the keys")]
 #[derive(Debug, Deserialize)]
 pub struct Target {
     pub target: String,

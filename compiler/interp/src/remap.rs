@@ -295,7 +295,7 @@ impl<S: Sink> Interp<'_, S> {
         }
     }
 
-    fn remap_words(&self, remap: &Remap) -> Res<Vec<(char, f64)>> {
+    fn remap_words(&mut self, remap: &Remap) -> Res<Vec<(char, f64)>> {
         let b = &self.block;
         let mut out = Vec::new();
         let mut missing = Vec::new();
@@ -330,6 +330,9 @@ impl<S: Sink> Interp<'_, S> {
             return Ok(out);
         }
         let said = format!("{} lacks words it needs:{tail}", remap.name);
+        // The controller shows the call that it put in place of the block.
+        self.reading.text = format!("O <{}> call ", remap.sub).into();
+        (self.reading.begin, self.reading.start, self.reading.end) = (0, 0, self.reading.text.len() as u32);
         Err(Fault::new(code::REMAP_WORDS, rs274::RT_REMAP_MISSING).arg(&remap.name).arg(tail).named(said))
     }
 

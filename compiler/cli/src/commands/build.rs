@@ -202,7 +202,7 @@ impl<'a> Round<'a> {
             }
         };
         let progress = Progress::new(self.global.quiet, format!("building {} ({})", job.source.display(), job.target.id));
-        let goal = Goal { target: job.target.id, options: &job.options, machine };
+        let goal = Goal { target: job.target.id, options: &job.options, machine, from_line: self.args.from_line.map(|l| (l, self.args.safe_z)) };
         let made = build(&unit, &goal);
         drop(progress);
         match made {

@@ -135,7 +135,7 @@ pub fn verify(global: &Global, args: &VerifyArgs) -> Exit {
             return if checked.unreadable { Exit::Io } else { Exit::Findings };
         }
     };
-    let goal = Goal { target: "rs274ngc", options: &args.options, machine: None };
+    let goal = Goal { target: "rs274ngc", options: &args.options, machine: None, from_line: None };
     let built = match build(&unit, &goal) {
         Ok(built) => built,
         Err(text) => {

@@ -5,8 +5,10 @@ pub mod check;
 pub mod completions;
 pub mod diff;
 pub mod explain;
+pub mod fmt;
 pub mod init;
 pub mod machine;
+pub mod preview;
 pub mod rs274;
 pub mod target;
 

@@ -81,7 +81,7 @@ fn report(
     for note in notes {
         builder.add_note(printable(note));
     }
-    for help in &d.help {
+    if let Some(help) = &d.help {
         builder.add_help(printable(help));
     }
     for fix in &d.fixes {
@@ -167,7 +167,7 @@ fn plain(out: &mut Vec<u8>, d: &Diagnostic, notes: &[String], color: bool) {
     for note in notes {
         let _ = writeln!(out, "  Note: {}", printable(note));
     }
-    for help in &d.help {
+    if let Some(help) = &d.help {
         let _ = writeln!(out, "  Help: {}", printable(help));
     }
     out.push(b'\n');

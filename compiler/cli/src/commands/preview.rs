@@ -1,0 +1,69 @@
+//! `gcc-robot preview part.ngc -o part.svg`
+
+use std::path::Path;
+
+use gr_backends::plot::{Options, Show};
+use gr_text::{Severity, code};
+
+use super::check::{Checked, show};
+use crate::emit::{picture, stem};
+use crate::exit::Exit;
+use crate::options::{Global, LintArgs, PreviewArgs, ViewArg};
+use crate::output::write_all;
+use crate::pipeline::{motion, open};
+use crate::progress::Progress;
+use crate::setup::station;
+use crate::sources::{Sources, reason};
+
+pub fn run(global: &Global, args: &PreviewArgs) -> Exit {
+    let mut renderer = global.renderer(false);
+    let mut sources = Sources::default();
+    let Some(station) = station(&args.setup, &LintArgs::default(), Path::new("."), &mut sources, &mut renderer) else {
+        renderer.finish(false);
+        return Exit::Findings;
+    };
+    let progress = Progress::new(global.quiet, format!("drawing {}", args.file.display()));
+    let unit = match open(&args.file, &station) {
+        Ok((unit, _)) => unit,
+        Err(checked) => {
+            drop(progress);
+            show(&mut renderer, &checked);
+            renderer.finish(false);
+            return if checked.unreadable { Exit::Io } else { Exit::Findings };
+        }
+    };
+    let motion = motion(&unit, None);
+    let bad = motion.found.iter().any(|d| d.severity == Severity::Error);
+    let kind = args.output.extension().map_or(String::new(), |e| e.to_string_lossy().to_ascii_lowercase());
+    let made = picture(&motion.program, &kind, &options(args));
+    drop(progress);
+    show(&mut renderer, &Checked { sources: motion.sources, found: motion.found, more: 0, unreadable: false });
+    let exit = match made {
+        _ if bad => Exit::Findings,
+        Err(text) => {
+            eprintln!("{text}");
+            Exit::Usage
+        }
+        Ok(bytes) => match write_all(&[(args.output.clone(), bytes)]) {
+            Ok(()) => Exit::Ok,
+            Err((path, e)) => {
+                let name = path.display().to_string();
+                super::complain(&mut renderer, &mut sources, &name, code::FILE_UNWRITABLE, &[name.clone(), reason(&e)]);
+                Exit::Io
+            }
+        },
+    };
+    renderer.finish(false);
+    exit
+}
+
+fn options(args: &PreviewArgs) -> Options {
+    let show = match args.view {
+        ViewArg::All => Show::All,
+        ViewArg::Isometric => Show::Isometric,
+        ViewArg::Top => Show::Top,
+        ViewArg::Front => Show::Front,
+        ViewArg::Right => Show::Right,
+    };
+    Options { show, width: args.width, height: args.height, title: stem(&args.file), rapids: !args.no_rapids }
+}
