@@ -170,8 +170,12 @@ impl Emitter<'_> {
         let (start, end) = (Pose::at(self.at), Pose::at(c.end));
         let read = Sweep::new(&start, &end, &arc);
         let own = meant.sweep.mismatch();
-        let room = if self.linuxcnc() { RADIUS_ROOM.max(own * 1.0001 + 1e-6) } else { RADIUS_ROOM };
-        if read.mismatch() > room {
+        let off = read.mismatch();
+        // A spiral that LinuxCNC took in the source it takes again, by its rule for the unit that is written.
+        let (small, radius) = (0.00282 * if self.w.unit == 1.0 { 10.0 } else { 25.4 }, read.shape.radius);
+        let accepted = off <= small || (off <= 0.000_99 * radius && off <= 99.0 * small);
+        let spiral = self.linuxcnc() && off <= own * 1.0001 + 1e-6 && accepted;
+        if off > RADIUS_ROOM && !spiral {
             return false;
         }
         if (read.angle() - meant.angle()).abs() > 0.5 {

@@ -3,7 +3,7 @@
 use super::emit::Emitter;
 use super::write::AXES;
 use super::Language;
-use gr_ir::{Axes, FeedMode, Op, Pose, Source, State, View};
+use gr_ir::{Axes, FeedMode, Op, Plane, Pose, Source, State, View};
 
 impl Emitter<'_> {
     /// Whether the language has these axes; an error if not.
@@ -295,9 +295,16 @@ impl Emitter<'_> {
         let count = points.len() / 3;
         let point = |i: usize| [points[3 * i], points[3 * i + 1], points[3 * i + 2]];
         let plain = (0..count).all(|i| point(i)[2] == 1.0);
-        let fits = plain && count == order as usize && (order == 3 || order == 4);
-        if !fits || !self.linuxcnc() {
+        let bezier = plain && count == order as usize && (order == 3 || order == 4);
+        if !self.linuxcnc() || count < order as usize || order < 3 {
             return self.spline_as_lines(view);
+        }
+        if self.plane != Plane::Xy {
+            self.w.block("G17");
+            self.plane = Plane::Xy;
+        }
+        if !bezier {
+            return self.weighted_spline(view, order, points);
         }
         let from = [self.at[0], self.at[1]];
         let offset = |a: [f64; 3], b: [f64; 2]| [a[0] - b[0], a[1] - b[1]];
@@ -316,6 +323,31 @@ impl Emitter<'_> {
         }
         line.extend(self.feed_words(view.state, view.start, view.end, view.source));
         self.w.block(&line.join(" "));
+        self.motion = None;
+    }
+
+    /// G5.2 … G5.3: control points with weights; the first is where the tool is.
+    fn weighted_spline(&mut self, view: &View<'_, '_>, order: u32, points: &[f64]) {
+        let feed = self.feed_words(view.state, view.start, view.end, view.source);
+        let mut head = vec!["G5.2".to_string()];
+        if order > 3 {
+            head.push(format!("L{order}"));
+        }
+        head.extend(feed);
+        if points[2] != 1.0 {
+            head.push(format!("P{}", self.w.number(points[2], 9)));
+            self.w.block(&head.join(" "));
+            head.clear();
+        }
+        for p in points[3..].chunks_exact(3) {
+            let ((x, said_x), (y, said_y)) = (self.w.axis(0, p[0]), self.w.axis(1, p[1]));
+            head.extend([format!("X{x}"), format!("Y{y}"), format!("P{}", self.w.number(p[2], 9))]);
+            self.w.block(&head.join(" "));
+            head.clear();
+            self.set(0, said_x);
+            self.set(1, said_y);
+        }
+        self.w.block("G5.3");
         self.motion = None;
     }
 
