@@ -235,7 +235,7 @@ pub struct Report {
 
 /// Measures a program.
 pub fn report(program: &Program, rates: &Rates) -> Report {
-    let mut run = Run { out: Report::default(), tool: 0, open: Vec::new(), cycle: None, offset: None };
+    let mut run = Run { known: Known::default(), out: Report::default(), tool: 0, open: Vec::new(), cycle: None, offset: None };
     run.select(program.start_state().tool, Source::default());
     let mut cursor = program.cursor();
     while let Some(view) = cursor.next() {
@@ -247,7 +247,43 @@ pub fn report(program: &Program, rates: &Rates) -> Report {
     out
 }
 
+/// Which coordinates of the tool the program has said. Before its first moves, and along Z after a tool offset
+/// has changed, the tool stands where the operator or the changer left it: rapids from there are no part of
+/// the path.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct Known([bool; 3]);
+
+impl Known {
+    /// Where a move may be taken to begin: none when even its end is not known yet. Call for every operation.
+    pub fn start(&mut self, view: &View<'_, '_>) -> Option<crate::Pose> {
+        let (from, to) = (&view.start.axes, &view.end.axes);
+        if matches!(view.op, Op::ToolOffset(_)) {
+            for i in 0..3 {
+                self.0[i] &= from[i] == to[i];
+            }
+        }
+        if !view.op.moves() {
+            return Some(*view.start);
+        }
+        let before = self.0;
+        for i in 0..3 {
+            self.0[i] |= from[i] != to[i] || view.op != Op::Rapid;
+        }
+        if view.op != Op::Rapid {
+            return Some(*view.start);
+        }
+        let mut start = *view.start;
+        for i in 0..3 {
+            if !before[i] {
+                start.axes[i] = to[i];
+            }
+        }
+        (0..3).all(|i| self.0[i] || to[i] == 0.0).then_some(start)
+    }
+}
+
 struct Run {
+    known: Known,
     out: Report,
     tool: usize,
     open: Vec<usize>,
@@ -280,8 +316,8 @@ impl Run {
         if let Some(i) = self.cycle {
             self.out.cycles[i].totals.add(&t);
         }
-        if t.moves > 0 {
-            self.moved(view);
+        if let (Some(start), true) = (self.known.start(view), t.moves > 0) {
+            self.moved(view, &start);
         }
         if let Op::Close(marker) = view.op {
             self.close(marker);
@@ -320,11 +356,8 @@ impl Run {
         }
     }
 
-    fn moved(&mut self, view: &View<'_, '_>) {
+    fn moved(&mut self, view: &View<'_, '_>, start: &crate::Pose) {
         let mut extent = Extent::default();
-        // Where the tool stands before its first move is not the program's to say.
-        let first = self.offset.is_none() && view.op == Op::Rapid;
-        let start = if first { view.end } else { view.start };
         extent.add_move(&view.op, start, view.end);
         self.out.all.join(&extent);
         self.machine_extent(view, start, &extent);

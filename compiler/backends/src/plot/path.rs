@@ -1,8 +1,8 @@
 //! The path as points, in one frame for the whole program.
 
 use gr_ir::geometry::{Extent, flatten};
-use gr_ir::measure::{Rates, Totals, measure};
-use gr_ir::{Op, Program, State, View};
+use gr_ir::measure::{Known, Rates, Totals, measure};
+use gr_ir::{Op, Pose, Program, State, View};
 
 /// What a stretch of path is drawn as.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, PartialOrd, Ord)]
@@ -58,7 +58,7 @@ pub struct Path {
     pub runs: Vec<(Class, u32)>,
     /// Points of all runs, one after the other. A run begins where its first move begins.
     pub points: Vec<[f32; 3]>,
-    /// Size of the path, without the way to its first point.
+    /// Size of the path.
     pub extent: Extent,
     /// Sums.
     pub totals: Totals,
@@ -104,19 +104,20 @@ impl Path {
         let mut path = Path { runs: Vec::new(), points: Vec::new(), extent: Extent::default(), totals: Totals::default() };
         let tolerance = rough_size(program) / 4000.0;
         let mut common = Common::new();
-        let mut fresh = true;
+        let (mut fresh, mut known) = (true, Known::default());
         let rates = Rates::default();
         let mut cursor = program.cursor();
         while let Some(view) = cursor.next() {
             path.totals.add(&measure(&view, &rates));
+            let start = known.start(&view);
             match Class::of(&view.op) {
                 Some(class) => {
                     if fresh {
                         common.enter(view.state);
                     }
-                    let lead = path.extent.is_empty() && class == Class::Rapid;
-                    let hidden = lead || (class == Class::Rapid && !rapids);
-                    path.add(&view, class, &common, tolerance, hidden);
+                    if let Some(start) = start.filter(|_| rapids || class != Class::Rapid) {
+                        path.add(&view, &start, class, &common, tolerance);
+                    }
                     fresh = false;
                 }
                 None => fresh |= moves_frame(&view.op),
@@ -125,12 +126,8 @@ impl Path {
         path
     }
 
-    fn add(&mut self, view: &View<'_, '_>, class: Class, common: &Common, tolerance: f64, hidden: bool) {
-        if hidden {
-            self.extent.add(common.place(&view.end.axes));
-            return;
-        }
-        let start = common.place(&view.start.axes);
+    fn add(&mut self, view: &View<'_, '_>, from: &Pose, class: Class, common: &Common, tolerance: f64) {
+        let start = common.place(&from.axes);
         let joined = self.runs.last().is_some_and(|r| r.0 == class) && self.points.last() == Some(&single(start));
         if !joined {
             self.runs.push((class, u32::try_from(self.points.len()).unwrap_or(u32::MAX)));
@@ -138,7 +135,7 @@ impl Path {
             self.extent.add(start);
         }
         let op = if self.points.len() < MOST_POINTS { view.op } else { Op::Linear };
-        flatten(&op, view.start, view.end, tolerance, |p| {
+        flatten(&op, from, view.end, tolerance, |p| {
             let p = common.place(p);
             self.extent.add(p);
             self.points.push(single(p));
