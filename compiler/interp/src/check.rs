@@ -235,7 +235,9 @@ impl<S: Sink> Interp<'_, S> {
         let path = b.g(Group::PathControl) == 640;
         let user_m = b.user_m >= 0;
         let eighties = (810..=890).contains(&motion);
-        if b.has(b'd') && !(comp_on || motion == 700 || rough || css) {
+        // 2.10 lets a peck drilling cycle say its clearance.
+        let peck = matches!(motion, 730 | 830) && self.setup.version == gr_canon::Version::V2_10;
+        if b.has(b'd') && !(comp_on || motion == 700 || rough || css || peck) {
             return unused(rs274::RT_D_UNUSED, b'd');
         }
         if b.has(b'$')

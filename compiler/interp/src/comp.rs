@@ -38,7 +38,7 @@ fn gouge(text: gr_spec::Rs274) -> Box<Fault> {
 
 /// `l` as a sine or cosine; beyond ±1 the tool can't touch both sides.
 fn ratio(l: f64, text: gr_spec::Rs274) -> Res<f64> {
-    if l > 1.0 || l < -1.0 { Err(gouge(text)) } else { Ok(l) }
+    if l.abs() > 1.0 { Err(gouge(text)) } else { Ok(l) }
 }
 
 /// Centre of the tool where it touches a straight side of direction `heading` that begins at `corner`, and the

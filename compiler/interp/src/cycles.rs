@@ -214,15 +214,11 @@ impl<S: Sink> Interp<'_, S> {
         let p = self.block.get(b'p').filter(|p| *p != -1.0);
         let q = self.block.get(b'q').filter(|q| *q != -1.0);
         match hole.g {
-            820 | 860 | 880 | 890 => {
-                if p.is_none() && !again {
-                    return Err(word_missing("P", rs274::CYCLE_NO_P).arg(hole.g / 10));
-                }
+            820 | 860 | 880 | 890 if p.is_none() && !again => {
+                return Err(word_missing("P", rs274::CYCLE_NO_P).arg(hole.g / 10));
             }
-            730 | 830 => {
-                if q.is_none() && !again {
-                    return Err(word_missing("Q", rs274::CYCLE_NO_Q).arg(hole.g / 10));
-                }
+            730 | 830 if q.is_none() && !again => {
+                return Err(word_missing("Q", rs274::CYCLE_NO_Q).arg(hole.g / 10));
             }
             870 if !again => {
                 if let Some(missing) = b"ijk".iter().find(|l| !self.block.has(**l)) {

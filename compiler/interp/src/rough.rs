@@ -191,6 +191,10 @@ impl Segment {
         }
     }
 
+    fn vanished(&self) -> bool {
+        self.size() < SHORT
+    }
+
     fn monotonic(&self) -> bool {
         let dz = (self.end - self.start).z;
         match self.shape {
@@ -549,7 +553,7 @@ impl Contour {
                 finish_corner(before, corner, after)?;
             }
         }
-        self.segments.retain(|s| !(s.size() < SHORT));
+        self.segments.retain(|s| !s.vanished());
         Ok(())
     }
 
@@ -588,7 +592,7 @@ impl Contour {
 
     fn offset_all(&mut self, step: f64, distance: f64) {
         self.segments.iter_mut().for_each(|s| s.offset(step));
-        self.segments.retain(|s| !(s.size() < SHORT));
+        self.segments.retain(|s| !s.vanished());
         let mut i = 0;
         while i + 1 < self.segments.len() {
             let (a, b) = (self.segments[i], self.segments[i + 1]);
@@ -621,7 +625,7 @@ impl Contour {
             if i + 1 >= self.segments.len() {
                 break;
             }
-            if self.segments[i].size() < SHORT {
+            if self.segments[i].vanished() {
                 self.segments.remove(i);
                 i = 0;
             } else if let [a, b] = &mut self.segments[i..=i + 1] {

@@ -66,7 +66,8 @@ pub struct Modal {
     pub cycle_r: f64,
     /// Level to come back to (G98).
     pub cycle_il: f64,
-    /// Last I and J of a G5, for a following G5 without them.
+    /// Where the last G5 ended: a G5 without I and J continues it only from there. (What it continues with is in
+    /// `cycle_i` and `cycle_j`, which G87 shares, as in the controller.)
     pub spline_tail: [f64; 2],
     /// Canned cycle repeats.
     pub cycle_l: i32,

@@ -251,3 +251,25 @@ fn examples_of_the_registry() {
     }
     assert!(wrong.is_empty(), "{wrong:#?}");
 }
+
+/// How far a peck cycle stays above the last bottom: fixed in 2.9; INI file or D word in 2.10.
+#[test]
+fn peck_clearance_by_version() {
+    let mm = "G21 G90 F100\nG0 Z5\nG83 X0 Y0 Z-10 R0 Q5\nG80\nM2\n";
+    let inch = "G20 G90 F10\nG0 Z5\nG83 X0 Y0 Z-10 R0 Q5\nG80\nM2\n";
+    let told = "G21 G90 F100\nG0 Z5\nG83 X0 Y0 Z-10 R0 Q5 D2\nG80\nM2\n";
+    let stream = |version, ini: &str, program: &str| {
+        let setup = Setup { version, ini: gr_interp::read_ini(ini, FileId(0), None, None).0, ..Setup::default() };
+        let chunk = Chunk { text: Arc::from(program), scan: Arc::new(gr_gcode::scan(program, setup.dialect)) };
+        let mut files = One(File::new("test.ngc", vec![chunk]));
+        let mut printer = Printer::new(Vec::new(), Version::V2_9);
+        let _ = Interp::new(&mut files, &setup, &mut printer).run(FileId(0));
+        String::from_utf8(printer.finish().expect("a vector takes everything")).expect("ASCII")
+    };
+    assert!(stream(Version::V2_9, "", mm).contains("STRAIGHT_TRAVERSE(0.0000, 0.0000, -4.7460,"));
+    assert!(stream(Version::V2_9, "", inch).contains("STRAIGHT_TRAVERSE(0.0000, 0.0000, -4.9900,"));
+    assert!(stream(Version::V2_10, "", mm).contains("STRAIGHT_TRAVERSE(0.0000, 0.0000, -4.0000,"));
+    let ini = "[RS274NGC]\nPARAMETER_G83_PECK_CLEARANCE = 0.5\n";
+    assert!(stream(Version::V2_10, ini, mm).contains("STRAIGHT_TRAVERSE(0.0000, 0.0000, -4.5000,"));
+    assert!(stream(Version::V2_10, ini, told).contains("STRAIGHT_TRAVERSE(0.0000, 0.0000, -3.0000,"));
+}
