@@ -270,7 +270,7 @@ fn stored(o: &mut rs274ngc::Options, unit: &Unit) {
         }
         o.stored_rotations[n] = param(base + 9).to_radians();
     }
-    for tool in unit.setup.tools.rows.iter().skip(1) {
+    for tool in unit.setup.tools.rows.iter().skip(1).filter(|t| &*t.comment != crate::setup::ASSUMED) {
         let mut offset = tool.offset;
         offset.iter_mut().enumerate().for_each(|(i, v)| *v = axis(i, *v));
         o.tools.push((tool.number, offset));

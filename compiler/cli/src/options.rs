@@ -85,7 +85,7 @@ pub struct SetupArgs {
     /// Machine: an id such as generic/mill3, or the path of a machine file
     #[arg(long, value_name = "MACHINE")]
     pub machine: Option<String>,
-    /// Tool table (.tbl)
+    /// Tool table (.tbl); without one every tool exists, without length and diameter
     #[arg(short = 't', long, value_name = "FILE")]
     pub tools: Option<PathBuf>,
     /// Stored parameters (.var); read only

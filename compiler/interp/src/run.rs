@@ -531,7 +531,9 @@ impl<'a, S: Sink> Interp<'a, S> {
         let span = span.map(|s| Span::new(s.start.saturating_sub(start), s.end.saturating_sub(start)));
         let p = self.place;
         let text = self.line_text();
-        let text = text.char_indices().nth(255).map_or(text, |(i, _)| &text[..i]).trim_end().into();
+        let text = text.char_indices().nth(255).map_or(text, |(i, _)| &text[..i]);
+        // Blanks at the end of a line are not read; a call that the controller made up keeps its own.
+        let text = if fault.code == code::REMAP_WORDS { text } else { text.trim_end() }.into();
         self.findings.push(Finding { file: p.file, line: p.line, frame: p.frame, fault, span, text });
     }
 
@@ -632,8 +634,12 @@ impl<'a, S: Sink> Interp<'a, S> {
     fn special_line(&mut self, scan: &Scan, text: &str, line: u32, words: &[Word]) -> Res {
         let at = scan.lines[line as usize];
         if at.faulty {
-            self.opened.damaged_met.insert((self.place.file, self.place.line));
-            if let Some(fault) = self.text_fault(scan, line) {
+            let fault = self.text_fault(scan, line);
+            let deleted = at.deleted && self.setup.block_delete;
+            if fault.is_some() || (self.skip.is_none() && !deleted) {
+                self.opened.damaged_met.insert((self.place.file, self.place.line));
+            }
+            if let Some(fault) = fault {
                 return Err(fault);
             }
         }
