@@ -36,13 +36,30 @@ pub const MOST_OF_A_KIND: usize = 1000;
 
 /// Everything that is to be said about a file.
 pub(crate) fn check(db: &Database, document: Document) -> Check {
+    if let Some(diagnostics) = crate::ufmg::check(db, document) {
+        return Check { diagnostics, more: 0 };
+    }
     Assembly::new(db, document, timeline(db, document)).finish(None)
 }
 
 /// What is to be said about some lines, as far as the blocks up to their end tell it.
 pub(crate) fn check_range(db: &Database, document: Document, lines: Range<u32>) -> Vec<Diagnostic> {
+    if let Some(mut found) = crate::ufmg::check(db, document) {
+        let line = |span: Span| line_of(db, document, span.start);
+        found.retain(|d| lines.contains(&line(d.primary().1)));
+        return found;
+    }
     let last = lines.end.saturating_sub(1).max(lines.start);
     Assembly::new(db, document, timeline_to(db, document, last)).finish(Some(lines)).diagnostics
+}
+
+/// The line of a byte of a file.
+fn line_of(db: &Database, document: Document, offset: u32) -> u32 {
+    let mut text = String::new();
+    for chunk in document.chunks(db).iter() {
+        text.push_str(chunk.text(db));
+    }
+    gr_text::LineIndex::new(text.as_bytes()).position(offset).0
 }
 
 struct Assembly<'a> {
@@ -242,24 +259,34 @@ impl Source {
     }
     fn diagnostic(&self, found: &Found, file: FileId) -> Diagnostic {
         let exact = found.span.map(|s| s.shifted(self.line_start()));
-        let span = exact.or_else(|| self.word(found.letter?)).unwrap_or_else(|| self.line_span());
+        let block = self.line_span();
+        let narrow = exact.or_else(|| self.word(found.letter?)).filter(|s| *s != block);
+        let mut places = remarks(found.code).iter().filter_map(|(letters, text)| Some((self.words(letters)?, *text)));
+        // A finding of the whole block points at the words that matter most, when they are known.
+        let (span, text) = match narrow {
+            Some(span) => (span, ""),
+            None => places.next().unwrap_or((block, "")),
+        };
         let mut d = Diagnostic::new(found.code, file, span, &found.args);
-        for (letters, text) in remarks(found.code) {
-            let spans: Vec<Span> = letters.iter().filter_map(|l| self.word(*l)).collect();
-            let (Some(from), Some(to)) = (spans.iter().map(|s| s.start).min(), spans.iter().map(|s| s.end).max()) else { continue };
-            let place = Span::new(from, to);
-            if place.end <= span.start || place.start >= span.end {
-                d = d.label(file, place, *text);
-            }
+        if let Some(label) = d.labels.first_mut() {
+            label.text = text.to_string();
+        }
+        for (place, text) in places.filter(|(place, _)| place.end <= span.start || place.start >= span.end) {
+            d = d.label(file, place, text);
         }
         d
+    }
+    /// From the first to the last word with one of these letters.
+    fn words(&self, letters: &[u8]) -> Option<Span> {
+        let spans = || letters.iter().filter_map(|l| self.word(*l));
+        Some(Span::new(spans().map(|s| s.start).min()?, spans().map(|s| s.end).max()?))
     }
 }
 
 /// Words that also have to do with a mistake, and what they are.
 fn remarks(code: Code) -> &'static [(&'static [u8], &'static str)] {
     match code {
-        code::ARC_RADIUS_MISMATCH => &[(b"xyz", "the end point"), (b"ijk", "the centre, from the start point")],
+        code::ARC_RADIUS_MISMATCH => &[(b"ijk", "the centre, seen from the start point"), (b"xyz", "the end point")],
         code::ARC_RADIUS_TOO_SMALL => &[(b"xyz", "the end point"), (b"r", "the radius")],
         _ => &[],
     }

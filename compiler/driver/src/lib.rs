@@ -13,6 +13,7 @@ mod lints;
 mod session;
 mod store;
 mod timeline;
+mod ufmg;
 
 pub use check::{Check, MOST_OF_A_KIND};
 pub use db::Executed;
