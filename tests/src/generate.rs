@@ -117,7 +117,7 @@ impl Walk {
     }
     /// A quarter turn about a centre on the same height: exact in decimal.
     fn arc(&mut self, motion: &mut &'static str) {
-        let r = 1 + self.random.below(MM as u64) as i64;
+        let r = MM / 10 + self.random.below(MM as u64) as i64;
         let i = if self.x + 2 * r > SIDE { -r } else { r };
         let up = self.y + r <= SIDE;
         let clockwise = (i > 0) == up;

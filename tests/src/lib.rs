@@ -1,5 +1,6 @@
 //! Helpers that the tests of the whole share.
 
+pub mod full;
 pub mod generate;
 pub mod linuxcnc;
 pub mod matrix;
