@@ -4,7 +4,7 @@ use std::hash::{Hash, Hasher};
 use std::sync::Arc;
 
 use gr_canon::{At, Call, CallFrame, Discard, FileId, FrameId, Mark, Sink};
-use gr_gcode::{Chunk, File, LineKind};
+use gr_gcode::{Chunk, File, Form, LineKind};
 use gr_interp::{Files, Finding, Interp, Modal, Params, State, run_lines};
 use gr_spec::code;
 
@@ -332,9 +332,28 @@ pub(crate) fn flow(stretch: &Stretch<'_>) -> FlowOutcome {
         // What stands behind the end is not looked at.
         findings.retain(|f| f.fault.code != code::FLOW_UNCLOSED || f.file != *main || f.line <= end.line);
     }
+    drop_consequences(&mut findings, file, *line, *main);
     let mut found: Vec<Found> = findings.iter().filter_map(|f| of_finding(f, options)).collect();
     found.extend(lints.found);
     FlowOutcome { boundary: Boundary::new(state, lints.flags, false), found, frames, summary: lints.summary, end }
+}
+
+/// An error makes the controller forget all labels: that the rest of a loop or branch is then without its beginning
+/// is the same mistake once more.
+fn drop_consequences(findings: &mut Vec<Finding>, file: &File, from: u32, main: FileId) {
+    let controls = file.chunks.iter().zip(&file.first_lines).find_map(|(chunk, first)| {
+        let scan = &chunk.scan;
+        let line = (0..scan.lines.len() as u32).find(|l| scan.words(*l).iter().any(|w| w.form == Form::Control))?;
+        (first + line >= from).then_some(first + line)
+    });
+    let first_control = controls.unwrap_or(0);
+    let mut after_error = false;
+    findings.retain(|f| {
+        let consequence = f.fault.code == code::FLOW_LABEL || f.fault.code == code::FLOW_UNCLOSED;
+        let keep = !(after_error && consequence);
+        after_error |= f.fault.rs.is_some() && (f.file != main || f.line >= first_control);
+        keep
+    });
 }
 
 /// Line of the closing `%`.

@@ -262,6 +262,16 @@ fn fold<'db>(db: &'db dyn Db, document: Document, last_line: u32) -> Timeline<'d
         let context = engine::Finish { shapes: &shapes, starts: &starts, options, modal: entry.boundary(db).modal(), end };
         late.found.extend(engine::finish(&context));
     }
+    if groups.iter().any(|g: &Group| g.found.iter().any(|f| f.code.def().severity == gr_spec::Severity::Error)) {
+        // After an error the rest is not to be trusted: what is still on at the end says nothing.
+        let left_on = [gr_spec::code::END_SPINDLE_ON, gr_spec::code::END_COMPENSATION_ON];
+        late.found.retain(|f| !left_on.contains(&f.code));
+        for group in &mut groups {
+            if group.found.iter().any(|f| left_on.contains(&f.code)) {
+                group.found = group.found.iter().filter(|f| !left_on.contains(&f.code)).cloned().collect();
+            }
+        }
+    }
     if !late.found.is_empty() {
         groups.push(Group { first_line: 0, found: late.found.into(), frames: None });
     }

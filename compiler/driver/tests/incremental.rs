@@ -257,3 +257,19 @@ fn an_edit_cancels_a_snapshot() {
     let _ = worker.join().expect("no panic comes out of a snapshot");
     assert_eq!(session.check(file), scratch(&session.text(file).unwrap(), 1024));
 }
+
+/// Found by the properties above.
+#[test]
+fn cases_that_once_failed() {
+    let text = "/G0 X9\nS1000 M3\nG0 X1 Y2\nG64 P0.001\nG0 X1 Y2\nG20\nG2 X1 Y1 I1\nG10 L2 P2 X5\no4 endwhile\n%\nG1G95 F100\n X#1\nG99999\n(debug,#1)\n";
+    for chunk in 1..9 {
+        assert_same(text, &scratch(text, chunk), &scratch(text, 256), "chunks");
+    }
+    let mut text = text.replace("G95 F100\n", "");
+    let mut session = Session::new();
+    let file = session.open("part.ngc", &text, options(1));
+    session.check(file);
+    let range = apply(&mut text, &Edit { at: 790, len: 0, new: "G95 F100\n".to_string() });
+    session.edit(file, range, "G95 F100\n");
+    assert_same(&text, &session.check(file), &scratch(&text, 256), "edit");
+}

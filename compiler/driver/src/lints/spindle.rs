@@ -23,9 +23,7 @@ pub(super) fn check(lints: &mut Lints<'_>, at: &At<'_>) {
 pub(super) fn watch(lints: &mut Lints<'_>, at: &At<'_>, call: &Call) {
     match call {
         Call::StartSpindleClockwise(n) | Call::StartSpindleCounterclockwise(n) => {
-            if !lints.flags.has(Flags::SPINDLE_USED) {
-                lints.summary.spindle_starts = true;
-            }
+            lints.summary.spindle_starts = true;
             lints.turning |= 1 << (*n & 7);
             lints.flags.set(Flags::SPINDLE_USED, true);
             lints.flags.set(Flags::STOPPED_TOLD, false);

@@ -1,0 +1,74 @@
+//! Machinist's lints: no false alarms on ordinary programs, and the finer points of single rules.
+
+#[allow(dead_code, unused_imports, reason = "shared with the test crate")]
+#[path = "../../../tests/src/generate.rs"]
+mod generate;
+
+use gr_driver::{Options, Session};
+use gr_interp::Setup;
+
+fn found(text: &str) -> Vec<String> {
+    let mut session = Session::new();
+    let file = session.open("part.ngc", text, Options::new(Setup::default()));
+    let line = |at: u32| text[..at as usize].matches('\n').count() + 1;
+    session.check(file).diagnostics.iter().map(|d| format!("{}: {}", line(d.primary().1.start), d.code.def().slug)).collect()
+}
+
+#[test]
+fn generated_programs_are_clean() {
+    assert_eq!(found(&generate::big(20_000)), Vec::<String>::new());
+    assert_eq!(found(&generate::mixed(20_000)), Vec::<String>::new());
+}
+
+#[test]
+fn a_program_without_spindle_is_left_alone() {
+    assert_eq!(found("G21 F100\nG1 X10\nM2\n"), Vec::<String>::new());
+    // … unless it is started further down.
+    assert_eq!(found("G21 F100\nG1 X10\nM3 S100\nG1 X20\nM5\nM2\n"), ["2: spindle/stopped"]);
+}
+
+#[test]
+fn a_stopped_spindle_is_told_once_until_it_starts() {
+    let text = "G21 F100\nM3 S100\nG1 X1\nM5\nG1 X2\nG1 X3\nM3\nG1 X4\nM5\nG1 X5\nG0 Z5\nM2\n";
+    assert_eq!(found(text), ["5: spindle/stopped", "10: spindle/stopped"]);
+}
+
+#[test]
+fn retracting_with_a_stopped_spindle_is_fine() {
+    assert_eq!(found("G21 F100\nM3 S100\nG1 X1\nM5\nG1 Z5\nM2\n"), Vec::<String>::new());
+}
+
+#[test]
+fn pecking_and_clearing_passes_are_no_dives() {
+    let drill = "G21 F100\nM3 S100\nG0 X5 Y5 Z5\nG83 X5 Y5 Z-10 R2 Q2\nX10\nG80\nG0 Z5\nM5\nM2\n";
+    assert_eq!(found(drill), Vec::<String>::new());
+    // A second pass that begins where the first began.
+    let passes = "G21 F100\nM3 S100\nG0 X0 Y0 Z5\nG0 Z-2\nG1 X20\nY20\nX0\nY0\nG0 Z5\nG0 Z-4\nG1 X20\nY20\nG0 Z5\nM5\nM2\n";
+    assert_eq!(found(passes), Vec::<String>::new());
+}
+
+#[test]
+fn a_dive_in_another_work_frame_compares_with_nothing() {
+    let text = "G21 F100\nM3 S100\nG1 Z-1\nX20\nY20\nG0 Z5\nG55\nG0 X10 Y10\nG0 Z-3\nG0 Z5\nM5\nM2\n";
+    let same = text.replace("G55\n", "");
+    assert_eq!(found(text).iter().filter(|f| f.contains("rapid")).count(), 1, "both frames are at the same place");
+    assert_eq!(found(&same), ["8: rapid/into-stock"]);
+}
+
+#[test]
+fn spindle_on_at_m2_is_a_hint_and_m5_on_the_same_line_counts() {
+    assert_eq!(found("G21\nM3 S100\nG0 X1\nM2\n"), ["4: end/spindle-on"]);
+    assert_eq!(found("G21\nM3 S100\nG0 X1\nM5 M2\n"), Vec::<String>::new());
+}
+
+#[test]
+fn errors_have_a_trace_and_loops_tell_once() {
+    let text = "G21 F100\no1 sub\nG2 X[#1] Y0 I1\no1 endsub\no2 repeat [3]\no1 call [7]\no2 endrepeat\nM2\n";
+    let mut session = Session::new();
+    let file = session.open("part.ngc", text, Options::new(Setup::default()));
+    let check = session.check(file);
+    let d = &check.diagnostics[0];
+    assert_eq!(d.code.def().slug, "arc/radius-mismatch");
+    assert!(!d.trace.is_empty(), "{d:#?}");
+    assert!(d.labels.len() > 1, "{d:#?}");
+}
