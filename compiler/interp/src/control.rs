@@ -807,7 +807,9 @@ impl<S: Sink> Interp<'_, S> {
         // Skipping at the end of a program is an error of its own; branches that ran through leave no trace in
         // the controller, so the file is searched for them.
         for id in self.opened.order.clone() {
-            self.unclosed_in(id);
+            if !self.files.is_plain(id) {
+                self.unclosed_in(id);
+            }
         }
     }
 

@@ -418,7 +418,9 @@ impl<S: Sink> Interp<'_, S> {
 
     /// M70, M73.
     pub(crate) fn save_modes(&mut self, restore: bool) {
-        let saved = Box::new(self.modes());
+        let mut saved = Box::new(self.modes());
+        // Where it was kept makes no difference.
+        (saved.g[0], saved.m[0], saved.settings[0]) = (0, 0, 0.0);
         let level = self.level();
         let here = &mut self.levels[level];
         here.saved = Some(saved);

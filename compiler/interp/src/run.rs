@@ -23,6 +23,17 @@ pub trait Files {
     fn file(&self, id: FileId) -> &File;
     /// The file of an external subroutine, found along [`crate::subroutine_paths`].
     fn find_sub(&mut self, name: &str) -> Option<FileId>;
+    /// The chunk that holds a line, the line's number in it, and the number of its first line. A program without
+    /// control flow is read through this alone, so that it need not be in memory as a whole.
+    fn chunk(&self, id: FileId, line: u32) -> Option<(Chunk, u32, u32)> {
+        let file = self.file(id);
+        let (c, l) = file.locate(line)?;
+        Some((file.chunks[c].clone(), l, file.first_lines[c]))
+    }
+    /// Nothing read of this file so far holds control flow or damage.
+    fn is_plain(&self, _id: FileId) -> bool {
+        false
+    }
 }
 
 /// No files at all: for a chunk without calls, and for single lines.
@@ -268,6 +279,7 @@ impl<'a, S: Sink> Interp<'a, S> {
     ) -> Self {
         let State { modal, queue, world, saved, tools: own, world_tools } = state;
         let mut main = Level::new(0);
+        main.saved_valid = saved.is_some();
         main.saved = saved;
         Interp {
             m: modal,
@@ -402,20 +414,18 @@ impl<'a, S: Sink> Interp<'a, S> {
     pub fn open(&mut self, main: FileId) -> Res {
         self.place = Place { file: main, line: 0, frame: FrameId::MAIN };
         self.note_file(main);
-        let file = self.files.file(main);
-        let lines = file.line_count();
         let mut line = 0;
         let mut kind = None;
-        while line < lines {
-            let Some((c, l)) = file.locate(line) else { break };
-            let scan = &file.chunks[c].scan;
-            let text = &file.chunks[c].text;
-            let span = scan.line_span(text, l);
-            if !text[span.range()].trim().is_empty() {
+        while let Some((chunk, l, first)) = self.files.chunk(main, line) {
+            let scan = &chunk.scan;
+            let lines = l..scan.lines.len() as u32;
+            let text = |l| chunk.text[scan.line_span(&chunk.text, l).range()].trim();
+            if let Some(l) = lines.into_iter().find(|l| !text(*l).is_empty()) {
                 kind = Some(scan.lines[l as usize].kind);
+                line = first + l;
                 break;
             }
-            line += 1;
+            line = first + scan.lines.len() as u32;
         }
         match kind {
             None => return Err(Fault::new(code::PROGRAM_ENDS_EARLY, rs274::RT_NO_PERCENT)),
@@ -463,9 +473,7 @@ impl<'a, S: Sink> Interp<'a, S> {
     }
 
     fn load(&self, file: FileId, line: u32) -> Option<(Chunk, u32, u32)> {
-        let file = self.files.file(file);
-        let (c, l) = file.locate(line)?;
-        Some((file.chunks[c].clone(), l, file.first_lines[c]))
+        self.files.chunk(file, line)
     }
 
     /// Runs at most `limit` lines of the chunk that holds the next line.
@@ -732,6 +740,9 @@ impl<'a, S: Sink> Interp<'a, S> {
         self.unclosed();
         let mut damaged = Vec::new();
         for id in &self.opened.order {
+            if self.files.is_plain(*id) {
+                continue;
+            }
             let file = self.files.file(*id);
             for (c, chunk) in file.chunks.iter().enumerate() {
                 let mut last = u32::MAX;
