@@ -131,9 +131,15 @@ pub fn is_latin1(d: &Decoded) -> bool {
 }
 
 /// All programs below `folder`, in order: files whose extension belongs to a dialect. Hidden ones are left out.
-pub fn walk(folder: &Path, extensions: &[&str], found: &mut Vec<PathBuf>) -> std::io::Result<()> {
-    let mut entries: Vec<PathBuf> = std::fs::read_dir(folder)?.map(|e| e.map(|e| e.path())).collect::<Result<_, _>>()?;
+/// Folders that can't be read come back.
+pub fn walk(folder: &Path, extensions: &[&str], found: &mut Vec<PathBuf>) -> Vec<(PathBuf, std::io::Error)> {
+    let listed = std::fs::read_dir(folder).and_then(|list| list.map(|e| e.map(|e| e.path())).collect::<Result<Vec<_>, _>>());
+    let mut entries = match listed {
+        Ok(entries) => entries,
+        Err(e) => return vec![(folder.to_path_buf(), e)],
+    };
     entries.sort();
+    let mut closed = Vec::new();
     for path in entries {
         let hidden = path.file_name().is_some_and(|n| n.to_string_lossy().starts_with('.'));
         if hidden {
@@ -141,12 +147,13 @@ pub fn walk(folder: &Path, extensions: &[&str], found: &mut Vec<PathBuf>) -> std
         }
         // A link to a folder could lead in circles.
         if path.is_dir() && !path.is_symlink() {
-            walk(&path, extensions, found)?;
+            closed.extend(walk(&path, extensions, found));
         } else if let Some(ext) = path.extension().and_then(|e| e.to_str())
             && extensions.iter().any(|x| x.eq_ignore_ascii_case(ext))
+            && path.is_file()
         {
             found.push(path);
         }
     }
-    Ok(())
+    closed
 }

@@ -101,11 +101,13 @@ fn programs(
             continue;
         }
         let before = files.len();
-        if let Err(e) = walk(path, &extensions(station.dialect), &mut files) {
-            let name = path.display().to_string();
-            super::complain(renderer, sources, &name, code::FILE_UNREADABLE, &[name.clone(), reason(&e)]);
+        let closed = walk(path, &extensions(station.dialect), &mut files);
+        for (at, e) in &closed {
+            let name = at.display().to_string();
+            super::complain(renderer, sources, &name, code::FILE_UNREADABLE, &[name.clone(), reason(e)]);
             exit = Exit::Io;
-        } else if files.len() == before {
+        }
+        if closed.is_empty() && files.len() == before {
             nothing(path.display().to_string(), sources, renderer);
         }
     }

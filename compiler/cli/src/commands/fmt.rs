@@ -1,10 +1,11 @@
 //! `gcc-robot fmt` and `gcc-robot renumber`
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use gr_gcode::{Case, FormatOptions, LeadingZeros, Renumber};
-use gr_spec::Dialect;
-use gr_text::{Decoded, Encoding, code};
+use gr_gcode::{Case, Form, FormatOptions, Keyword, LeadingZeros, LineKind, Node, Renumber, Scan, Word};
+use gr_spec::{Dialect, Family};
+use gr_text::{Decoded, Encoding, Span, code};
 
 use crate::exit::Exit;
 use crate::options::{CaseArg, FmtArgs, Global, LintArgs, RenumberArgs, SetupArgs, StyleArgs, ZerosArg};
@@ -24,8 +25,8 @@ pub fn run(global: &Global, args: &FmtArgs) -> Exit {
         let mut files = vec![path.clone()];
         if path.is_dir() {
             files.clear();
-            if let Err(e) = walk(path, &extensions(work.station.dialect), &mut files) {
-                exit = exit.max(work.complain(path, code::FILE_UNREADABLE, &[path.display().to_string(), reason(&e)]));
+            for (at, e) in walk(path, &extensions(work.station.dialect), &mut files) {
+                exit = exit.max(work.complain(&at, code::FILE_UNREADABLE, &[at.display().to_string(), reason(&e)]));
             }
         }
         for file in files {
@@ -41,23 +42,87 @@ pub fn renumber(global: &Global, args: &RenumberArgs) -> Exit {
         Ok(work) => work,
         Err(exit) => return exit,
     };
-    let options = FormatOptions {
-        case: Case::Keep,
-        o_word_case: Case::Keep,
-        spaces: false,
-        indent: 0,
-        leading_zeros: LeadingZeros::Keep,
-        renumber: Some(Renumber { start: args.start, step: args.step, all: args.all }),
-    };
     let exit = match read(&args.file) {
         Ok(decoded) => {
-            let text = formatted(&args.file, &decoded.text, &work.station, &options);
+            let dialect = work.station.dialect_of(&args.file, &decoded.text);
+            let scan = gr_gcode::scan(&decoded.text, dialect);
+            let numbers = Renumber { start: args.start, step: args.step, all: args.all };
+            let text = renumbered(&decoded.text, &scan, dialect, numbers);
             work.write(args.output.as_deref().unwrap_or(Path::new("-")), &text, decoded.encoding)
         }
         Err((code, list)) => work.complain(&args.file, code, &list),
     };
     work.renderer.finish(false);
     exit
+}
+
+/// New N words, and jumps that follow them; everything else stays as it is.
+fn renumbered(text: &str, scan: &Scan, dialect: &Dialect, numbers: Renumber) -> String {
+    let mut edits: Vec<(Span, String)> = Vec::new();
+    let mut new_of = BTreeMap::new();
+    let mut next = numbers.start;
+    for line in 0..scan.lines.len() as u32 {
+        let words = scan.words(line);
+        if scan.lines[line as usize].faulty || scan.lines[line as usize].kind == LineKind::Percent {
+            continue;
+        }
+        if let Some(old) = words.iter().find(|w| w.letter == b'n' && w.form == Form::Literal) {
+            new_of.entry(old.value.to_bits()).or_insert(next);
+            let span = scan.word_span(text, line, old);
+            edits.push((Span::new(span.start + 1, span.end), next.to_string()));
+        } else if numbers.all && words.iter().any(|w| w.form != Form::Comment && !is_program(scan, w)) {
+            let span = scan.line_span(text, line);
+            let body = &text[span.range()];
+            let lead = body.len() - body.trim_start_matches([' ', '\t', '/']).len();
+            let at = span.start + lead as u32;
+            edits.push((Span::new(at, at), format!("N{next} ")));
+        } else {
+            continue;
+        }
+        next = next.saturating_add(numbers.step.max(1));
+    }
+    if dialect.family == Family::Fanuc {
+        jumps(text, scan, &new_of, &mut edits);
+    }
+    edits.sort_by_key(|(span, _)| span.start);
+    let mut out = String::with_capacity(text.len() + 8 * edits.len());
+    let mut at = 0;
+    for (span, new) in edits {
+        out.push_str(&text[at..span.start as usize]);
+        out.push_str(&new);
+        at = span.end as usize;
+    }
+    out.push_str(&text[at..]);
+    out
+}
+
+/// `O100` at the start of a program has a number of its own.
+fn is_program(scan: &Scan, word: &Word) -> bool {
+    word.form == Form::Control && scan.controls[word.index()].keyword == Keyword::Program
+}
+
+/// Targets of GOTO and of M99 P.
+fn jumps(text: &str, scan: &Scan, new_of: &BTreeMap<u64, u32>, edits: &mut Vec<(Span, String)>) {
+    for control in scan.controls.iter().filter(|c| matches!(c.keyword, Keyword::MacroGoto | Keyword::MacroIfGoto)) {
+        let args = &scan.args[control.first_arg as usize..(control.first_arg + control.arg_count) as usize];
+        let Some(target) = args.last() else { continue };
+        if let Node::Number(value) = scan.nodes[target.0 as usize]
+            && let Some(new) = new_of.get(&value.to_bits())
+        {
+            edits.push((scan.node_spans[target.0 as usize], new.to_string()));
+        }
+    }
+    for line in 0..scan.lines.len() as u32 {
+        let words = scan.words(line);
+        let literal = |letter: u8| words.iter().find(|w| w.letter == letter && w.form == Form::Literal);
+        if let (Some(m), Some(p)) = (literal(b'm'), literal(b'p'))
+            && m.value == 99.0
+            && let Some(new) = new_of.get(&p.value.to_bits())
+        {
+            let span = scan.word_span(text, line, p);
+            edits.push((Span::new(span.start + 1, span.end), new.to_string()));
+        }
+    }
 }
 
 fn style(args: &StyleArgs) -> FormatOptions {
@@ -158,6 +223,17 @@ fn encoded(text: &str, encoding: Encoding) -> Vec<u8> {
 mod tests {
     use super::*;
     use gr_text::decode;
+
+    #[test]
+    fn numbers_and_jumps() {
+        let dialect = Dialect::find("fanuc-mill").unwrap();
+        let text = "%\nO0001\nn5 g1x1 y2(c)f100\n/ G0 X2\nIF [#1 GT 2] GOTO 5\nGOTO 7\nM99 P5\n%\n";
+        let scan = gr_gcode::scan(text, dialect);
+        let all = renumbered(text, &scan, dialect, Renumber { start: 100, step: 10, all: true });
+        insta::assert_snapshot!(all);
+        let some = renumbered(text, &scan, dialect, Renumber { start: 1, step: 1, all: false });
+        assert!(some.contains("\nn1 g1x1 y2(c)f100\n/ G0 X2\n") && some.contains("GOTO 1\n") && some.contains("M99 P1\n"));
+    }
 
     #[test]
     fn spellings_survive() {

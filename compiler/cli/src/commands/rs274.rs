@@ -352,6 +352,9 @@ fn program(choice: &Choice) -> Result<Program, Quit> {
     };
     let path = Path::new(name);
     let shown = path.display().to_string();
+    if let Some(file) = by_pieces(path, &shown, dialect(choice.version)) {
+        return Ok(Program { file, latin1: false, open: Some(Ok(())) });
+    }
     let bytes = match std::fs::read(path) {
         Ok(bytes) => bytes,
         Err(_) => {
@@ -363,6 +366,34 @@ fn program(choice: &Choice) -> Result<Program, Quit> {
     let decoded = decode(bytes);
     let latin1 = is_latin1(&decoded);
     Ok(Program { file: file_of(&shown, &decoded.text, dialect(choice.version)), latin1, open: Some(Ok(())) })
+}
+
+/// Bytes read at a time.
+const PIECE: usize = 1 << 18;
+
+/// Reads a plain UTF-8 file piece by piece, so that its text is in memory once only. None: it is something else.
+fn by_pieces(path: &Path, name: &str, dialect: &'static Dialect) -> Option<File> {
+    use std::io::Read as _;
+    let input = std::fs::File::open(path).ok().filter(|f| f.metadata().is_ok_and(|m| m.is_file()))?;
+    let mut chunks = Vec::new();
+    let mut held: Vec<u8> = Vec::with_capacity(2 * PIECE);
+    loop {
+        let before = held.len();
+        let read = (&input).take(PIECE as u64).read_to_end(&mut held).ok()?;
+        if chunks.is_empty() && before == 0 && held.first().is_some_and(|b| matches!(b, 0xEF | 0xFE | 0xFF)) {
+            return None;
+        }
+        // Chunks end behind a line feed, so that no CRLF is cut.
+        let end = if read == 0 { held.len() } else { held.iter().rposition(|b| *b == b'\n').map_or(0, |n| n + 1) };
+        let text = std::str::from_utf8(&held[..end]).ok()?;
+        if !text.is_empty() {
+            chunks.push(Chunk { text: text.into(), scan: std::sync::Arc::new(gr_gcode::scan(text, dialect)) });
+        }
+        held.drain(..end);
+        if read == 0 {
+            return Some(File::new(name, chunks));
+        }
+    }
 }
 
 fn dialect(version: Version) -> &'static Dialect {

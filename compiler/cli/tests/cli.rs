@@ -1,0 +1,235 @@
+//! The command as its users see it: run on files, output, exit status.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+
+fn fixtures() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures")
+}
+
+fn command(args: &[&str]) -> Command {
+    let mut c = Command::new(env!("CARGO_BIN_EXE_gcc-robot"));
+    c.args(args).current_dir(fixtures()).env_remove("NO_COLOR").env_remove("GCC_ROBOT_LINUXCNC").stdin(Stdio::null());
+    c
+}
+
+fn run(args: &[&str]) -> Output {
+    command(args).output().unwrap()
+}
+
+fn in_folder(folder: &Path, args: &[&str]) -> Output {
+    command(args).current_dir(folder).output().unwrap()
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8(bytes.to_vec()).unwrap()
+}
+
+/// Exit status, standard output and standard error in one text.
+fn whole(o: &Output) -> String {
+    format!("exit {}\n--- out\n{}--- err\n{}", o.status.code().unwrap(), text(&o.stdout), text(&o.stderr))
+}
+
+fn code(o: &Output) -> i32 {
+    o.status.code().unwrap()
+}
+
+#[test]
+fn check_for_people() {
+    insta::assert_snapshot!(whole(&run(&["check", "faulty.ngc"])));
+    insta::assert_snapshot!("call_trace", whole(&run(&["check", "loop.ngc"])));
+    insta::assert_snapshot!("all_good", whole(&run(&["check", "part.ngc"])));
+    assert!(text(&run(&["check", "faulty.ngc", "--color", "always"]).stderr).contains("\x1b["));
+    assert!(!text(&run(&["check", "faulty.ngc"]).stderr).contains('\x1b'));
+}
+
+#[test]
+fn check_for_machines() {
+    for format in ["short", "json", "github"] {
+        let o = run(&["check", "faulty.ngc", "part.ngc", "--message-format", format]);
+        insta::assert_snapshot!(format, whole(&o));
+    }
+    let o = run(&["check", "faulty.ngc", "part.ngc", "--message-format", "json"]);
+    assert!(text(&o.stdout).lines().all(|l| serde_json::from_str::<serde_json::Value>(l).is_ok()));
+    let o = run(&["check", "faulty.ngc", "--message-format", "sarif"]);
+    let log: serde_json::Value = serde_json::from_slice(&o.stdout).unwrap();
+    assert_eq!(log["version"], "2.1.0");
+    let run = &log["runs"][0];
+    let rules: Vec<_> = run["tool"]["driver"]["rules"].as_array().unwrap().iter().map(|r| &r["id"]).collect();
+    for result in run["results"].as_array().unwrap() {
+        assert!(rules.contains(&&result["ruleId"]));
+        assert!(result["locations"][0]["physicalLocation"]["region"]["startLine"].as_u64().unwrap() > 0);
+    }
+}
+
+#[test]
+fn check_folders_and_jobs() {
+    let one = run(&["check", ".", "--message-format", "json", "-j", "1"]);
+    let many = run(&["check", ".", "--message-format", "json", "-j", "8"]);
+    assert_eq!(text(&one.stdout), text(&many.stdout), "the number of threads changes nothing");
+    assert_eq!(code(&one), 1);
+    let empty = tempfile::tempdir().unwrap();
+    assert_eq!(code(&run(&["check", empty.path().to_str().unwrap()])), 1);
+    assert_eq!(code(&in_folder(empty.path(), &["check"])), 2, "nothing to check");
+}
+
+#[test]
+fn lints_can_be_set() {
+    let folder = tempfile::tempdir().unwrap();
+    let program = "G21 G90 G94 F100\nG1 X1\nM2\n";
+    std::fs::write(folder.path().join("a.ngc"), program).unwrap();
+    let check = |more: &[&str]| code(&in_folder(folder.path(), &[&["check", "a.ngc"], more].concat()));
+    assert_eq!(check(&[]), 0);
+    assert_eq!(check(&["--strict"]), 1);
+    assert_eq!(check(&["--deny", "spindle/stopped"]), 1);
+    assert_eq!(check(&["--strict", "--allow", "E0280"]), 0);
+    assert_eq!(check(&["--allow", "no/such"]), 1);
+    assert_eq!(check(&["--allow", "arc/radius-mismatch"]), 1, "an error is no lint");
+    std::fs::write(folder.path().join("gcc-robot.toml"), "schema = 1\n[lints]\nstrict = true\n").unwrap();
+    assert_eq!(check(&[]), 1);
+}
+
+#[test]
+fn files_that_are_none() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    std::fs::write(at.join("empty.ngc"), "").unwrap();
+    std::fs::write(at.join("binary.ngc"), (0..=255).cycle().take(5000).collect::<Vec<u8>>()).unwrap();
+    std::fs::write(at.join("utf16.ngc"), b"\xFF\xFEG\x002\x001\x00\n\x00M\x002\x00\n\x00").unwrap();
+    std::fs::write(at.join("cr.ngc"), "G21\rG90\rM2\r").unwrap();
+    std::fs::create_dir(at.join("folder.ngc")).unwrap();
+    assert_eq!(code(&in_folder(at, &["check", "missing.ngc"])), 3);
+    assert_eq!(code(&in_folder(at, &["build", "folder.ngc"])), 3);
+    assert_eq!(code(&in_folder(at, &["check", "empty.ngc"])), 1);
+    assert_eq!(code(&in_folder(at, &["check", "binary.ngc"])), 1);
+    assert_eq!(code(&in_folder(at, &["check", "utf16.ngc"])), 0);
+    assert_eq!(code(&in_folder(at, &["check", "cr.ngc"])), 0);
+    let huge = std::fs::File::create(at.join("huge.ngc")).unwrap();
+    huge.set_len(3 << 30).unwrap();
+    let o = in_folder(at, &["check", "huge.ngc", "--message-format", "short"]);
+    assert_eq!(code(&o), 3);
+    assert!(text(&o.stderr).contains("E0823"));
+}
+
+#[test]
+fn build_targets() {
+    for target in ["canon", "motion", "rs274ngc", "csv", "sheet"] {
+        insta::assert_snapshot!(format!("build_{target}"), whole(&run(&["build", "part.ngc", "--target", target])));
+    }
+    for target in ["json", "svg", "png", "html", "sheet-json", "sheet-html"] {
+        let o = run(&["build", "part.ngc", "--target", target]);
+        assert!(code(&o) == 0 && o.stdout.len() > 100, "{target}: {}", text(&o.stderr));
+    }
+    let twice = || run(&["build", "part.ngc", "--target", "png"]).stdout;
+    assert_eq!(twice(), twice());
+    assert_eq!(code(&run(&["build", "part.ngc", "--target", "nothing"])), 2);
+}
+
+#[test]
+fn build_writes_all_or_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    for name in ["part.ngc", "faulty.ngc"] {
+        std::fs::copy(fixtures().join(name), at.join(name)).unwrap();
+    }
+    assert_eq!(code(&in_folder(at, &["build", "part.ngc", "faulty.ngc", "-o", "out/"])), 1);
+    assert!(!at.join("out").exists());
+    assert_eq!(code(&in_folder(at, &["build", "part.ngc", "-o", "part.ngc"])), 1, "never over the source");
+    assert_eq!(std::fs::read(at.join("part.ngc")).unwrap(), std::fs::read(fixtures().join("part.ngc")).unwrap());
+    let o = in_folder(at, &["build", "part.ngc", "-o", "out/x.ngc", "--depfile", "out/x.d"]);
+    assert_eq!(code(&o), 0, "{}", text(&o.stderr));
+    assert_eq!(std::fs::read_to_string(at.join("out/x.d")).unwrap(), "out/x.ngc: \\\n  part.ngc\n\npart.ngc:\n");
+    assert_eq!(std::fs::read_dir(at.join("out")).unwrap().count(), 2, "no temporary files stay");
+    assert_eq!(code(&in_folder(at, &["diff", "part.ngc", "out/x.ngc", "--tolerance", "0.0001"])), 0);
+}
+
+#[test]
+fn a_project() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    assert_eq!(code(&in_folder(at, &["init"])), 0);
+    assert_eq!(code(&in_folder(at, &["init"])), 3, "an existing file stays");
+    std::fs::copy(fixtures().join("part.ngc"), at.join("part.ngc")).unwrap();
+    let o = in_folder(at, &["build"]);
+    assert_eq!(code(&o), 0, "{}", text(&o.stderr));
+    assert!(at.join("build/part.ngc").is_file());
+    std::fs::write(at.join("gcc-robot.toml"), "schema = 1\n[project]\nsorces = []\n").unwrap();
+    insta::assert_snapshot!(whole(&in_folder(at, &["check"])).replace(&*at.to_string_lossy(), "FOLDER"));
+}
+
+#[test]
+fn reference_ufmg2008() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    std::fs::write(at.join("a.g"), "G01 X350 Y0 F20\nG01 X300 Y50 F20\n").unwrap();
+    let o = in_folder(at, &["build", "a.g", "--target", "joint-gcode", "--reference", "ufmg2008", "-o", "b.g"]);
+    assert_eq!(code(&o), 0, "{}", text(&o.stderr));
+    for name in ["b.g", "b-cartesian.csv", "b-joint.csv"] {
+        assert!(at.join(name).is_file(), "{name}");
+    }
+}
+
+#[test]
+fn other_commands() {
+    insta::assert_snapshot!("explain", whole(&run(&["explain", "E0203"])));
+    insta::assert_snapshot!("explain_code", whole(&run(&["explain", "g04"])));
+    assert_eq!(code(&run(&["explain", "nonsense"])), 2);
+    assert!(text(&run(&["explain", "--list"]).stdout).lines().count() > 100);
+    assert!(text(&run(&["target", "list"]).stdout).contains("rs274ngc"));
+    assert_eq!(code(&run(&["target", "show", "rs274ngc"])), 0);
+    assert!(text(&run(&["machine", "list"]).stdout).contains("generic/mill3"));
+    for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {
+        assert!(run(&["completions", shell]).stdout.len() > 1000);
+    }
+    assert_eq!(code(&run(&["no-such-command"])), 2);
+    assert_eq!(code(&run(&["--version"])), 0);
+    insta::assert_snapshot!("diff", whole(&run(&["diff", "part.ngc", "loop-free.ngc"])));
+    assert_eq!(code(&run(&["verify", "part.ngc", "--to", "grbl"])), 0);
+}
+
+#[test]
+fn format_and_renumber() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    std::fs::write(at.join("a.ngc"), "g21g90(\u{fc}ber)\nn5 g0x1\nm2\n").unwrap();
+    assert_eq!(code(&in_folder(at, &["fmt", "--check", "a.ngc"])), 1);
+    assert_eq!(code(&in_folder(at, &["fmt", "."])), 0);
+    assert_eq!(code(&in_folder(at, &["fmt", "--check", "."])), 0);
+    assert_eq!(std::fs::read_to_string(at.join("a.ngc")).unwrap(), "G21 G90 (\u{fc}ber)\nN5 G0 X1\nM2\n");
+    let o = in_folder(at, &["renumber", "a.ngc", "--all"]);
+    assert_eq!(text(&o.stdout), "N10 G21 G90 (\u{fc}ber)\nN20 G0 X1\nN30 M2\n");
+}
+
+#[test]
+fn preview_writes_pictures() {
+    let folder = tempfile::tempdir().unwrap();
+    let part = fixtures().join("part.ngc");
+    for (name, head) in [("a.svg", &b"<"[..]), ("a.png", b"\x89PNG"), ("a.html", b"<")] {
+        let goal = folder.path().join(name);
+        let o = run(&["preview", part.to_str().unwrap(), "-o", goal.to_str().unwrap()]);
+        assert_eq!(code(&o), 0, "{}", text(&o.stderr));
+        assert!(std::fs::read(goal).unwrap().starts_with(head));
+    }
+    assert_eq!(code(&run(&["preview", "part.ngc", "-o", "/nowhere/a.bmp"])), 2);
+}
+
+/// Every diagnostic whose registry row has a program that raises it, as people see it.
+#[test]
+fn every_diagnostic() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let mut shown = String::new();
+    for code in gr_spec::Code::all() {
+        let def = code.def();
+        let Some(bad) = def.bad else { continue };
+        std::fs::write(at.join("bad.ngc"), bad).unwrap();
+        let mut args = vec!["check", "bad.ngc", "-q", "--dialect", def.dialect.unwrap_or("linuxcnc"), "--warn", def.code];
+        if let Some(tools) = def.tools {
+            std::fs::write(at.join("tools.tbl"), tools).unwrap();
+            args.extend(["--tools", "tools.tbl"]);
+        }
+        let o = in_folder(at, &args);
+        shown.push_str(&format!("=== {} {}\n{}", def.code, def.slug, text(&o.stderr)));
+    }
+    insta::assert_snapshot!(shown);
+}
