@@ -9,6 +9,7 @@ mod check;
 mod db;
 mod disk;
 mod engine;
+mod lazy;
 mod lints;
 mod session;
 mod store;
@@ -17,5 +18,6 @@ mod ufmg;
 
 pub use check::{Check, MOST_OF_A_KIND};
 pub use db::Executed;
+pub use lazy::Lazy;
 pub use lints::{Level, Rules};
 pub use session::{Cancelled, Options, Session, Snapshot};
