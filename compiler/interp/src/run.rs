@@ -539,7 +539,7 @@ impl<'a, S: Sink> Interp<'a, S> {
         let span = span.map(|s| Span::new(s.start.saturating_sub(start), s.end.saturating_sub(start)));
         let p = self.place;
         let text = self.line_text();
-        let text = text.char_indices().nth(255).map_or(text, |(i, _)| &text[..i]);
+        let text = text.char_indices().nth(254).map_or(text, |(i, _)| &text[..i]);
         // Blanks at the end of a line are not read; a call that the controller made up keeps its own.
         let text = if fault.code == code::REMAP_WORDS { text } else { text.trim_end() }.into();
         self.findings.push(Finding { file: p.file, line: p.line, frame: p.frame, fault, span, text });
