@@ -77,7 +77,10 @@ impl Emitter<'_> {
     ) {
         let (start, end) = (sweep.at(from), sweep.at(to));
         let meant = Meant { sweep, from, to, turns, plane };
-        let found = (0..=4).find_map(|extra| self.candidate(&meant, &end, extra, view.state));
+        let found = match self.may_vanish(&meant, &end) {
+            true => None,
+            false => (0..=4).find_map(|extra| self.candidate(&meant, &end, extra, view.state)),
+        };
         if let Some(c) = found {
             if c.extra > 0 {
                 let args = [(self.w.places + c.extra).to_string(), self.w.places.to_string()];
@@ -96,6 +99,16 @@ impl Emitter<'_> {
         } else {
             self.arc_as_lines(view, sweep, from, to);
         }
+    }
+
+    /// Whether the arc comes back so near to its start that the last bits of the start decide whether a control
+    /// makes a full turn or none. Only a start that was written as the same number is sure.
+    fn may_vanish(&self, meant: &Meant<'_>, end: &Pose) -> bool {
+        let (f, s, _) = plane_axes(meant.plane);
+        let said = [f, s].map(|i| self.w.axis(i, end.axes[i]).1);
+        let same = [f, s].into_iter().zip(said).all(|(i, v)| self.anchored[i] && self.at[i] == v);
+        let gap = libm::hypot(said[0] - self.at[f], said[1] - self.at[s]);
+        !same && gap < 20.0 * self.w.step() && meant.angle().abs() > 3.0
     }
 
     /// The arc written with `extra` more decimals in its centre or radius, if it reads back right.
