@@ -257,7 +257,7 @@ impl Reader<'_> {
         Levels {
             strict: args.strict || lints.is_some_and(|l| l.strict),
             allow: self.codes(&both(&args.allow, lints.map(|l| &l.allow)), true),
-            warn: self.codes(&both(&args.warn, lints.map(|l| &l.warn)), false),
+            warn: self.codes(&both(&args.warn, lints.map(|l| &l.warn)), true),
             deny: self.codes(&both(&args.deny, lints.map(|l| &l.deny)), false),
         }
     }

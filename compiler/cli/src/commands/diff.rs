@@ -154,7 +154,14 @@ pub fn verify(global: &Global, args: &VerifyArgs) -> Exit {
     let again = Unit { path: "<translation>".into(), text, encoding: gr_text::Encoding::Utf8, setup };
     let (a, b) = (motion(&unit, None), motion(&again, None));
     let tolerance = Tolerance { length: allowed(args), rate: 1e-3, ..Tolerance::default() };
-    tell(global, &diff(&a.program, &b.program, &tolerance), &a.sources, &b.sources)
+    let mut result = diff(&a.program, &b.program, &tolerance);
+    if args.options.to.as_deref() == Some("grbl") {
+        // grbl has no tool changes: they are stops with a remark.
+        let before = result.differences.len();
+        result.differences.retain(|d| !matches!(d.aspect, Aspect::Tool | Aspect::Event));
+        result.count -= before - result.differences.len();
+    }
+    tell(global, &result, &a.sources, &b.sources)
 }
 
 /// One unit of the last decimal that is written; with straight pieces for arcs, their tolerance too.

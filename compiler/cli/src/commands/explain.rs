@@ -36,7 +36,7 @@ fn list() -> String {
         .map(|c| {
             let d = c.def();
             let lint = if d.lint { "lint" } else { word(d.severity) };
-            format!("{} {:<8}{:<32}{}\n", d.code, lint, d.slug, d.message)
+            format!("{} {:<8}{:<32}{}\n", d.code, lint, d.slug, gr_spec::fill(d.message, &["…".into(), "…".into(), "…".into(), "…".into()]))
         })
         .collect()
 }
@@ -76,9 +76,10 @@ fn word(severity: Severity) -> &'static str {
 fn diagnostic(code: Code) -> String {
     let d = code.def();
     let kind = if d.lint { format!("{}, a lint", word(d.severity)) } else { word(d.severity).to_string() };
-    let mut text = format!("{} {} ({kind})\n\n{}\n\n{}\n", d.code, d.slug, d.message, d.explanation);
+    let told = |template: &str| gr_spec::fill(template, &["…".into(), "…".into(), "…".into(), "…".into()]);
+    let mut text = format!("{} {} ({kind})\n\n{}\n\n{}\n", d.code, d.slug, told(d.message), d.explanation);
     if let Some(fix) = d.fix {
-        text.push_str(&format!("\nWhat to do: {fix}\n"));
+        text.push_str(&format!("\nWhat to do: {}\n", told(fix)));
     }
     if let Some(dialect) = d.dialect {
         text.push_str(&format!("\nThe examples are for the dialect {dialect}.\n"));

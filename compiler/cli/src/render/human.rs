@@ -9,7 +9,7 @@ use gr_text::{Diagnostic, FileId, Label, Severity};
 use crate::sources::{Positions, Sources, floor};
 
 /// Longer lines are cut down to the stretch around their labels.
-const WIDTH: usize = 240;
+const WIDTH: usize = 120;
 /// Bytes kept on each side of a label of a long line.
 const MARGIN: usize = 60;
 /// Labels further from the first one than this many lines are told in words.
@@ -241,7 +241,7 @@ impl Excerpt {
             let (mut cut_start, mut cut_end) = (start, end);
             if end - start > WIDTH {
                 cut_start = floor(text, (*from as usize).saturating_sub(MARGIN).max(start));
-                cut_end = floor(text, (*to as usize).saturating_add(MARGIN).min(cut_start + 2 * WIDTH).min(end)).max(cut_start);
+                cut_end = floor(text, (*to as usize).saturating_add(MARGIN).min(cut_start + WIDTH).min(end)).max(cut_start);
             }
             let place = self.text.len();
             let shown = printable(&text[cut_start..cut_end]);

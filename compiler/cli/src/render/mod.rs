@@ -67,7 +67,7 @@ impl Tally {
             [rest @ .., last] if !rest.is_empty() => format!("{} and {last}", rest.join(", ")),
             [only, ..] => only.clone(),
         };
-        format!("{found} in {}", many(self.files, "file"))
+        if self.files == 0 { found } else { format!("{found} in {}", many(self.files, "file")) }
     }
 }
 
