@@ -87,3 +87,13 @@ fn user_commands_are_a_range() {
     assert_eq!(d.code("M142").map(|c| c.code), Some("M100-M199"));
     assert!(d.code("M200").is_none() && d.code("G142").is_none());
 }
+
+/// An extension decides alone: two dialects that claim it would leave the choice to the order of files.
+#[test]
+fn each_extension_belongs_to_one_dialect() {
+    let mut all: Vec<_> = Dialect::all().iter().flat_map(|d| d.extensions).collect();
+    all.sort_unstable();
+    let before = all.len();
+    all.dedup();
+    assert_eq!(all.len(), before);
+}
