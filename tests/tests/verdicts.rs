@@ -77,7 +77,8 @@ fn each_fault_has_its_diagnostic() {
 }
 
 fn is_lint(code: &str) -> bool {
-    gr_spec::Code::find(code).is_some_and(|c| c.def().lint)
+    // A probe that goes nowhere: rs274 is silent, we warn on purpose, and one shipped program has it.
+    code == "E0256" || gr_spec::Code::find(code).is_some_and(|c| c.def().lint)
 }
 
 /// A false alarm is an error on a program the real one accepts, or a warning that is not in the table of lints.
