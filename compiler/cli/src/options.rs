@@ -106,7 +106,8 @@ pub struct SetupArgs {
 }
 
 /// A length unit.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum UnitArg {
     /// Millimetres
     Mm,

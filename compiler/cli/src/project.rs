@@ -46,7 +46,7 @@ pub struct Section {
     pub tools: Option<PathBuf>,
     pub vars: Option<PathBuf>,
     pub ini: Option<PathBuf>,
-    pub machine_units: Option<String>,
+    pub machine_units: Option<crate::options::UnitArg>,
     pub block_delete: bool,
     pub subs: Vec<PathBuf>,
     pub reference: Option<String>,

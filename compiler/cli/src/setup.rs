@@ -20,8 +20,8 @@ pub struct Station {
     pub setup: Setup,
     /// Asked for by an option.
     pub dialect: Option<&'static Dialect>,
-    /// Machine id or path.
-    pub machine: Option<String>,
+    /// The machine, if one was named.
+    pub machine: Option<gr_machine::Machine>,
     /// Files it was made of, for dep-files and `--watch`.
     pub files: Vec<PathBuf>,
     /// Project file, if one was found.
@@ -93,21 +93,20 @@ pub fn station(
         reader.dialect(&rule.dialect);
     }
     let machine = args.machine.clone().or_else(|| section.and_then(|s| s.machine.clone()));
+    let machine = machine.and_then(|name| reader.machine(&name));
+    if let Some(machine) = &machine {
+        limits(machine, &mut setup);
+    }
     let lints = reader.levels(lints, project.as_ref());
     let Reader { files, .. } = reader;
     (renderer.tally.errors == errors).then_some(Station { setup, dialect, machine, files, project, lints })
 }
 
 fn units(args: &SetupArgs, section: Option<&crate::project::Section>) -> Option<Units> {
-    let of_project = || match section?.machine_units.as_deref()? {
-        "inch" => Some(Units::Inch),
-        _ => Some(Units::Mm),
-    };
-    match args.machine_units {
-        Some(UnitArg::Mm) => Some(Units::Mm),
-        Some(UnitArg::Inch) => Some(Units::Inch),
-        None => of_project(),
-    }
+    args.machine_units.or(section.and_then(|s| s.machine_units)).map(|u| match u {
+        UnitArg::Mm => Units::Mm,
+        UnitArg::Inch => Units::Inch,
+    })
 }
 
 /// A file that the INI file names, if it is there: a program can be checked without the machine's own files.
@@ -127,6 +126,23 @@ fn assumed_tools() -> gr_interp::ToolTable {
         table.rows.push(gr_interp::Tool { number, pocket: number, comment: ASSUMED.into(), ..gr_interp::Tool::default() });
     }
     table
+}
+
+/// The travel of a machine, where the INI file does not say otherwise.
+fn limits(machine: &gr_machine::Machine, setup: &mut Setup) {
+    // Limits of an INI file are in the unit that the file states.
+    let scale = if setup.ini.machine_units() == Some(Units::Inch) { 25.4 } else { 1.0 };
+    for (i, (axis, (min, max))) in "xyzabcuvw".chars().zip(machine.travel().unwrap_or_default()).enumerate() {
+        let shown = |v: f64| if (3..6).contains(&i) { v.to_degrees() } else { v / scale };
+        for (key, value) in [("min_limit", min), ("max_limit", max)] {
+            if let Some(value) = value {
+                let entry = setup.ini.values.entry((format!("axis_{axis}"), key.into())).or_default();
+                if entry.is_empty() {
+                    entry.push(shown(value).to_string());
+                }
+            }
+        }
+    }
 }
 
 /// Folders with subroutines come first on the INI file's own search path.
@@ -241,6 +257,20 @@ impl Reader<'_> {
         match gr_interp::read_parameters(&text, file) {
             Ok(params) => setup.params = params,
             Err(d) => self.show(&[*d]),
+        }
+    }
+    fn machine(&mut self, name: &str) -> Option<gr_machine::Machine> {
+        match crate::commands::machine::load(name, self.sources) {
+            Ok(machine) => {
+                if gr_machine::is_path(name) {
+                    self.files.push(name.into());
+                }
+                Some(machine)
+            }
+            Err(found) => {
+                self.show(&found);
+                None
+            }
         }
     }
     fn dialect(&mut self, name: &str) -> Option<&'static Dialect> {

@@ -223,16 +223,17 @@ fn every_diagnostic() {
         let def = code.def();
         let Some(bad) = def.bad else { continue };
         std::fs::write(at.join("bad.ngc"), bad).unwrap();
-        let mut args = vec!["check", "bad.ngc", "-q", "--dialect", def.dialect.unwrap_or("linuxcnc")];
-        if def.lint {
-            args.extend(["--warn", def.code]);
+        std::fs::write(at.join("mill.ini"), "[TRAJ]\nLINEAR_UNITS = mm\n[AXIS_X]\nMIN_LIMIT = 0\nMAX_LIMIT = 800\n").unwrap();
+        std::fs::write(at.join("tools.tbl"), def.tools.unwrap_or("")).unwrap();
+        let mut args: Vec<&str> = def.options.unwrap_or("check").split_whitespace().collect();
+        args.extend(["bad.ngc", "-q"]);
+        if args[0] != "machine" {
+            args.extend(["--dialect", def.dialect.unwrap_or("linuxcnc")]);
+            args.extend(def.tools.map_or(vec![], |_| vec!["--tools", "tools.tbl"]));
+            args.extend(if def.lint { vec!["--warn", def.code] } else { vec![] });
         }
-        if let Some(tools) = def.tools {
-            std::fs::write(at.join("tools.tbl"), tools).unwrap();
-            args.extend(["--tools", "tools.tbl"]);
-        }
-        let o = in_folder(at, &args);
-        shown.push_str(&format!("=== {} {}\n{}", def.code, def.slug, text(&o.stderr)));
+        let told = text(&in_folder(at, &args).stderr);
+        shown.push_str(&format!("=== {} {}\n{told}", def.code, def.slug));
     }
     insta::assert_snapshot!(shown);
 }

@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 
 use clap::Parser as _;
-use gr_machine::Machine;
 use gr_spec::TargetDef;
 use gr_text::{Severity, code};
 
@@ -96,15 +95,11 @@ impl<'a> Round<'a> {
             return self.end(false);
         };
         self.files.extend(station.files.iter().cloned());
-        let machine = match station.machine.as_deref().map(|name| self.machine(name)) {
-            Some(None) => return self.end(false),
-            other => other.flatten(),
-        };
         match self.jobs(&station) {
             Ok(jobs) => {
                 self.renderer.tally.files = jobs.iter().map(|j| &j.source).collect::<std::collections::BTreeSet<_>>().len();
                 for job in &jobs {
-                    self.job(job, &station, machine.as_ref());
+                    self.job(job, &station);
                 }
                 if self.exit == Exit::Ok {
                     self.write();
@@ -126,18 +121,6 @@ impl<'a> Round<'a> {
 
     fn fail(&mut self, exit: Exit) {
         self.exit = self.exit.max(exit);
-    }
-
-    /// The machine of this id or path.
-    fn machine(&mut self, name: &str) -> Option<Machine> {
-        match super::machine::load(name, &mut self.sources) {
-            Ok(machine) => Some(machine),
-            Err(found) => {
-                found.iter().for_each(|d| self.renderer.show(&self.sources, d));
-                self.fail(Exit::Findings);
-                None
-            }
-        }
     }
 
     fn jobs(&mut self, station: &Station) -> Result<Vec<Job>, String> {
@@ -187,7 +170,7 @@ impl<'a> Round<'a> {
         Ok(jobs)
     }
 
-    fn job(&mut self, job: &Job, station: &Station, machine: Option<&Machine>) {
+    fn job(&mut self, job: &Job, station: &Station) {
         let progress = Progress::new(self.global.quiet, format!("building {} ({})", job.source.display(), job.target.id));
         let unit = match open(&job.source, station) {
             Ok((unit, checked)) => {
@@ -202,7 +185,7 @@ impl<'a> Round<'a> {
             }
         };
         let progress = Progress::new(self.global.quiet, format!("building {} ({})", job.source.display(), job.target.id));
-        let goal = Goal { target: job.target.id, options: &job.options, machine, from_line: self.args.from_line.map(|l| (l, self.args.safe_z)) };
+        let goal = Goal { target: job.target.id, options: &job.options, machine: station.machine.as_ref(), from_line: self.args.from_line.map(|l| (l, self.args.safe_z)) };
         let made = build(&unit, &goal);
         drop(progress);
         match made {

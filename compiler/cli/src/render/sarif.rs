@@ -31,7 +31,13 @@ impl Log {
             }
             value
         };
-        let locations: Vec<Value> = d.labels.first().map(|l| location(l, &l.text)).into_iter().collect();
+        let locations: Vec<Value> = d
+            .labels
+            .first()
+            .filter(|l| !sources.name(l.file).is_empty())
+            .map(|l| location(l, &l.text))
+            .into_iter()
+            .collect();
         let related: Vec<Value> = d.labels.iter().skip(1).map(|l| location(l, &l.text)).collect();
         let frames: Vec<Value> = d
             .trace
