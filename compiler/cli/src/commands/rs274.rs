@@ -432,6 +432,7 @@ fn setup(choice: &Choice, tools: ToolTable) -> Setup {
         machine_units: Units::Inch,
         user_m_codes: false,
         uvw: false,
+        startup_code: false,
         tools,
         block_delete: choice.block_delete,
         keep_going: choice.on_error != OnError::Stop,
