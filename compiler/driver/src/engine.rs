@@ -10,7 +10,7 @@ use gr_spec::code;
 
 use crate::Options;
 use crate::db::{Db, Outline, Shape};
-use crate::lints::{Flags, Found, Lints, Summary, Where, left_on};
+use crate::lints::{Flags, From, Found, Lints, Summary, Where, left_on};
 
 /// State between two chunks: the interpreter's, and what lints remember.
 #[derive(Clone, Debug)]
@@ -219,6 +219,7 @@ fn of_finding(f: &Finding, options: &Options) -> Option<Found> {
         letter: f.fault.letter,
         span: f.span,
         args: f.fault.message_args().to_vec(),
+        from: if f.fault.rs.is_some() { From::Fault } else { From::Doubt },
     })
 }
 
@@ -410,7 +411,7 @@ fn no_end(context: &Finish<'_>, line: u32) -> Option<Found> {
         None if strict => code.def().severity,
         severity => severity?,
     };
-    Some(Found { code, severity, place: place(line), letter: None, span: None, args: Vec::new() })
+    Some(Found { code, severity, place: place(line), letter: None, span: None, args: Vec::new(), from: From::Lint })
 }
 
 /// A file of subroutines: it begins with one.

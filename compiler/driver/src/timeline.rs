@@ -11,7 +11,7 @@ use gr_canon::{CallFrame, FrameId};
 
 use crate::db::{ChunkText, Counted, Db, Document, RunOptions, Shape, scanned, shape};
 use crate::engine::{self, Boundary, End, Environment};
-use crate::lints::{Cuts, Found, Summary, Where};
+use crate::lints::{Cuts, Found, From, Summary, Where};
 
 /// State between two chunks.
 #[salsa::interned(debug)]
@@ -211,6 +211,33 @@ impl Late {
     }
 }
 
+/// Findings of the interpreter after which it gives up, as the controller does when it is told to go on.
+const GIVE_UP: usize = 100;
+
+/// Cuts everything behind the fault at which the interpreter gives up, and says on which line that is. The
+/// interpreter counts within the stretch that it runs; here the whole file counts.
+fn too_many(groups: &mut Vec<Group>) -> Option<u32> {
+    if groups.iter().map(|g| g.found.len()).sum::<usize>() < GIVE_UP {
+        return None;
+    }
+    let mut count = 0;
+    for g in 0..groups.len() {
+        for (at, found) in groups[g].found.iter().enumerate() {
+            count += usize::from(found.from != From::Lint);
+            if count >= GIVE_UP && found.from == From::Fault {
+                let line = found.place.line.wrapping_add(groups[g].first_line);
+                // Lints of a stretch with control flow come behind its findings.
+                let keep = |(i, f): &(usize, &Found)| *i <= at || (f.from == From::Lint && f.place.line <= found.place.line);
+                let kept: Vec<Found> = groups[g].found.iter().enumerate().filter(keep).map(|(_, f)| f.clone()).collect();
+                groups[g].found = kept.into();
+                groups.truncate(g + 1);
+                return Some(line);
+            }
+        }
+    }
+    None
+}
+
 fn fold<'db>(db: &'db dyn Db, document: Document, last_line: u32) -> Timeline<'db> {
     let run = document.run(db);
     let options = run.options(db);
@@ -256,6 +283,9 @@ fn fold<'db>(db: &'db dyn Db, document: Document, last_line: u32) -> Timeline<'d
             env = step.env.unwrap_or(env);
             at += 1;
         }
+    }
+    if let Some(line) = too_many(&mut groups) {
+        end = Some(End { line, stopped: true, program: false });
     }
     let complete = at >= chunks.len() || end.is_some();
     if complete {

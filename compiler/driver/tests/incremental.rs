@@ -273,3 +273,13 @@ fn cases_that_once_failed() {
     session.edit(file, range, "G95 F100\n");
     assert_same(&text, &session.check(file), &scratch(&text, 256), "edit");
 }
+
+#[test]
+fn a_hundred_mistakes_are_enough_whatever_the_chunks() {
+    let text = "G21\n".to_string() + &"G1 X1\n(fine)\n".repeat(300) + "M2\n";
+    let whole = scratch(&text, 10_000);
+    assert_eq!(whole.diagnostics.len(), 100);
+    for chunk in [1, 3, 7, 64] {
+        assert_same(&text, &scratch(&text, chunk), &whole, "many mistakes");
+    }
+}

@@ -27,7 +27,7 @@ fn milder(severity: Severity) -> Severity {
 /// The program ended by `%` or just stopped: everything stays as it is.
 pub(crate) fn left_on(state: &Modal, place: Where, rules: &Rules) -> Vec<Found> {
     let found = |code: Code| {
-        Some(Found { code, severity: rules.severity(code)?, place, letter: None, span: None, args: Vec::new() })
+        Some(Found { code, severity: rules.severity(code)?, place, letter: None, span: None, args: Vec::new(), from: super::From::Lint })
     };
     let turning = state.turning.iter().any(|t| *t != 0);
     let spindle = turning.then(|| found(code::END_SPINDLE_ON)).flatten();

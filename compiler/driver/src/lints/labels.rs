@@ -17,7 +17,7 @@ pub(crate) fn labels(shapes: &[&Shape], starts: &[(u32, u32)], options: &Options
     let mut report = |code: Code, line: u32, letter: u8, name: &str| {
         if let Some(severity) = options.rules.severity(code) {
             let place = Where { line, ..Where::default() };
-            found.push(Found { code, severity, place, letter: Some(letter), span: None, args: vec![name.to_string()] });
+            found.push(Found { code, severity, place, letter: Some(letter), span: None, args: vec![name.to_string()], from: super::From::Lint });
         }
     };
     if options.setup.dialect.family == Family::Fanuc && shapes.iter().any(|s| s.jumps) {

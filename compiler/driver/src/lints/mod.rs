@@ -74,6 +74,19 @@ pub(crate) struct Found {
     /// Exact place, relative to the chunk.
     pub(crate) span: Option<gr_text::Span>,
     pub(crate) args: Vec<String>,
+    /// Who found it.
+    pub(crate) from: From,
+}
+
+/// Who found something.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum From {
+    /// A lint.
+    Lint,
+    /// The interpreter, and went on.
+    Doubt,
+    /// The interpreter, and gave the block up.
+    Fault,
 }
 
 /// Where a call came from.
@@ -84,7 +97,7 @@ pub(crate) struct Where {
     pub(crate) frame: FrameId,
 }
 
-impl From<&At<'_>> for Where {
+impl std::convert::From<&At<'_>> for Where {
     fn from(at: &At<'_>) -> Where {
         Where { file: at.file, line: at.line, frame: at.frame }
     }
@@ -163,7 +176,7 @@ impl<'a> Lints<'a> {
 
     fn report(&mut self, code: Code, at: &At<'_>, letter: Option<u8>, args: &[String]) {
         if let Some(severity) = self.rules.severity(code) {
-            self.found.push(Found { code, severity, place: at.into(), letter, span: None, args: args.to_vec() });
+            self.found.push(Found { code, severity, place: at.into(), letter, span: None, args: args.to_vec(), from: From::Lint });
         }
     }
 
@@ -314,5 +327,5 @@ impl Lints<'_> {
 /// Cutting before the spindle is started for the first time.
 pub(crate) fn stopped_at(place: Where, rules: &Rules) -> Option<Found> {
     let code = gr_spec::code::SPINDLE_STOPPED;
-    Some(Found { code, severity: rules.severity(code)?, place, letter: None, span: None, args: Vec::new() })
+    Some(Found { code, severity: rules.severity(code)?, place, letter: None, span: None, args: Vec::new(), from: From::Lint })
 }

@@ -97,6 +97,6 @@ impl Dive {
         }
         let severity = rules.severity(code::RAPID_INTO_STOCK)?;
         let args = vec![self.end[2].to_string(), cuts.lowest.to_string()];
-        Some(Found { code: code::RAPID_INTO_STOCK, severity, place: self.place, letter: Some(b'z'), span: None, args })
+        Some(Found { code: code::RAPID_INTO_STOCK, severity, place: self.place, letter: Some(b'z'), span: None, args, from: super::From::Lint })
     }
 }
