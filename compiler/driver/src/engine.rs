@@ -10,7 +10,7 @@ use gr_spec::code;
 
 use crate::Options;
 use crate::db::{Db, Outline, Shape};
-use crate::lints::{Flags, From, Found, Lints, Summary, Where, left_on};
+use crate::lints::{Flags, Found, From, Lints, Seen, Summary, Where, left_on};
 
 /// State between two chunks: the interpreter's, and what lints remember.
 #[derive(Clone, Debug)]
@@ -20,6 +20,8 @@ pub(crate) struct Boundary {
     /// The opening `%` is still to come.
     opening: bool,
     key: Box<[u8]>,
+    /// What the stream has said, while calls are held back.
+    seen: Option<Box<Seen>>,
 }
 
 impl Boundary {
@@ -27,7 +29,21 @@ impl Boundary {
         // The N number of the last block is of no use to the next one.
         state.modal.n_number = -1;
         let key = state.key_bytes().into();
-        Boundary { state: Arc::new(state), flags, opening, key }
+        Boundary { state: Arc::new(state), flags, opening, key, seen: None }
+    }
+    /// Behind a chunk of `lines` lines.
+    fn behind(mut state: State, lints: &Lints<'_>, opening: bool, lines: u32) -> Boundary {
+        let seen = (!state.queue.is_empty()).then(|| Box::new(lints.seen()));
+        state.queue.count_lines_from(lines);
+        Boundary { seen, ..Boundary::new(state, lints.flags, opening) }
+    }
+    /// The lints as they go on from here.
+    fn lints<'a>(&self, options: &'a Options) -> Lints<'a> {
+        let mut lints = Lints::new(&options.rules, &self.state.modal, self.flags);
+        if let Some(seen) = &self.seen {
+            lints.resume(seen);
+        }
+        lints
     }
     pub(crate) fn modal(&self) -> &Modal {
         &self.state.modal
@@ -40,6 +56,7 @@ impl PartialEq for Boundary {
             && self.opening == other.opening
             && self.key == other.key
             && self.state.queue == other.state.queue
+            && self.seen == other.seen
     }
 }
 
@@ -176,7 +193,7 @@ fn opened(chunk: &Chunk) -> (u32, bool) {
 /// Interprets a chunk that has no control flow.
 pub(crate) fn step(chunk: &Chunk, entry: &Boundary, env: Option<&Environment>, options: &Options) -> StepOutcome {
     let (first, opening) = if entry.opening { opened(chunk) } else { (0, false) };
-    let mut lints = LastLine { inner: Lints::new(&options.rules, &entry.state.modal, entry.flags), line: 0 };
+    let mut lints = LastLine { inner: entry.lints(options), line: 0 };
     let nothing = Params::default();
     let params = env.map_or(&nothing, |e| &e.params);
     let lines = first..chunk.scan.lines.len() as u32;
@@ -189,10 +206,11 @@ pub(crate) fn step(chunk: &Chunk, entry: &Boundary, env: Option<&Environment>, o
         gr_interp::End::Percent => percent_line(chunk, first),
         _ => lints.line,
     };
+    let boundary = Boundary::behind(exit.state, &lints.inner, opening, chunk.scan.lines.len() as u32);
     found.extend(lints.inner.found);
     found.sort_by_key(|f| f.place.line);
     StepOutcome {
-        boundary: Boundary::new(exit.state, lints.inner.flags, opening),
+        boundary,
         environment: env.filter(|_| touched).map(|_| Environment { params: exit.params }),
         found,
         summary: lints.inner.summary,
@@ -310,9 +328,12 @@ impl<S: Sink> Sink for Watch<'_, S> {
 pub(crate) fn flow(stretch: &Stretch<'_>) -> FlowOutcome {
     let Stretch { db, main, file, line, shift, entry, env, options } = stretch;
     let mut library = Library::new(*db, options, *main, file.clone());
-    let lints = Lints::new(&options.rules, &entry.state.modal, entry.flags);
+    let lints = entry.lints(options);
     let watch = Watch { inner: LastLine { inner: lints, line: 0 }, db: *db, frames: Vec::new(), calls: 0 };
-    let state = ((*entry.state).clone(), env.params.clone());
+    let mut state = (*entry.state).clone();
+    // From lines of the chunk to lines of the file.
+    state.queue.count_lines_from(line.wrapping_neg());
+    let state = (state, env.params.clone());
     let from = if entry.opening { (*line).max(shift + 1) } else { *line };
     let mut interp = Interp::resume(&mut library, &options.setup, watch, state, *main, (from, *shift as i32));
     let why = interp.run_open();

@@ -96,6 +96,12 @@ impl Queue {
     pub fn push(&mut self, call: Call, place: Place) {
         self.items.push((Item::Other(call), place));
     }
+    /// Lines count from `by` lines further down from now on: a line above the new first one wraps around zero.
+    pub fn count_lines_from(&mut self, by: u32) {
+        for (_, place) in &mut self.items {
+            place.line = place.line.wrapping_sub(by);
+        }
+    }
     /// Forgets everything (restart).
     pub fn clear(&mut self) {
         self.last_front = self.front();

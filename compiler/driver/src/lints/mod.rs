@@ -144,6 +144,20 @@ pub(crate) struct Lints<'a> {
     tool: i32,
 }
 
+/// What the stream has said so far. The interpreter's state says the same, except while cutter compensation
+/// holds calls back: then the stream lags behind.
+#[derive(Clone, PartialEq, Debug)]
+pub(crate) struct Seen {
+    points: [[f64; 3]; 4],
+    rotation: f64,
+    feed: f64,
+    turning: u8,
+    switches: [bool; 4],
+    units: Units,
+    plane: Plane,
+    tool: i32,
+}
+
 fn xyz(axes: &[f64]) -> [f64; 3] {
     [axes[0], axes[1], axes[2]]
 }
@@ -172,6 +186,28 @@ impl<'a> Lints<'a> {
             plane: state.plane(),
             tool: state.selected_tool,
         }
+    }
+
+    /// What the stream has said so far.
+    pub(crate) fn seen(&self) -> Seen {
+        Seen {
+            points: [self.position, self.origin, self.g92, self.tool_offset],
+            rotation: self.rotation,
+            feed: self.feed,
+            turning: self.turning,
+            switches: [self.compensation, self.mist, self.flood, self.feed_per_revolution],
+            units: self.units,
+            plane: self.plane,
+            tool: self.tool,
+        }
+    }
+
+    /// Goes on from what the stream had said.
+    pub(crate) fn resume(&mut self, seen: &Seen) {
+        [self.position, self.origin, self.g92, self.tool_offset] = seen.points;
+        [self.compensation, self.mist, self.flood, self.feed_per_revolution] = seen.switches;
+        (self.rotation, self.feed, self.turning) = (seen.rotation, seen.feed, seen.turning);
+        (self.units, self.plane, self.tool) = (seen.units, seen.plane, seen.tool);
     }
 
     fn report(&mut self, code: Code, at: &At<'_>, letter: Option<u8>, args: &[String]) {
