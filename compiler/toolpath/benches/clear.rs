@@ -1,0 +1,4 @@
+//! How long a pocket takes.
+fn main() {
+    divan::main();
+}

@@ -1,0 +1,1 @@
+//! Joins loose segments into closed curves.
