@@ -221,7 +221,8 @@ fn every_diagnostic() {
     let mut shown = String::new();
     for code in gr_spec::Code::all() {
         let def = code.def();
-        let Some(bad) = def.bad else { continue };
+        // Examples of exchange files are tested with the crates that read them.
+        let Some(bad) = def.bad.filter(|_| def.dialect != Some("part21")) else { continue };
         std::fs::write(at.join("bad.ngc"), bad).unwrap();
         std::fs::write(at.join("mill.ini"), "[TRAJ]\nLINEAR_UNITS = mm\n[AXIS_X]\nMIN_LIMIT = 0\nMAX_LIMIT = 800\n").unwrap();
         std::fs::write(at.join("tools.tbl"), def.tools.unwrap_or("")).unwrap();
