@@ -20,7 +20,7 @@ pub(crate) struct Boundary {
     /// The opening `%` is still to come.
     opening: bool,
     key: Box<[u8]>,
-    /// What the stream has said, while calls are held back.
+    /// What the stream has said, when it differs from the state: calls are held back, or were dropped by an error.
     seen: Option<Box<Seen>>,
 }
 
@@ -33,7 +33,8 @@ impl Boundary {
     }
     /// Behind a chunk of `lines` lines.
     fn behind(mut state: State, lints: &Lints<'_>, opening: bool, lines: u32) -> Boundary {
-        let seen = (!state.queue.is_empty()).then(|| Box::new(lints.seen()));
+        let seen = lints.seen();
+        let seen = (seen != Lints::new(lints.rules, &state.modal, lints.flags).seen()).then(|| Box::new(seen));
         state.queue.count_lines_from(lines);
         Boundary { seen, ..Boundary::new(state, lints.flags, opening) }
     }

@@ -145,7 +145,7 @@ pub(crate) struct Lints<'a> {
 }
 
 /// What the stream has said so far. The interpreter's state says the same, except while cutter compensation
-/// holds calls back: then the stream lags behind.
+/// holds calls back (the stream lags behind) and after an error dropped them.
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) struct Seen {
     points: [[f64; 3]; 4],
