@@ -151,7 +151,7 @@ pub fn build(unit: &Unit, goal: &Goal<'_>) -> Result<Built, String> {
         "json" => dumped(|out| gr_backends::dump::json(&motion.program, out)),
         "csv" => dumped(|out| gr_backends::dump::csv(&motion.program, &gr_backends::dump::CsvOptions::default(), out)),
         "svg" | "png" | "html" => one_picture(&motion.program, goal.target, &name)?,
-        "sheet" | "sheet-json" | "sheet-html" => Ok((one(sheet(&motion.program, goal.target, &name)), Vec::new())),
+        "sheet" | "sheet-json" | "sheet-html" => Ok((one(sheet(&motion.program, unit, goal.target, &name)), Vec::new())),
         other => return Err(format!("the target {other} can't be made by this version")),
     };
     Ok(match made {
@@ -197,8 +197,23 @@ pub fn picture(program: &Program, kind: &str, options: &gr_backends::plot::Optio
     })
 }
 
-fn sheet(program: &Program, kind: &str, name: &str) -> Vec<u8> {
-    let options = gr_backends::sheet::Options { title: name.to_string(), ..gr_backends::sheet::Options::default() };
+/// The tool table for a setup sheet.
+fn tool_rows(unit: &Unit) -> Vec<gr_backends::sheet::ToolRow> {
+    let unit_mm = unit.setup.machine_units.mm();
+    let row = |t: &gr_interp::Tool| gr_backends::sheet::ToolRow {
+        number: t.number,
+        diameter: t.diameter * unit_mm,
+        comment: t.comment.to_string(),
+    };
+    unit.setup.tools.rows.iter().map(row).collect()
+}
+
+fn sheet(program: &Program, unit: &Unit, kind: &str, name: &str) -> Vec<u8> {
+    let options = gr_backends::sheet::Options {
+        title: name.to_string(),
+        tools: tool_rows(unit),
+        ..gr_backends::sheet::Options::default()
+    };
     let sheet = gr_backends::sheet::sheet(program, &options);
     let text = match kind {
         "sheet-json" => sheet.json(),

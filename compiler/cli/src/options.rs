@@ -151,6 +151,9 @@ pub struct BuildArgs {
     /// Programs [default: sources and targets of gcc-robot.toml]
     #[arg(value_name = "FILE")]
     pub files: Vec<PathBuf>,
+    /// Folder whose gcc-robot.toml says what to build [default: the nearest one at or above this folder]
+    #[arg(long, value_name = "FOLDER")]
+    pub project: Option<PathBuf>,
     /// What to make; `gcc-robot target list` shows all [default: rs274ngc]
     #[arg(long, value_name = "TARGET")]
     pub target: Option<String>,

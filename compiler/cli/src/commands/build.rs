@@ -89,7 +89,13 @@ impl<'a> Round<'a> {
     }
 
     fn run(mut self) -> Ended {
-        let found = station(&self.args.setup, &self.args.lints, Path::new("."), &mut self.sources, &mut self.renderer);
+        let from = self.args.project.as_deref().unwrap_or(Path::new("."));
+        if self.args.project.is_some() && !from.join(crate::project::NAME).is_file() {
+            eprintln!("there is no {} in {}", crate::project::NAME, from.display());
+            self.fail(Exit::Usage);
+            return self.end(false);
+        }
+        let found = station(&self.args.setup, &self.args.lints, from, &mut self.sources, &mut self.renderer);
         let Some(station) = found else {
             self.fail(Exit::Findings);
             return self.end(false);
@@ -245,7 +251,9 @@ impl<'a> Round<'a> {
             .and_then(|_| write_all(&files))
             .and_then(|()| stdout.iter().try_for_each(|(p, b)| to_stdout(b).map_err(|e| (p.clone(), e))));
         match written {
-            Ok(()) if !self.global.quiet && self.args.files.is_empty() => eprintln!("built {} files", files.len()),
+            Ok(()) if !self.global.quiet && self.args.files.is_empty() => {
+                files.iter().for_each(|(p, _)| eprintln!("built {}", p.display()));
+            }
             Ok(()) => {}
             Err((path, e)) => {
                 let name = path.display().to_string();
