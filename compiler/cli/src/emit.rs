@@ -199,7 +199,7 @@ pub fn picture(program: &Program, kind: &str, options: &gr_backends::plot::Optio
 
 /// The tool table for a setup sheet.
 fn tool_rows(unit: &Unit) -> Vec<gr_backends::sheet::ToolRow> {
-    let unit_mm = unit.setup.machine_units.mm();
+    let unit_mm = if unit.setup.machine_units == Units::Inch { 25.4 } else { 1.0 };
     let row = |t: &gr_interp::Tool| gr_backends::sheet::ToolRow {
         number: t.number,
         diameter: t.diameter * unit_mm,

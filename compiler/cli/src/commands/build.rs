@@ -252,7 +252,8 @@ impl<'a> Round<'a> {
             .and_then(|()| stdout.iter().try_for_each(|(p, b)| to_stdout(b).map_err(|e| (p.clone(), e))));
         match written {
             Ok(()) if !self.global.quiet && self.args.files.is_empty() => {
-                files.iter().for_each(|(p, _)| eprintln!("built {}", p.display()));
+                let here = std::env::current_dir().unwrap_or_default();
+                files.iter().for_each(|(p, _)| eprintln!("built {}", p.strip_prefix(&here).unwrap_or(p).display()));
             }
             Ok(()) => {}
             Err((path, e)) => {
