@@ -13,6 +13,19 @@ pub struct Options {
     pub title: String,
     /// Rapid rates and tool change time.
     pub rates: Rates,
+    /// Rows of the tool table.
+    pub tools: Vec<ToolRow>,
+}
+
+/// What a tool table says of a tool.
+#[derive(Clone, PartialEq, Debug, Default)]
+pub struct ToolRow {
+    /// Number.
+    pub number: i32,
+    /// Diameter, mm; zero when the table names none.
+    pub diameter: f64,
+    /// The person's own words.
+    pub comment: String,
 }
 
 /// A finished sheet.
@@ -27,11 +40,27 @@ pub struct Sheet {
 pub fn sheet(program: &Program, options: &Options) -> Sheet {
     let mut report = report(program, &options.rates);
     tool_notes(program, &mut report);
+    for tool in &mut report.tools {
+        if let Some(row) = options.tools.iter().find(|r| r.number == tool.tool) {
+            from_table(tool, row);
+        }
+    }
     Sheet { title: options.title.clone(), report, rates: options.rates }
 }
 
-/// A comment that begins with the tool's number (`T3 drill 5`), or the nearest one up to three lines before
-/// its first change, describes the tool.
+/// The table knows the tool better than the program's comments do; a row the program itself wrote (G10 L1) is
+/// newer than both.
+fn from_table(tool: &mut ToolUse, row: &ToolRow) {
+    if !row.comment.trim().is_empty() {
+        tool.note = Some(row.comment.trim().to_owned());
+    }
+    if row.diameter != 0.0 {
+        tool.diameter.get_or_insert(row.diameter);
+    }
+}
+
+/// A comment that begins with the tool's number (`T3 drill 5`), or else the one in the block of its first change,
+/// describes the tool.
 fn tool_notes(program: &Program, report: &mut Report) {
     let mut notes: Vec<(gr_ir::Source, &str)> = Vec::new();
     for step in program.steps() {
@@ -45,11 +74,8 @@ fn tool_notes(program: &Program, report: &mut Report) {
     for tool in report.tools.iter_mut().filter(|t| t.tool >= 0) {
         let named = notes.iter().find(|(_, text)| describes(text, tool.tool));
         let first = tool.first;
-        let near = |lines: u32| {
-            let there = first.line.checked_sub(lines);
-            notes.iter().find(|(s, _)| s.file == first.file && Some(s.line) == there)
-        };
-        tool.note = named.or_else(|| (0..4).find_map(near)).map(|(_, t)| (*t).to_owned());
+        let there = || notes.iter().find(|(s, _)| s.file == first.file && s.line == first.line);
+        tool.note = named.or_else(there).map(|(_, t)| (*t).to_owned());
     }
 }
 
