@@ -1,0 +1,19 @@
+//! STEP-NC process plans to motion. [`process`] is what a file says, as plain data; [`plan`] makes a motion
+//! program of it; [`table`] lists it for people; [`reference`] repeats the results of two published systems;
+//! [`stepnc`] writes a motion program back as STEP-NC. Reading Part 21 and checking the schema are elsewhere.
+
+pub mod frame;
+pub mod process;
+mod read;
+pub mod reference;
+pub mod table;
+
+use gr_text::{Diagnostic, FileId};
+pub use process::{Process, Tool, Units};
+
+/// Reads the process of a file. Faults of syntax and schema are not told here.
+pub fn process(text: &[u8], file: FileId, units: Option<Units>) -> (Option<Process>, Vec<Tool>, Vec<Diagnostic>) {
+    let exchange = gr_p21::parse(text);
+    let model = gr_step::Model::new(text, &exchange);
+    read::read(&model, file, units)
+}

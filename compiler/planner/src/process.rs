@@ -1,0 +1,895 @@
+//! The process model: what a STEP-NC file says is to be machined, as plain data. Lengths are mm, angles rad,
+//! times s, feeds mm/s, spindle speeds rpm. Everything knows which instance it came from. Making paths of it
+//! is not here.
+
+use crate::frame::Frame;
+use gr_text::Span;
+
+/// Where something comes from.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct Origin {
+    /// Instance number.
+    pub id: u64,
+    /// Its statement.
+    pub span: Span,
+}
+
+/// How numbers of technology are read.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub enum Units {
+    /// m/s, 1/s, degrees: as the standard says.
+    #[default]
+    Iso,
+    /// m/min, rpm (or rpm/100), mm/rev, radians: as STEP Modeler writes them.
+    StepModeler,
+}
+
+/// A project.
+#[derive(Clone, PartialEq, Debug, Default)]
+pub struct Process {
+    /// Its name.
+    pub name: String,
+    /// How technology was read.
+    pub units: Units,
+    /// Workpieces of the project.
+    pub workpieces: Vec<Workpiece>,
+    /// What is executed, in order.
+    pub elements: Vec<Element>,
+    /// Workingsteps that no workplan reaches.
+    pub orphans: Vec<Origin>,
+    /// Variables with their values before the first executable.
+    pub variables: Vec<(String, Option<f64>)>,
+}
+
+/// A workpiece.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Workpiece {
+    /// Instance.
+    pub origin: Origin,
+    /// Name.
+    pub name: String,
+    /// Material.
+    pub material: String,
+    /// Global tolerance as written, mm.
+    pub tolerance: Option<f64>,
+    /// Raw block: where its corner lies, and its size.
+    pub block: Option<(Frame, [f64; 3])>,
+}
+
+/// One thing to execute.
+#[derive(Clone, PartialEq, Debug)]
+pub enum Element {
+    /// A nested workplan.
+    Plan(Plan),
+    /// A machining workingstep.
+    Step(Box<Workingstep>),
+    /// A rapid movement.
+    Rapid(Box<Rapid>),
+    /// A function of the control.
+    Function(Function),
+    /// Touch probing of the workpiece.
+    Probe(Box<Probe>),
+}
+
+/// A workplan.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Plan {
+    /// Instance.
+    pub origin: Origin,
+    /// Name.
+    pub name: String,
+    /// Setup it is done in.
+    pub setup: Option<Setup>,
+    /// Elements, in order.
+    pub elements: Vec<Element>,
+}
+
+/// A clamping of the part.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Setup {
+    /// Instance.
+    pub origin: Origin,
+    /// Name.
+    pub name: String,
+    /// Its place on the machine, if stated.
+    pub frame: Option<Frame>,
+    /// Height of its security plane.
+    pub security: Option<f64>,
+    /// Placement of each workpiece in it.
+    pub workpieces: Vec<(u64, Frame)>,
+}
+
+/// A point and a normal.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Plane {
+    /// A point of it.
+    pub point: [f64; 3],
+    /// Its normal.
+    pub normal: [f64; 3],
+}
+
+/// One operation on one feature.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Workingstep {
+    /// Instance.
+    pub origin: Origin,
+    /// Name.
+    pub name: String,
+    /// Plane above which rapids are safe, in the frame of the setup.
+    pub security: Plane,
+    /// Feature.
+    pub feature: Feature,
+    /// Operation.
+    pub operation: Operation,
+    /// Top of the raw part in the setup, if known.
+    pub stock_top: Option<f64>,
+}
+
+/// A rapid movement.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Rapid {
+    /// Instance.
+    pub origin: Origin,
+    /// Name.
+    pub name: String,
+    /// Security plane.
+    pub security: Plane,
+    /// Path; empty for RETURN_HOME without one.
+    pub toolpaths: Vec<Toolpath>,
+    /// RETURN_HOME.
+    pub home: bool,
+}
+
+/// Touch probing.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Probe {
+    /// Instance.
+    pub origin: Origin,
+    /// Name.
+    pub name: String,
+    /// Security plane.
+    pub security: Plane,
+    /// Where it starts.
+    pub start: [f64; 3],
+    /// Unit direction.
+    pub direction: [f64; 3],
+    /// How far the surface is expected.
+    pub distance: f64,
+    /// Variable that takes the result.
+    pub variable: String,
+}
+
+/// A function of the control.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Function {
+    /// Instance.
+    pub origin: Origin,
+    /// Name.
+    pub name: String,
+    /// What it does.
+    pub kind: FunctionKind,
+}
+
+/// What a function does.
+#[derive(Clone, PartialEq, Debug)]
+pub enum FunctionKind {
+    /// Words for the operator.
+    Message(String),
+    /// Stops if the operator wants.
+    OptionalStop,
+    /// Stops.
+    ProgramStop,
+    /// Changes the pallet.
+    ExchangePallet,
+    /// Puts a tool into the spindle.
+    LoadTool(Tool),
+    /// Takes it out.
+    UnloadTool,
+}
+
+/// A manufacturing feature in the frame of its setup.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Feature {
+    /// Instance.
+    pub origin: Origin,
+    /// Entity.
+    pub keyword: String,
+    /// Name.
+    pub name: String,
+    /// Placement in the setup.
+    pub frame: Frame,
+    /// Placement as written, relative to the workpiece.
+    pub placement: Frame,
+    /// Depth below the placement (positive into the material).
+    pub depth: f64,
+    /// Shape.
+    pub shape: Shape,
+    /// Where it is repeated: placements in the setup. Without a pattern, just `frame`.
+    pub copies: Vec<Frame>,
+}
+
+/// Shapes.
+#[derive(Clone, PartialEq, Debug)]
+pub enum Shape {
+    /// A plane to be cut flat.
+    Face {
+        /// Along the course of travel.
+        length: f64,
+        /// Direction of the course in the feature frame.
+        direction: [f64; 2],
+        /// Across it.
+        width: f64,
+        /// Direction across, in the feature frame.
+        across: [f64; 2],
+        /// Boundary where it is not the rectangle of the two.
+        boundary: Option<Contour>,
+        /// What stays.
+        bosses: Vec<Boss>,
+    },
+    /// A closed pocket.
+    Pocket {
+        /// Boundary at the top.
+        boundary: Closed,
+        /// What stays.
+        bosses: Vec<Boss>,
+        /// Draft of the walls, rad.
+        slope: f64,
+        /// Bottom.
+        bottom: PocketBottom,
+        /// Radius between wall and bottom.
+        planar_radius: Option<f64>,
+        /// Radius between walls.
+        orthogonal_radius: Option<f64>,
+    },
+    /// An open pocket: its boundary, and the part of it that is a wall.
+    OpenPocket {
+        /// Boundary, open.
+        boundary: Contour,
+        /// Wall, if it is less than the boundary.
+        wall: Option<Contour>,
+        /// What stays.
+        bosses: Vec<Boss>,
+        /// Draft of the walls, rad.
+        slope: f64,
+        /// Bottom.
+        bottom: PocketBottom,
+        /// Radius between wall and bottom.
+        planar_radius: Option<f64>,
+        /// Radius between walls.
+        orthogonal_radius: Option<f64>,
+    },
+    /// A slot.
+    Slot {
+        /// Where the section goes.
+        path: Travel,
+        /// Section.
+        section: Section,
+        /// Ends, in the order of the path.
+        ends: Vec<SlotEnd>,
+    },
+    /// A step.
+    Step {
+        /// Length along its edge.
+        length: f64,
+        /// Direction of the edge in the feature frame.
+        direction: [f64; 2],
+        /// Angle of the wall against vertical, rad.
+        wall: f64,
+        /// Radius between wall and floor.
+        radius: f64,
+    },
+    /// A round hole.
+    Hole {
+        /// At the top.
+        diameter: f64,
+        /// At the bottom, where it is another.
+        final_diameter: Option<f64>,
+        /// Bottom.
+        bottom: HoleBottom,
+    },
+    /// Material outside a contour is cut.
+    Outside {
+        /// Contour.
+        boundary: Contour,
+    },
+    /// A boss of its own.
+    Boss(Boss),
+    /// Its geometry is the tool path.
+    Toolpath,
+    /// A thread.
+    Thread {
+        /// Major diameter.
+        major: f64,
+        /// Pitch.
+        pitch: Option<f64>,
+        /// Right-handed.
+        right: bool,
+        /// Inside.
+        inner: bool,
+        /// Length.
+        length: f64,
+    },
+    /// Elements of a compound feature.
+    Compound(Vec<Feature>),
+    /// Anything else.
+    Other,
+}
+
+/// A closed profile.
+#[derive(Clone, PartialEq, Debug)]
+pub enum Closed {
+    /// Length along x, width along y.
+    Rectangle {
+        /// Where its centre lies.
+        frame: Frame,
+        /// Along x.
+        length: f64,
+        /// Along y.
+        width: f64,
+    },
+    /// A circle.
+    Circle {
+        /// Where its centre lies.
+        frame: Frame,
+        /// Diameter.
+        diameter: f64,
+    },
+    /// A regular polygon.
+    Ngon {
+        /// Where its centre lies.
+        frame: Frame,
+        /// Diameter.
+        diameter: f64,
+        /// Sides.
+        sides: u32,
+        /// The diameter is measured across flats.
+        across_flats: bool,
+    },
+    /// A curve.
+    General(Contour),
+}
+
+/// A line of straight pieces and arcs. `bulge` is the tangent of a quarter of the arc's angle from this
+/// vertex to the next, positive counter-clockwise.
+#[derive(Clone, PartialEq, Debug, Default)]
+pub struct Contour {
+    /// x, y, bulge.
+    pub points: Vec<[f64; 3]>,
+    /// The last vertex goes on to the first.
+    pub closed: bool,
+}
+
+/// What stays inside a pocket or on a face.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Boss {
+    /// Instance.
+    pub origin: Origin,
+    /// Boundary in the frame of the feature.
+    pub boundary: Contour,
+    /// How far its top lies below the feature's placement; ≤ 0 at or above.
+    pub top: f64,
+    /// Draft, rad.
+    pub slope: f64,
+}
+
+/// Bottoms of pockets.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub enum PocketBottom {
+    /// None.
+    Through,
+    /// Flat.
+    Planar,
+    /// Rounded, general: its name.
+    Other(&'static str),
+}
+
+/// Where a section goes.
+#[derive(Clone, PartialEq, Debug)]
+pub enum Travel {
+    /// Straight.
+    Line {
+        /// Start in the feature frame.
+        start: [f64; 2],
+        /// Unit direction.
+        direction: [f64; 2],
+        /// Length.
+        length: f64,
+    },
+    /// Any plane curve in the feature frame.
+    Curve(Contour),
+}
+
+/// Sections of slots.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub enum Section {
+    /// Flat bottom with two walls: width at the bottom.
+    SquareU {
+        /// At the bottom.
+        width: f64,
+        /// Radii between walls and bottom.
+        radius: [f64; 2],
+        /// Angles of the walls against vertical, rad.
+        angle: [f64; 2],
+    },
+    /// Half-round bottom.
+    RoundedU {
+        /// Width.
+        width: f64,
+    },
+    /// V.
+    Vee {
+        /// Radius at the tip.
+        radius: f64,
+        /// Angle between the walls, rad.
+        angle: f64,
+        /// Its tilt, rad.
+        tilt: f64,
+    },
+    /// T.
+    Tee {
+        /// Of the upper part.
+        width: f64,
+        /// Of the lower part.
+        bar_width: f64,
+        /// Of the lower part.
+        bar_depth: f64,
+    },
+    /// Part of a circle.
+    Circular {
+        /// Radius.
+        radius: f64,
+        /// Angle, rad.
+        sweep: f64,
+    },
+    /// Any curve.
+    General,
+}
+
+/// Ends of slots.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub enum SlotEnd {
+    /// Open: the tool runs out.
+    Open,
+    /// Half round.
+    Radiused,
+    /// Flat with two corner radii.
+    Flat(f64, f64),
+    /// Of a disc cutter.
+    Woodruff(f64),
+    /// The path is closed.
+    Loop,
+}
+
+/// Bottoms of holes.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub enum HoleBottom {
+    /// None.
+    Through,
+    /// Flat.
+    Flat,
+    /// Flat with a radius.
+    Radiused(f64),
+    /// Ball.
+    Spherical(f64),
+    /// Cone: angle as written (rad) and tip radius.
+    Conical(f64, Option<f64>),
+}
+
+/// A tool.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Tool {
+    /// Instance of the tool.
+    pub origin: Origin,
+    /// Name.
+    pub name: String,
+    /// Entity of its body: FACEMILL, TWIST_DRILL …
+    pub kind: String,
+    /// Diameter.
+    pub diameter: f64,
+    /// Half angle of its tip as written, rad.
+    pub tip_angle: Option<f64>,
+    /// Length of its cutting edge.
+    pub cutting_length: Option<f64>,
+    /// Edge radius.
+    pub edge_radius: f64,
+    /// From its reference to the tip.
+    pub length: Option<f64>,
+    /// Teeth.
+    pub teeth: Option<u32>,
+    /// Right-handed, if stated.
+    pub right_handed: Option<bool>,
+    /// Pitch of a tap.
+    pub pitch: Option<f64>,
+    /// Number in the tool table, from 1.
+    pub number: u32,
+}
+
+/// What a workingstep does.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Operation {
+    /// Instance.
+    pub origin: Origin,
+    /// Entity.
+    pub keyword: String,
+    /// Name.
+    pub name: String,
+    /// Retract plane above the feature.
+    pub retract: Option<f64>,
+    /// Start point in the feature frame.
+    pub start: Option<[f64; 3]>,
+    /// Tool.
+    pub tool: Tool,
+    /// Technology.
+    pub technology: Technology,
+    /// Machine functions.
+    pub functions: Functions,
+    /// Overcut at open sides.
+    pub overcut: Option<f64>,
+    /// Explicit tool paths.
+    pub toolpaths: Vec<Toolpath>,
+    /// Tool direction entity, if any.
+    pub direction: Option<String>,
+    /// What kind of work.
+    pub kind: OperationKind,
+}
+
+/// Kinds of work.
+#[derive(Clone, PartialEq, Debug)]
+pub enum OperationKind {
+    /// Drilling family.
+    Drill(Drilling),
+    /// 2½D milling.
+    Mill(Milling),
+    /// Freeform, turning and the rest.
+    Other,
+}
+
+/// Drilling family.
+#[derive(Clone, PartialEq, Debug, Default)]
+pub struct Drilling {
+    /// Depth of cut.
+    pub depth: Option<f64>,
+    /// Hole before it.
+    pub previous: Option<f64>,
+    /// Dwell at the bottom, s.
+    pub dwell: f64,
+    /// Feed on the way out, as a ratio.
+    pub feed_on_retract: Option<f64>,
+    /// Reduced feed over a first and a last stretch: ratio and length.
+    pub first: Option<(f64, f64)>,
+    /// See `first`.
+    pub last: Option<(f64, f64)>,
+    /// Reduced speed there, as ratios.
+    pub cut: [Option<f64>; 2],
+    /// Pecking: first depth, step, retract distance, dwell.
+    pub peck: Option<[f64; 4]>,
+    /// The spindle stops at the bottom.
+    pub stop_at_bottom: bool,
+    /// Waiting position and depth of a test cut.
+    pub test_cut: Option<(f64, Option<[f64; 3]>)>,
+    /// The chuck compensates (tapping).
+    pub floating_chuck: bool,
+}
+
+/// 2½D milling.
+#[derive(Clone, PartialEq, Debug, Default)]
+pub struct Milling {
+    /// Finishing rather than roughing.
+    pub finish: bool,
+    /// The bottom is cut.
+    pub bottom: bool,
+    /// The side is cut.
+    pub side: bool,
+    /// Axial depth.
+    pub axial: Option<f64>,
+    /// Radial depth.
+    pub radial: Option<f64>,
+    /// Stock on walls.
+    pub allowance_side: f64,
+    /// Stock on the bottom.
+    pub allowance_bottom: f64,
+    /// Strategy.
+    pub strategy: Option<Strategy>,
+    /// Way in.
+    pub approach: Approach,
+    /// Way out.
+    pub retract: Approach,
+}
+
+/// A strategy.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Strategy {
+    /// Instance.
+    pub origin: Origin,
+    /// Entity.
+    pub keyword: String,
+    /// Overlap as written.
+    pub overlap: Option<f64>,
+    /// Multiple passes allowed.
+    pub multiple: Option<bool>,
+    /// Feed direction in the feature frame.
+    pub feed: Option<[f64; 2]>,
+    /// Stepover to the left of the feed.
+    pub step_left: Option<bool>,
+    /// Contours run counter-clockwise.
+    pub ccw: Option<bool>,
+    /// Climb milling.
+    pub climb: Option<bool>,
+    /// How strokes are joined.
+    pub connection: Option<String>,
+}
+
+/// Ways into and out of the material.
+#[derive(Clone, PartialEq, Debug, Default)]
+pub enum Approach {
+    /// Not stated.
+    #[default]
+    None,
+    /// Straight along the tool axis.
+    Axis,
+    /// Along the path with a slope, rad.
+    Ramp(f64),
+    /// Helix: radius, slope rad.
+    Helix(f64, f64),
+    /// To and fro: slope rad, width.
+    Zigzag(f64, f64),
+    /// From the air, at an angle: rad, length.
+    Angle(f64, f64),
+    /// From the air, on a quarter circle: radius.
+    Tangent(f64),
+    /// Along a path of its own.
+    Along(Vec<Toolpath>),
+}
+
+/// Cutting data.
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
+pub struct Technology {
+    /// Instance.
+    pub origin: Origin,
+    /// mm/s.
+    pub feed: Option<f64>,
+    /// The feed is that of the contact point.
+    pub contact_feed: bool,
+    /// rpm, always positive.
+    pub speed: Option<f64>,
+    /// Clockwise, seen from the holder: M3.
+    pub clockwise: bool,
+    /// Feed and spindle are coupled.
+    pub synchronised: bool,
+    /// The feed override is locked.
+    pub lock_feed: bool,
+    /// The spindle override is locked.
+    pub lock_spindle: bool,
+    /// As written: feed, cutting speed, spindle, feed per tooth.
+    pub written: [Option<f64>; 4],
+}
+
+/// Coolant and the like.
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
+pub struct Functions {
+    /// Flood.
+    pub flood: bool,
+    /// Mist.
+    pub mist: bool,
+}
+
+/// One piece of an explicit tool path.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Toolpath {
+    /// Instance.
+    pub origin: Origin,
+    /// Approach, lift, connect, non-contact, contact, trajectory.
+    pub role: String,
+    /// Rapid.
+    pub rapid: bool,
+    /// Ratio of the operation's feed.
+    pub ratio: Option<f64>,
+    /// Own technology.
+    pub technology: Option<Technology>,
+    /// Own machine functions.
+    pub functions: Option<Functions>,
+    /// What it is.
+    pub path: PathKind,
+}
+
+/// Kinds of explicit path.
+#[derive(Clone, PartialEq, Debug)]
+pub enum PathKind {
+    /// The tool tip goes along a curve, with its axis if that changes.
+    Location {
+        /// Curve.
+        curve: Curve,
+        /// Tool axis: one direction per point.
+        axis: Option<Curve>,
+    },
+    /// Waits, s.
+    Feedstop(f64),
+    /// By the security plane to the next piece.
+    BySecurityPlane,
+    /// Straight to the next piece.
+    Direct,
+}
+
+/// A space curve.
+#[derive(Clone, PartialEq, Debug, Default)]
+pub struct Curve {
+    /// First point.
+    pub start: [f64; 3],
+    /// Pieces, in order.
+    pub pieces: Vec<Piece>,
+}
+
+/// A piece of a space curve.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub enum Piece {
+    /// Straight to a point.
+    Line([f64; 3]),
+    /// Along a circle.
+    Arc {
+        /// Centre.
+        center: [f64; 3],
+        /// Unit normal: counter-clockwise seen against it.
+        normal: [f64; 3],
+        /// End.
+        end: [f64; 3],
+    },
+}
+
+impl Piece {
+    /// Where it ends.
+    pub fn end(&self) -> [f64; 3] {
+        match self {
+            Piece::Line(p) => *p,
+            Piece::Arc { end, .. } => *end,
+        }
+    }
+}
+
+impl Curve {
+    /// Last point.
+    pub fn end(&self) -> [f64; 3] {
+        self.pieces.last().map_or(self.start, Piece::end)
+    }
+    /// The same curve the other way round.
+    pub fn reversed(&self) -> Curve {
+        let mut points = vec![self.start];
+        points.extend(self.pieces.iter().map(Piece::end));
+        let back = self.pieces.iter().enumerate().rev().map(|(i, piece)| match *piece {
+            Piece::Line(_) => Piece::Line(points[i]),
+            Piece::Arc { center, normal, .. } => Piece::Arc { center, normal: normal.map(|c| -c), end: points[i] },
+        });
+        Curve { start: self.end(), pieces: back.collect() }
+    }
+}
+
+impl Contour {
+    /// A polygon.
+    pub fn polygon(points: impl IntoIterator<Item = [f64; 2]>) -> Contour {
+        Contour { points: points.into_iter().map(|p| [p[0], p[1], 0.0]).collect(), closed: true }
+    }
+    /// A full circle, counter-clockwise.
+    pub fn circle(center: [f64; 2], radius: f64) -> Contour {
+        Contour { points: vec![[center[0] + radius, center[1], 1.0], [center[0] - radius, center[1], 1.0]], closed: true }
+    }
+    /// Smallest and largest x and y, arcs by their vertices' circle.
+    pub fn bounds(&self) -> ([f64; 2], [f64; 2]) {
+        let mut low = [f64::INFINITY; 2];
+        let mut high = [f64::NEG_INFINITY; 2];
+        let n = self.points.len();
+        let mut take = |p: [f64; 2]| {
+            for i in 0..2 {
+                low[i] = low[i].min(p[i]);
+                high[i] = high[i].max(p[i]);
+            }
+        };
+        for (i, p) in self.points.iter().enumerate() {
+            take([p[0], p[1]]);
+            let next = if i + 1 < n { self.points[i + 1] } else { self.points[0] };
+            if p[2] != 0.0 && (i + 1 < n || self.closed) {
+                for q in arc_extremes(*p, next) {
+                    take(q);
+                }
+            }
+        }
+        (low, high)
+    }
+    /// Signed area, counter-clockwise positive.
+    pub fn area(&self) -> f64 {
+        let n = self.points.len();
+        let pairs = (0..n).map(|i| (self.points[i], self.points[(i + 1) % n]));
+        pairs
+            .map(|(a, b)| {
+                let chord = (a[0] * b[1] - b[0] * a[1]) / 2.0;
+                chord + segment_area(a, b)
+            })
+            .sum()
+    }
+}
+
+fn segment_area(a: [f64; 3], b: [f64; 3]) -> f64 {
+    if a[2] == 0.0 {
+        return 0.0;
+    }
+    let angle = 4.0 * libm::atan(a[2]);
+    let half = libm::hypot(b[0] - a[0], b[1] - a[1]) / 2.0;
+    let radius = half / libm::sin(angle / 2.0).abs();
+    radius * radius * (angle - libm::sin(angle)) / 2.0
+}
+
+/// Centre of the arc from a vertex to the next.
+pub fn arc_center(a: [f64; 3], b: [f64; 3]) -> [f64; 2] {
+    let k = (1.0 - a[2] * a[2]) / (4.0 * a[2]);
+    let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
+    [(a[0] + b[0]) / 2.0 - dy * k, (a[1] + b[1]) / 2.0 + dx * k]
+}
+
+fn arc_extremes(a: [f64; 3], b: [f64; 3]) -> Vec<[f64; 2]> {
+    let c = arc_center(a, b);
+    let r = libm::hypot(a[0] - c[0], a[1] - c[1]);
+    let start = libm::atan2(a[1] - c[1], a[0] - c[0]);
+    let sweep = 4.0 * libm::atan(a[2]);
+    let quarter = std::f64::consts::FRAC_PI_2;
+    (0..4)
+        .filter(|q| {
+            let by = f64::from(*q) * quarter - start;
+            let by = if sweep >= 0.0 { by.rem_euclid(4.0 * quarter) } else { (-by).rem_euclid(4.0 * quarter) };
+            by <= sweep.abs()
+        })
+        .map(|q| {
+            let t = f64::from(q) * quarter;
+            [c[0] + r * libm::cos(t), c[1] + r * libm::sin(t)]
+        })
+        .collect()
+}
+
+impl Closed {
+    /// As a contour in the frame of the feature, counter-clockwise where the shape has no sense of its own.
+    /// `None` for sizes that are no sizes.
+    pub fn contour(&self) -> Option<Contour> {
+        let good = |v: f64| v.is_finite() && v > 0.0;
+        match self {
+            Closed::Rectangle { frame, length, width } if good(*length) && good(*width) => {
+                let (l, w) = (length / 2.0, width / 2.0);
+                let corners = [[-l, -w], [l, -w], [l, w], [-l, w]];
+                Some(Contour::polygon(corners.map(|c| flat(frame.point([c[0], c[1], 0.0])))))
+            }
+            Closed::Circle { frame, diameter } if good(*diameter) => {
+                Some(Contour::circle(flat(frame.origin), diameter / 2.0))
+            }
+            Closed::Ngon { frame, diameter, sides, across_flats } if good(*diameter) && *sides >= 3 => {
+                let n = f64::from((*sides).min(10_000));
+                let half = std::f64::consts::PI / n;
+                let r = if *across_flats { diameter / 2.0 / libm::cos(half) } else { diameter / 2.0 };
+                let corner = |i: u32| {
+                    let t = 2.0 * half * f64::from(i);
+                    flat(frame.point([r * libm::cos(t), r * libm::sin(t), 0.0]))
+                };
+                Some(Contour::polygon((0..(*sides).min(10_000)).map(corner)))
+            }
+            Closed::General(contour) if contour.points.len() >= 2 => Some(contour.clone()),
+            _ => None,
+        }
+    }
+}
+
+fn flat(p: [f64; 3]) -> [f64; 2] {
+    [p[0], p[1]]
+}
+
+impl Process {
+    /// All machining workingsteps in the order of execution.
+    pub fn steps(&self) -> Vec<&Workingstep> {
+        fn walk<'a>(elements: &'a [Element], out: &mut Vec<&'a Workingstep>) {
+            for e in elements {
+                match e {
+                    Element::Plan(p) => walk(&p.elements, out),
+                    Element::Step(s) => out.push(s),
+                    _ => {}
+                }
+            }
+        }
+        let mut out = Vec::new();
+        walk(&self.elements, &mut out);
+        out
+    }
+}

@@ -1,0 +1,509 @@
+//! Features and profiles.
+
+use gr_step::Node;
+use gr_text::code;
+
+use super::{DEEPEST, Reader, origin, title};
+use crate::frame::{Frame, norm, sub};
+use crate::process::*;
+
+impl<'m> Reader<'m> {
+    /// A feature in the frame of its setup. `operation` chooses among the elements of a compound feature.
+    pub fn feature(&mut self, node: Node<'m>, setup: Option<&Setup>, operation: u64) -> Option<Feature> {
+        let piece = node.node("its_workpiece").map(|w| w.id());
+        let place = setup.and_then(|s| s.workpieces.iter().find(|p| Some(p.0) == piece)).map_or(Frame::default(), |p| p.1);
+        let outer = self.outer(node, &place, 0)?;
+        let (copies_of, node) = self.base_of_pattern(node)?;
+        let mut copies = Vec::new();
+        for o in outer {
+            match copies_of {
+                Some(pattern) => copies.extend(self.pattern(pattern, &o)?),
+                None => copies.push(o),
+            }
+        }
+        let placement = match node.node("feature_placement") {
+            Some(p) => self.placement(p)?,
+            None if node.is_a("two5d_manufacturing_feature") => {
+                self.missing(node, "feature_placement", "it says where the feature lies");
+                return None;
+            }
+            None => Frame::default(),
+        };
+        let copies: Vec<Frame> = match copies_of {
+            Some(p) if p.keyword() == "GENERAL_PATTERN" => copies,
+            _ => copies.iter().map(|c| c.place(&placement)).collect(),
+        };
+        let depth = self.depth(node)?;
+        let frame = copies.first().copied().unwrap_or(placement);
+        let shape = self.shape(node, operation, &placement, setup)?;
+        let (keyword, name) = (node.keyword().to_string(), node.string("its_id").into_owned());
+        Some(Feature { origin: origin(node), keyword, name, frame, placement, depth, shape, copies })
+    }
+
+    /// Frames that the feature's own placement is relative to: the workpiece's, or those of the compound
+    /// feature it is an element of, once for each of its copies.
+    fn outer(&mut self, node: Node<'m>, workpiece: &Frame, depth: usize) -> Option<Vec<Frame>> {
+        let Some(parent) = self.parents.get(&node.id()).copied().filter(|p| p.is_a("compound_feature")) else {
+            return Some(vec![*workpiece]);
+        };
+        if depth > DEEPEST {
+            self.say(code::PLAN_GOES_ROUND, node, &[&title(node)]);
+            return None;
+        }
+        let outer = self.outer(parent, workpiece, depth + 1)?;
+        let own = parent.node("feature_placement").and_then(|p| self.placement(p))?;
+        Some(outer.iter().map(|o| o.place(&own)).collect())
+    }
+
+    fn base_of_pattern(&mut self, node: Node<'m>) -> Option<(Option<Node<'m>>, Node<'m>)> {
+        if !node.is_a("replicate_feature") {
+            return Some((None, node));
+        }
+        let Some(base) = node.node("replicate_base_feature") else {
+            self.missing(node, "replicate_base_feature", "a pattern repeats a feature");
+            return None;
+        };
+        if base.is_a("replicate_feature") {
+            self.not_lowered(base, ": a pattern inside a pattern");
+            return None;
+        }
+        Some((Some(node), base))
+    }
+
+    /// Frames to put the base feature's placement into.
+    fn pattern(&mut self, node: Node<'m>, outer: &Frame) -> Option<Vec<Frame>> {
+        let own = node.node("feature_placement").and_then(|p| self.placement(p))?;
+        let own = outer.place(&own);
+        match node.keyword() {
+            "CIRCULAR_PATTERN" => {
+                let step = self.angle(node.real("angle_increment").unwrap_or(0.0));
+                let turn = self.angle(node.real("base_feature_rotation").unwrap_or(0.0));
+                let count = self.count(node, "number_of_feature", 1)?;
+                let radius = node.length("base_feature_diameter").unwrap_or(0.0) / 2.0;
+                let gone: Vec<i64> = indices(node, "missing_base_feature", "index");
+                let moved = node.nodes("relocated_base_feature");
+                let moved: Vec<(i64, f64)> = moved
+                    .iter()
+                    .filter_map(|m| Some((m.attr("index")?.integer()?, self.angle(m.real("angular_offset")?))))
+                    .collect();
+                let at = |i: i64| {
+                    let extra = moved.iter().find(|m| m.0 == i).map_or(0.0, |m| m.1);
+                    let turned = own.turned(step * (i - 1) as f64 + extra);
+                    let place = Frame { origin: turned.point([radius, 0.0, 0.0]), ..turned };
+                    // The features keep their own orientation unless the pattern turns them.
+                    if turn == 0.0 { place } else { place.turned(turn * (i - 1) as f64) }
+                };
+                Some((1..=count).filter(|i| !gone.contains(i)).map(at).collect())
+            }
+            "RECTANGULAR_PATTERN" => {
+                let spacing = node.length("spacing").unwrap_or(0.0);
+                let direction = node.node("its_direction").and_then(|d| self.direction(d)).unwrap_or([1.0, 0.0, 0.0]);
+                let rows = if node.attr("number_of_rows").is_some() { self.count(node, "number_of_rows", 1)? } else { 1 };
+                let columns = self.count(node, "number_of_columns", 1)?;
+                let row_spacing = node.length("row_spacing").unwrap_or(spacing);
+                let across = node.node("row_layout_direction").and_then(|d| self.direction(d));
+                let across = across.unwrap_or([-direction[1], direction[0], 0.0]);
+                let gone = node.nodes("missing_base_feature");
+                let key = |n: &Node<'m>| Some((n.attr("row_index")?.integer()?, n.attr("column_index")?.integer()?));
+                let gone: Vec<(i64, i64)> = gone.iter().filter_map(key).collect();
+                let moved = node.nodes("relocated_base_feature");
+                let mut out = Vec::new();
+                for row in 1..=rows {
+                    for column in 1..=columns {
+                        if gone.contains(&(row, column)) {
+                            continue;
+                        }
+                        let (a, b) = (spacing * (column - 1) as f64, row_spacing * (row - 1) as f64);
+                        let mut p: [f64; 3] = std::array::from_fn(|i| direction[i] * a + across[i] * b);
+                        if let Some(m) = moved.iter().find(|m| key(m) == Some((row, column))) {
+                            let d = m.node("offset_direction").and_then(|d| self.direction(d)).unwrap_or([0.0; 3]);
+                            let by = m.real("offset_distance").unwrap_or(0.0);
+                            p = std::array::from_fn(|i| p[i] + d[i] * by);
+                        }
+                        out.push(own.place(&Frame::at(p)));
+                    }
+                }
+                Some(out)
+            }
+            "GENERAL_PATTERN" => {
+                let all: Option<Vec<Frame>> =
+                    node.nodes("replicate_locations").into_iter().map(|p| Some(own.place(&self.placement(p)?))).collect();
+                all
+            }
+            _ => {
+                self.not_lowered(node, "");
+                None
+            }
+        }
+    }
+
+    fn count(&mut self, node: Node<'m>, attribute: &str, low: i64) -> Option<i64> {
+        let v = node.attr(attribute).and_then(|v| v.integer()).unwrap_or(0);
+        if (low..=10_000).contains(&v) {
+            return Some(v);
+        }
+        self.say_at(code::PLAN_BAD_SIZE, node, attribute, &[&title(node), attribute, &v.to_string(), "1 to 10000"]);
+        None
+    }
+
+    fn depth(&mut self, node: Node<'m>) -> Option<f64> {
+        if !node.is_a("machining_feature") {
+            return Some(0.0);
+        }
+        let Some(plane) = node.node("depth").and_then(|d| self.plane(d)) else {
+            self.missing(node, "depth", "it says how deep the feature is");
+            return None;
+        };
+        let depth = -plane.point[2] + 0.0;
+        if depth < 0.0 {
+            self.say_at(code::PLAN_BAD_SIZE, node, "depth", &[&title(node), "depth", &format!("{depth} (above the feature)"), "at or below its placement"]);
+            return None;
+        }
+        Some(depth)
+    }
+
+    fn shape(&mut self, node: Node<'m>, operation: u64, placement: &Frame, setup: Option<&Setup>) -> Option<Shape> {
+        Some(match node.keyword() {
+            "PLANAR_FACE" => self.face(node)?,
+            "CLOSED_POCKET" => {
+                let boundary = self.need(node, "feature_boundary")?;
+                let boundary = self.closed(boundary, placement)?;
+                let (slope, bottom) = (self.slope(node), self.pocket_bottom(node));
+                let bosses = self.bosses(node, placement)?;
+                let (planar_radius, orthogonal_radius) = (node.length("planar_radius"), node.length("orthogonal_radius"));
+                Shape::Pocket { boundary, bosses, slope, bottom, planar_radius, orthogonal_radius }
+            }
+            "OPEN_POCKET" => {
+                let boundary = self.need(node, "open_boundary")?;
+                let boundary = self.open_contour(boundary, placement)?;
+                let wall = match node.node("wall_boundary") {
+                    Some(w) => Some(self.open_contour(w, placement)?),
+                    None => None,
+                };
+                let (slope, bottom) = (self.slope(node), self.pocket_bottom(node));
+                let bosses = self.bosses(node, placement)?;
+                let (planar_radius, orthogonal_radius) = (node.length("planar_radius"), node.length("orthogonal_radius"));
+                Shape::OpenPocket { boundary, wall, bosses, slope, bottom, planar_radius, orthogonal_radius }
+            }
+            "SLOT" => {
+                let path = self.need(node, "course_of_travel")?;
+                let section = self.need(node, "swept_shape")?;
+                let (path, section) = (self.travel(path)?, self.section(section)?);
+                let ends = self.slot_ends(node)?;
+                Shape::Slot { path, section, ends }
+            }
+            "STEP" => {
+                let path = self.need(node, "open_boundary")?;
+                let Travel::Line { direction, length, .. } = self.travel(path)? else {
+                    self.not_lowered(path, " as the edge of a step");
+                    return None;
+                };
+                let wall = node.node("wall_boundary");
+                let radius = wall.and_then(|w| w.length("profile_radius")).unwrap_or(0.0);
+                let angle = wall.and_then(|w| w.real("tilt_angle")).map_or(0.0, |a| self.angle(a));
+                Shape::Step { length, direction, wall: angle, radius }
+            }
+            "ROUND_HOLE" => self.hole(node)?,
+            "GENERAL_OUTSIDE_PROFILE" => {
+                let boundary = self.need(node, "feature_boundary")?;
+                let boundary = if boundary.is_a("closed_profile") {
+                    self.closed_contour(boundary, placement)?
+                } else {
+                    self.open_contour(boundary, placement)?
+                };
+                Shape::Outside { boundary }
+            }
+            "BOSS" => Shape::Boss(self.boss(node, &Frame::default(), placement)?),
+            "TOOLPATH_FEATURE" => Shape::Toolpath,
+            "CATALOGUE_THREAD" | "DEFINED_THREAD" => {
+                let major = self.positive(node, "major_diameter", "the size of the thread")?;
+                let hand = node.node("thread_hand").map_or(String::new(), |h| h.string("descriptive_string").to_lowercase());
+                let length = node.node("partial_profile").and_then(|p| p.real("effective_length")).unwrap_or(0.0);
+                let per_inch = node.node("number_of_threads").and_then(|n| n.real("its_parameter_value"));
+                let pitch = per_inch.filter(|n| *n > 0.0).map(|n| 25.4 / n);
+                let inner = node.attr("inner_or_outer_thread").and_then(|v| v.boolean()).unwrap_or(true);
+                Shape::Thread { major, pitch, right: !hand.contains("left"), inner, length }
+            }
+            _ if node.is_a("compound_feature") => {
+                let mut elements = Vec::new();
+                for e in node.nodes("elements").into_iter().filter(|e| e.is_a("machining_feature")) {
+                    // A compound feature inside itself would go on for ever.
+                    if e.is_a("compound_feature") || e.is_a("replicate_feature") {
+                        self.not_lowered(e, " as an element of a compound feature");
+                        return None;
+                    }
+                    elements.push(self.feature(e, setup, operation)?);
+                }
+                let own = |f: &Feature| self.model.get(f.origin.id).is_some_and(|n| n.nodes("its_operations").iter().any(|o| o.id() == operation));
+                let chosen: Vec<Feature> = elements.iter().filter(|f| own(f)).cloned().collect();
+                Shape::Compound(if chosen.is_empty() { elements } else { chosen })
+            }
+            _ => Shape::Other,
+        })
+    }
+
+    fn need(&mut self, node: Node<'m>, attribute: &str) -> Option<Node<'m>> {
+        let found = node.node(attribute);
+        if found.is_none() {
+            self.missing(node, attribute, "the shape of the feature is not known without it");
+        }
+        found
+    }
+
+    fn slope(&mut self, node: Node<'m>) -> f64 {
+        node.real("slope").map_or(0.0, |s| self.angle(s))
+    }
+
+    fn pocket_bottom(&mut self, node: Node<'m>) -> PocketBottom {
+        match node.node("bottom_condition").map(|b| b.keyword()) {
+            Some("THROUGH_POCKET_BOTTOM_CONDITION") => PocketBottom::Through,
+            Some("RADIUSED_POCKET_BOTTOM_CONDITION") => PocketBottom::Other("rounded"),
+            Some("GENERAL_POCKET_BOTTOM_CONDITION") => PocketBottom::Other("general"),
+            _ => PocketBottom::Planar,
+        }
+    }
+
+    fn bosses(&mut self, node: Node<'m>, placement: &Frame) -> Option<Vec<Boss>> {
+        node.nodes("its_boss").into_iter().map(|b| self.boss(b, placement, placement)).collect()
+    }
+
+    /// `around`: the frame its own placement is turned into.
+    fn boss(&mut self, node: Node<'m>, around: &Frame, _placement: &Frame) -> Option<Boss> {
+        let own = node.node("feature_placement").and_then(|p| self.placement(p))?;
+        // Placements of features are relative to the workpiece; the pocket wants it in its own frame.
+        let local = Frame {
+            origin: around.inverse_point(own.origin),
+            x: around.inverse_vector(own.x),
+            y: around.inverse_vector(own.y),
+            z: around.inverse_vector(own.z),
+        };
+        let profile = self.need(node, "its_boundary")?;
+        let contour = self.closed_contour(profile, &own)?;
+        let points = contour.points.iter().map(|p| {
+            let q = local.point([p[0], p[1], 0.0]);
+            [q[0], q[1], p[2]]
+        });
+        let boundary = Contour { points: points.collect(), closed: true };
+        Some(Boss { origin: origin(node), boundary, top: -local.origin[2], slope: self.slope(node) })
+    }
+
+    fn face(&mut self, node: Node<'m>) -> Option<Shape> {
+        let course = self.need(node, "course_of_travel")?;
+        let Travel::Line { direction, length, .. } = self.travel(course)? else {
+            self.not_lowered(course, " as the course of a planar face");
+            return None;
+        };
+        let profile = self.need(node, "removal_boundary")?;
+        let width = self.positive(profile, "profile_length", "it says how wide the face is")?;
+        let placed = profile.node("placement").and_then(|p| self.placement(p)).map(|f| [f.x[0], f.x[1]]);
+        let square = [direction[1].abs(), direction[0].abs()];
+        let across = placed.filter(|p| (p[0] * direction[0] + p[1] * direction[1]).abs() < 1e-6 && libm::hypot(p[0], p[1]) > 0.5);
+        let boundary = match node.node("face_boundary") {
+            Some(b) => Some(self.closed_contour(b, &Frame::default())?),
+            None => None,
+        };
+        let placement = node.node("feature_placement").and_then(|p| self.placement(p)).unwrap_or_default();
+        let bosses = self.bosses(node, &placement)?;
+        let across = across.unwrap_or(if direction[0] * direction[1] == 0.0 { square } else { [-direction[1], direction[0]] });
+        Some(Shape::Face { length, direction, width, across, boundary, bosses })
+    }
+
+    fn hole(&mut self, node: Node<'m>) -> Option<Shape> {
+        let diameter = self.positive(node, "diameter", "a hole has one")?;
+        let taper = node.node("change_in_diameter");
+        let depth = self.depth(node)?;
+        let final_diameter = match taper.map(|t| (t, t.keyword())) {
+            Some((t, "DIAMETER_TAPER")) => t.length("final_diameter"),
+            Some((t, "ANGLE_TAPER")) => {
+                let angle = self.angle(t.real("angle").unwrap_or(0.0));
+                Some(diameter - 2.0 * depth * libm::tan(angle))
+            }
+            _ => None,
+        };
+        let Some(bottom) = node.node("bottom_condition") else {
+            self.missing(node, "bottom_condition", "a hole is through, or has a bottom of some form");
+            return None;
+        };
+        let bottom = match bottom.keyword() {
+            "THROUGH_BOTTOM_CONDITION" => HoleBottom::Through,
+            "FLAT_HOLE_BOTTOM" => HoleBottom::Flat,
+            "FLAT_WITH_RADIUS_HOLE_BOTTOM" => HoleBottom::Radiused(bottom.length("corner_radius").unwrap_or(0.0)),
+            "SPHERICAL_HOLE_BOTTOM" => HoleBottom::Spherical(bottom.length("radius").unwrap_or(diameter / 2.0)),
+            "CONICAL_HOLE_BOTTOM" => {
+                HoleBottom::Conical(self.angle(bottom.real("tip_angle").unwrap_or(0.0)), bottom.length("tip_radius"))
+            }
+            _ => HoleBottom::Flat,
+        };
+        Some(Shape::Hole { diameter, final_diameter, bottom })
+    }
+
+    fn slot_ends(&mut self, node: Node<'m>) -> Option<Vec<SlotEnd>> {
+        let ends = node.nodes("end_conditions").into_iter().map(|e| match e.keyword() {
+            "OPEN_SLOT_END_TYPE" => SlotEnd::Open,
+            "RADIUSED_SLOT_END_TYPE" => SlotEnd::Radiused,
+            "FLAT_SLOT_END_TYPE" => {
+                SlotEnd::Flat(e.length("corner_radius1").unwrap_or(0.0), e.length("corner_radius2").unwrap_or(0.0))
+            }
+            "WOODRUFF_SLOT_END_TYPE" => SlotEnd::Woodruff(e.length("radius").unwrap_or(0.0)),
+            _ => SlotEnd::Loop,
+        });
+        Some(ends.collect())
+    }
+
+    /// A travel path in the feature frame.
+    fn travel(&mut self, node: Node<'m>) -> Option<Travel> {
+        let frame = match node.node("placement") {
+            Some(p) => self.placement(p)?,
+            None => Frame::default(),
+        };
+        match node.keyword() {
+            "LINEAR_PATH" => {
+                let length = self.positive(node, "distance", "a path has a length")?;
+                let Some(d) = node.node("its_direction").and_then(|d| self.direction(d)) else {
+                    self.missing(node, "its_direction", "a path has a direction");
+                    return None;
+                };
+                let flat = libm::hypot(d[0], d[1]);
+                if flat < 0.999 {
+                    self.not_lowered(node, ": it leaves the plane of the feature");
+                    return None;
+                }
+                Some(Travel::Line { start: [frame.origin[0], frame.origin[1]], direction: [d[0] / flat, d[1] / flat], length })
+            }
+            "CIRCULAR_PATH" | "COMPLETE_CIRCULAR_PATH" => {
+                let r = self.positive(node, "radius", "a circle has one")?;
+                Some(Travel::Curve(Contour::circle([frame.origin[0], frame.origin[1]], r)))
+            }
+            "PARTIAL_CIRCULAR_PATH" => {
+                let r = self.positive(node, "radius", "a circle has one")?;
+                let sweep = self.angle(node.real("sweep_angle").unwrap_or(0.0));
+                let at = |t: f64| frame.point([r * libm::cos(t), r * libm::sin(t), 0.0]);
+                let b = libm::tan(sweep / 8.0);
+                let points = [(0.0, b), (sweep / 2.0, b), (sweep, 0.0)].map(|(t, b)| [at(t)[0], at(t)[1], b]);
+                Some(Travel::Curve(Contour { points: points.to_vec(), closed: false }))
+            }
+            "GENERAL_PATH" => {
+                let curve = self.need(node, "swept_path")?;
+                Some(Travel::Curve(self.contour(curve, &frame)?))
+            }
+            _ => {
+                self.not_lowered(node, " as a travel path");
+                None
+            }
+        }
+    }
+
+    fn section(&mut self, node: Node<'m>) -> Option<Section> {
+        let angle = |r: &Self, a: &str| node.real(a).map_or(0.0, |v| r.angle(v));
+        Some(match node.keyword() {
+            "SQUARE_U_PROFILE" => Section::SquareU {
+                width: self.positive(node, "width", "a slot has a width")?,
+                radius: [node.length("first_radius").unwrap_or(0.0), node.length("second_radius").unwrap_or(0.0)],
+                angle: [angle(self, "first_angle"), angle(self, "second_angle")],
+            },
+            "ROUNDED_U_PROFILE" => Section::RoundedU { width: self.positive(node, "width", "a slot has a width")? },
+            "VEE_PROFILE" => Section::Vee {
+                radius: node.length("profile_radius").unwrap_or(0.0),
+                angle: angle(self, "profile_angle"),
+                tilt: angle(self, "tilt_angle"),
+            },
+            "TEE_PROFILE" => Section::Tee {
+                width: self.positive(node, "width", "a slot has a width")?,
+                bar_width: self.positive(node, "cross_bar_width", "a T-slot has one")?,
+                bar_depth: self.positive(node, "cross_bar_depth", "a T-slot has one")?,
+            },
+            "PARTIAL_CIRCULAR_PROFILE" => Section::Circular {
+                radius: self.positive(node, "radius", "a circle has one")?,
+                sweep: angle(self, "sweep_angle"),
+            },
+            _ => Section::General,
+        })
+    }
+
+    /// Where a profile lies in the frame of its feature. Some programs repeat the feature's own placement
+    /// there; taken as it is written the feature would be moved twice.
+    fn profile_frame(&mut self, node: Node<'m>, feature: &Frame) -> Option<Frame> {
+        let Some(p) = node.node("placement") else { return Some(Frame::default()) };
+        let frame = self.placement(p)?;
+        let repeated = norm(sub(frame.origin, feature.origin)) < 1e-9 && norm(feature.origin) > 1e-9;
+        if repeated {
+            self.placed_twice.insert(node.id());
+            return Some(Frame::default());
+        }
+        Some(frame)
+    }
+
+    fn closed(&mut self, node: Node<'m>, feature: &Frame) -> Option<Closed> {
+        let frame = self.profile_frame(node, feature)?;
+        Some(match node.keyword() {
+            "RECTANGULAR_CLOSED_PROFILE" => Closed::Rectangle {
+                frame,
+                length: self.positive(node, "profile_length", "a rectangle has one")?,
+                width: self.positive(node, "profile_width", "a rectangle has one")?,
+            },
+            "CIRCULAR_CLOSED_PROFILE" => {
+                Closed::Circle { frame, diameter: self.positive(node, "diameter", "a circle has one")? }
+            }
+            "NGON_PROFILE" => Closed::Ngon {
+                frame,
+                diameter: self.positive(node, "diameter", "a polygon has one")?,
+                sides: self.count(node, "number_of_sides", 3)? as u32,
+                across_flats: node.attr("circumscribed_or_across_flats").and_then(|v| v.boolean()).unwrap_or(false),
+            },
+            "GENERAL_CLOSED_PROFILE" => {
+                let curve = self.need(node, "closed_profile_shape")?;
+                let mut contour = self.contour(curve, &frame)?;
+                if !contour.closed {
+                    self.say(code::PLAN_CANNOT_CUT, node, &[&title(node), "its curve does not end where it begins"]);
+                    return None;
+                }
+                contour.closed = true;
+                Closed::General(contour)
+            }
+            _ => {
+                self.not_lowered(node, " as a closed profile");
+                return None;
+            }
+        })
+    }
+
+    fn closed_contour(&mut self, node: Node<'m>, feature: &Frame) -> Option<Contour> {
+        let closed = self.closed(node, feature)?;
+        let contour = closed.contour();
+        if contour.is_none() {
+            self.say(code::PLAN_CANNOT_CUT, node, &[&title(node), "its profile has no size"]);
+        }
+        contour
+    }
+
+    fn open_contour(&mut self, node: Node<'m>, feature: &Frame) -> Option<Contour> {
+        let frame = self.profile_frame(node, feature)?;
+        match node.keyword() {
+            "GENERAL_PROFILE" => {
+                let curve = self.need(node, "its_profile")?;
+                self.contour(curve, &frame)
+            }
+            "LINEAR_PROFILE" => {
+                let l = self.positive(node, "profile_length", "a line has one")?;
+                let points = [[0.0, 0.0, 0.0], [l, 0.0, 0.0]].map(|p| frame.point(p)).map(|p| [p[0], p[1], 0.0]);
+                Some(Contour { points: points.to_vec(), closed: false })
+            }
+            "PARTIAL_CIRCULAR_PROFILE" => {
+                let r = self.positive(node, "radius", "a circle has one")?;
+                let sweep = self.angle(node.real("sweep_angle").unwrap_or(0.0));
+                let at = |t: f64| frame.point([r * libm::cos(t), r * libm::sin(t), 0.0]);
+                let b = libm::tan(sweep / 8.0);
+                let points = [(0.0, b), (sweep / 2.0, b), (sweep, 0.0)].map(|(t, b)| [at(t)[0], at(t)[1], b]);
+                Some(Contour { points: points.to_vec(), closed: false })
+            }
+            _ => {
+                self.not_lowered(node, " as an open boundary");
+                None
+            }
+        }
+    }
+}
+
+fn indices(node: Node<'_>, list: &str, attribute: &str) -> Vec<i64> {
+    node.nodes(list).iter().filter_map(|n| n.attr(attribute)?.integer()).collect()
+}

@@ -1,0 +1,341 @@
+//! Operations, tools, technology and explicit tool paths.
+
+use gr_step::Node;
+use gr_text::code;
+
+use super::{Reader, origin};
+use crate::process::*;
+
+impl<'m> Reader<'m> {
+    pub fn operation(&mut self, node: Node<'m>) -> Option<Operation> {
+        let tool = node.node("its_tool");
+        let Some(tool) = tool else {
+            self.missing(node, "its_tool", "nothing is cut without a tool");
+            return None;
+        };
+        let tool = self.tool(tool)?;
+        let technology = match node.node("its_technology") {
+            Some(t) => self.technology(t, &tool),
+            None => {
+                self.missing(node, "its_technology", "feed and speed are not known");
+                return None;
+            }
+        };
+        let functions = node.node("its_machine_functions").map(|f| self.functions(f)).unwrap_or_default();
+        let toolpaths = node.node("its_toolpath").map(|t| self.toolpaths(t, tool.diameter)).unwrap_or_default();
+        let direction = node.node("its_tool_direction").map(|d| d.keyword().to_string());
+        if let Some(d) = direction.as_deref().filter(|d| *d != "THREE_AXES") {
+            let why = format!(": tool direction {d}");
+            if toolpaths.is_empty() {
+                self.not_lowered(node, &why);
+            }
+        }
+        let kind = if node.is_a("drilling_type_operation") {
+            OperationKind::Drill(self.drilling(node))
+        } else if node.is_a("two5d_milling_operation") {
+            OperationKind::Mill(self.milling(node))
+        } else {
+            OperationKind::Other
+        };
+        Some(Operation {
+            origin: origin(node),
+            keyword: node.keyword().to_string(),
+            name: node.string("its_id").into_owned(),
+            retract: node.real("retract_plane"),
+            start: node.node("start_point").and_then(|p| self.point(p)),
+            tool,
+            technology,
+            functions,
+            overcut: node.real("overcut_length"),
+            toolpaths,
+            direction,
+            kind,
+        })
+    }
+
+    fn drilling(&mut self, node: Node<'m>) -> Drilling {
+        let strategy = node.node("its_machining_strategy");
+        let ratio = |a: &str| strategy.and_then(|s| s.real(a));
+        let depth = |a: &str| strategy.and_then(|s| s.real(a)).filter(|d| *d > 0.0);
+        let stretch = |depth: Option<f64>, feed: Option<f64>| Some((as_ratio(feed?), depth?));
+        if let Some(s) = strategy {
+            for a in ["reduced_cut_at_start", "reduced_feed_at_start", "reduced_cut_at_end", "reduced_feed_at_end"] {
+                if s.real(a).is_some_and(|v| v > 1.0) {
+                    let v = s.real(a).unwrap_or(0.0);
+                    self.no_effect(s, a, &format!("{v} is read as {v} percent"));
+                }
+            }
+        }
+        let peck = (node.keyword() == "MULTISTEP_DRILLING").then(|| {
+            let v = |a: &str| node.real(a).unwrap_or(0.0);
+            [v("first_depth"), v("depth_of_step"), v("retract_distance"), v("dwell_time_step")]
+        });
+        let test = node.real("depth_of_testcut").filter(|d| *d > 0.0);
+        let waiting = node.node("waiting_position").and_then(|p| self.point(p));
+        if node.keyword() == "THREAD_DRILLING" {
+            self.not_lowered(node, "");
+        }
+        Drilling {
+            depth: node.real("cutting_depth"),
+            previous: node.real("previous_diameter"),
+            dwell: node.real("dwell_time_bottom").filter(|d| *d > 0.0 && d.is_finite()).unwrap_or(0.0),
+            feed_on_retract: node.real("feed_on_retract").map(as_ratio),
+            first: stretch(depth("depth_of_start"), ratio("reduced_feed_at_start")),
+            last: stretch(depth("depth_of_end"), ratio("reduced_feed_at_end")),
+            cut: [ratio("reduced_cut_at_start").map(as_ratio), ratio("reduced_cut_at_end").map(as_ratio)],
+            peck,
+            stop_at_bottom: node.attr("spindle_stop_at_bottom").and_then(|v| v.boolean()).unwrap_or(false),
+            test_cut: test.map(|d| (d, waiting)),
+            floating_chuck: node.attr("compensation_chuck").and_then(|v| v.boolean()).unwrap_or(false),
+        }
+    }
+
+    fn milling(&mut self, node: Node<'m>) -> Milling {
+        let k = node.keyword();
+        let number = |a: &str| node.real(a).filter(|v| v.is_finite());
+        Milling {
+            finish: k.contains("FINISH"),
+            bottom: k.contains("BOTTOM") || k.contains("PLANE"),
+            side: k.contains("SIDE"),
+            axial: number("axial_cutting_depth"),
+            radial: number("radial_cutting_depth"),
+            allowance_side: number("allowance_side").unwrap_or(0.0),
+            allowance_bottom: number("allowance_bottom").unwrap_or(0.0),
+            strategy: node.node("its_machining_strategy").map(|s| self.strategy(s)),
+            approach: self.approach(node, "approach"),
+            retract: self.approach(node, "retract"),
+        }
+    }
+
+    fn strategy(&mut self, node: Node<'m>) -> Strategy {
+        let choice = |a: &str| node.attr(a).and_then(|v| v.choice());
+        let feed = node.node("feed_direction").and_then(|d| self.direction(d)).map(|d| [d[0], d[1]]);
+        Strategy {
+            origin: origin(node),
+            keyword: node.keyword().to_string(),
+            overlap: node.real("overlap"),
+            multiple: node.attr("allow_multiple_passes").and_then(|v| v.boolean()),
+            feed,
+            step_left: choice("stepover_direction").map(|c| c == "LEFT"),
+            ccw: choice("rotation_direction").map(|c| c == "CCW"),
+            climb: choice("cutmode").or_else(|| choice("spiral_cutmode")).map(|c| c == "CLIMB"),
+            connection: choice("its_stroke_connection_strategy"),
+        }
+    }
+
+    fn approach(&mut self, node: Node<'m>, attribute: &str) -> Approach {
+        let Some(a) = node.node(attribute) else { return Approach::None };
+        let angle = |name: &str| a.real(name).map_or(0.0, |v| self.angle(v));
+        let length = |name: &str| a.real(name).unwrap_or(0.0);
+        match a.keyword() {
+            "PLUNGE_TOOLAXIS" => Approach::Axis,
+            "PLUNGE_RAMP" => Approach::Ramp(angle("angle")),
+            "PLUNGE_HELIX" => Approach::Helix(length("radius"), angle("angle")),
+            "PLUNGE_ZIGZAG" => Approach::Zigzag(angle("angle"), length("width")),
+            "AP_RETRACT_ANGLE" => Approach::Angle(angle("angle"), length("travel_length")),
+            "AP_RETRACT_TANGENT" => Approach::Tangent(length("radius")),
+            "ALONG_PATH" => Approach::Along(a.node("path").map(|p| self.toolpaths(p, 0.0)).unwrap_or_default()),
+            _ => Approach::None,
+        }
+    }
+
+    /// A tool; the same tool gets the same number wherever it is described.
+    pub fn tool(&mut self, node: Node<'m>) -> Option<Tool> {
+        let body = node.node("its_tool_body");
+        let dimension = body.and_then(|b| b.node("dimension"));
+        let (of, attribute) = match dimension {
+            Some(d) => (d, "diameter"),
+            None => (node, "effective_cutting_diameter"),
+        };
+        if dimension.is_none() && node.real(attribute).is_none() {
+            let why = "it has neither a body with dimensions nor a diameter of its own";
+            self.missing(node, "its_tool_body", why);
+            return None;
+        }
+        let diameter = self.positive(of, attribute, "a tool has a diameter")?;
+        let body = body.unwrap_or(node);
+        let edges = [node.nodes("its_cutting_edge"), node.nodes("its_cutting_edges")].concat();
+        let length = edges.first().and_then(|e| e.real("tool_offset_length").or_else(|| e.real("tool_functional_length")));
+        let hand = body.attr("hand_of_cut").and_then(|v| v.choice());
+        let tip = dimension.and_then(|d| d.real("tool_tip_half_angle")).or_else(|| node.real("point_angle").map(|a| a / 2.0));
+        let mut tool = Tool {
+            origin: origin(node),
+            name: node.string("its_id").into_owned(),
+            kind: body.keyword().to_string(),
+            diameter,
+            tip_angle: tip.filter(|a| *a != 0.0).map(|a| self.angle(a)),
+            cutting_length: dimension.and_then(|d| d.real("cutting_edge_length")).or_else(|| node.real("maximum_depth_of_cut")).filter(|l| *l > 0.0),
+            edge_radius: of.real("edge_radius").unwrap_or(0.0),
+            length: length.or_else(|| node.real("overall_assembly_length")).filter(|l| l.is_finite()),
+            teeth: body.attr("number_of_teeth").or_else(|| body.attr("number_of_effective_teeth")).and_then(|v| v.integer()).and_then(|n| u32::try_from(n).ok()),
+            right_handed: hand.as_deref().and_then(|h| match h {
+                "RIGHT" => Some(true),
+                "LEFT" => Some(false),
+                _ => None,
+            }),
+            pitch: node.real("thread_pitch"),
+            number: 0,
+        };
+        let same = |t: &Tool| {
+            t.name == tool.name && t.kind == tool.kind && t.diameter == tool.diameter && t.edge_radius == tool.edge_radius
+                && t.tip_angle == tool.tip_angle && t.cutting_length == tool.cutting_length && t.length == tool.length
+        };
+        match self.tools.iter().find(|t| same(t)) {
+            Some(known) => tool.number = known.number,
+            None => {
+                tool.number = self.tools.len() as u32 + 1;
+                self.tools.push(tool.clone());
+            }
+        }
+        Some(tool)
+    }
+
+    fn technology(&mut self, node: Node<'m>, tool: &Tool) -> Technology {
+        let written = ["feedrate", "cutspeed", "spindle", "feedrate_per_tooth"].map(|a| node.real(a).filter(|v| v.is_finite()));
+        let [feed, cut, spindle, tooth] = written;
+        let round = std::f64::consts::PI * tool.diameter;
+        let iso = self.units == Units::Iso;
+        let by_cut = cut.filter(|_| round > 0.0).map(|v| if iso { v * 60_000.0 / round } else { v * 1000.0 / round });
+        let speed = if iso { spindle.map(|s| s.abs() * 60.0).or(by_cut) } else { by_cut.or(spindle.map(f64::abs)) };
+        let teeth = f64::from(tool.teeth.unwrap_or(1).max(1));
+        let per_rev = tooth.map(|t| t * teeth);
+        let feed_mm = match (feed, per_rev, speed) {
+            (Some(f), ..) if iso => Some(f * 1000.0),
+            (Some(f), _, Some(n)) => Some(f * n / 60.0),
+            (None, Some(f), Some(n)) => Some(f * n / 60.0),
+            _ => None,
+        };
+        if !iso {
+            let n = speed.unwrap_or(0.0);
+            let read = format!("S{n:.1} rpm, F{:.1} mm/min", feed_mm.unwrap_or(0.0) * 60.0);
+            let other = format!("S{:.1}, F{:.1}", spindle.unwrap_or(0.0).abs() * 60.0, feed.unwrap_or(0.0) * 60_000.0);
+            self.units_were_read(node, &read, &other);
+        }
+        if feed_mm.is_none() {
+            self.missing(node, "feedrate", "the feed follows from a feed, or from a feed per tooth with a spindle speed");
+        }
+        for (a, v) in [("feedrate", feed), ("feedrate_per_tooth", tooth)] {
+            if let Some(v) = v {
+                self.in_range(node, a, v, f64::MIN_POSITIVE, "above zero");
+            }
+        }
+        let by_sign = spindle.is_none_or(|s| s <= 0.0);
+        let clockwise = tool.right_handed.unwrap_or(by_sign);
+        if let (Some(s), Some(right)) = (spindle.filter(|s| *s != 0.0), tool.right_handed)
+            && right != by_sign
+        {
+            let name = |cw: bool| if cw { "clockwise" } else { "counter-clockwise" };
+            let hand = if right { "right" } else { "left" };
+            self.say_at(code::PLAN_SPINDLE_SIGN, node, "spindle", &[&s.to_string(), name(by_sign), hand, name(clockwise)]);
+        }
+        let flag = |a: &str| node.attr(a).and_then(|v| v.boolean()).unwrap_or(false);
+        if node.attr("its_adaptive_control").is_some() {
+            self.no_effect(node, "its_adaptive_control", "the control does it");
+        }
+        let reference = node.attr("feedrate_reference").and_then(|v| v.choice());
+        Technology {
+            origin: origin(node),
+            feed: feed_mm.filter(|f| *f > 0.0),
+            contact_feed: reference.as_deref() == Some("CCP"),
+            speed: speed.filter(|s| *s > 0.0),
+            clockwise,
+            synchronised: flag("synchronize_spindle_with_feed"),
+            lock_feed: flag("inhibit_feedrate_override"),
+            lock_spindle: flag("inhibit_spindle_override"),
+            written,
+        }
+    }
+
+    fn functions(&mut self, node: Node<'m>) -> Functions {
+        let flag = |a: &str| node.attr(a).and_then(|v| v.boolean()).unwrap_or(false);
+        let why = "the program has no word for it";
+        for a in ["through_spindle_coolant", "chip_removal"] {
+            if flag(a) {
+                self.no_effect(node, a, if a == "chip_removal" { why } else { "flood coolant is switched on instead" });
+            }
+        }
+        for a in ["coolant_pressure", "through_pressure", "oriented_spindle_stop", "its_process_model"] {
+            if node.attr(a).is_some() {
+                self.no_effect(node, a, why);
+            }
+        }
+        for a in ["axis_clamping", "other_functions"] {
+            if node.attr(a).is_some_and(|v| v.items().next().is_some()) {
+                self.no_effect(node, a, why);
+            }
+        }
+        Functions { flood: flag("coolant") || flag("through_spindle_coolant"), mist: flag("mist") }
+    }
+
+    /// The pieces of an explicit tool path.
+    pub fn toolpaths(&mut self, list: Node<'m>, tool_diameter: f64) -> Vec<Toolpath> {
+        list.nodes("its_list").into_iter().filter_map(|n| self.toolpath(n, tool_diameter)).collect()
+    }
+
+    fn toolpath(&mut self, node: Node<'m>, tool_diameter: f64) -> Option<Toolpath> {
+        let role = node.attr("its_type").and_then(|v| v.choice()).unwrap_or_default();
+        let (mut rapid, mut ratio) = (false, None);
+        if let Some(speed) = node.attr("its_speed") {
+            match speed.choice() {
+                Some(name) => rapid = name == "RAPID",
+                None => ratio = speed.real(),
+            }
+            if speed.node().is_some() {
+                self.not_lowered(node, ": a feed along a curve (TOOLPATH_SPEED)");
+                return None;
+            }
+        }
+        let stand_in = Tool {
+            origin: origin(node),
+            name: String::new(),
+            kind: String::new(),
+            diameter: tool_diameter,
+            tip_angle: None,
+            cutting_length: None,
+            edge_radius: 0.0,
+            length: None,
+            teeth: None,
+            right_handed: None,
+            pitch: None,
+            number: 0,
+        };
+        let technology = node.node("its_technology").map(|t| self.technology(t, &stand_in));
+        let functions = node.node("its_machine_functions").map(|f| self.functions(f));
+        let path = match node.keyword() {
+            "CUTTER_LOCATION_TRAJECTORY" => {
+                let forward = node.attr("its_direction").and_then(|v| v.boolean()).unwrap_or(true);
+                let curve = node.node("basiccurve").or_else(|| {
+                    self.missing(node, "basiccurve", "the path is not known without it");
+                    None
+                })?;
+                let curve = self.curve(curve, 0)?;
+                let axis = match node.node("its_toolaxis") {
+                    Some(a) => Some(self.curve(a, 0)?),
+                    None => None,
+                };
+                if node.attr("surface_normal").is_some() {
+                    self.no_effect(node, "surface_normal", "the path is that of the tool tip");
+                }
+                let (curve, axis) = if forward { (curve, axis) } else { (curve.reversed(), axis.map(|a| a.reversed())) };
+                PathKind::Location { curve, axis }
+            }
+            "CUTTER_CONTACT_TRAJECTORY" => {
+                self.not_lowered(node, ": the path of the contact point; a cutter location trajectory is");
+                return None;
+            }
+            "FEEDSTOP" => PathKind::Feedstop(node.real("dwell").filter(|d| *d >= 0.0 && d.is_finite()).unwrap_or(0.0)),
+            "CONNECT_SECPLANE" => PathKind::BySecurityPlane,
+            "CONNECT_DIRECT" => PathKind::Direct,
+            _ => {
+                self.not_lowered(node, " in a tool path");
+                return None;
+            }
+        };
+        Some(Toolpath { origin: origin(node), role, rapid, ratio, technology, functions, path })
+    }
+}
+
+/// Ratios above one are percent: the example of the standard writes 75.
+fn as_ratio(v: f64) -> f64 {
+    if v > 1.0 { v / 100.0 } else { v }
+}
