@@ -11,12 +11,14 @@
 //!
 //! Meaning (entities, types, units) is not here.
 
+mod format;
 mod index;
 mod lex;
 mod model;
 mod parse;
 mod text;
 
+pub use format::{format, renumber};
 pub use index::{Entry, Index, index};
 pub use model::{Exchange, Fault, Instance, Kind, Section, Value, members};
-pub use parse::parse;
+pub use parse::{check_syntax, parse};

@@ -168,6 +168,8 @@ impl Exchange {
     /// The instance of an id.
     pub fn find(&self, id: u64) -> Option<u32> {
         match &self.ids {
+            // Header entities have no number.
+            Ids::Sorted if id == 0 => None,
             Ids::Sorted => self.instances.binary_search_by_key(&id, |i| i.id).ok().map(|i| i as u32),
             Ids::Map(map) => map.get(&id).copied(),
         }

@@ -13,25 +13,27 @@ const DEPTH: usize = 10_000;
 
 /// Reads a whole file.
 pub fn parse(text: &[u8]) -> Exchange {
-    let mut p = Parser {
-        text,
-        at: 0,
-        out: Exchange::default(),
-        names: FxHashMap::default(),
-        recent: [(0, 0, u32::MAX); 64],
-        open: Vec::new(),
-        last_id: 0,
-        sorted: true,
-        spoiled: false,
-        section: None,
-    };
+    let mut p = Parser::<true>::new(text);
     p.out.instances.reserve(text.len() / 88 + 4);
     p.out.values.reserve(text.len() / 18 + 16);
     p.file();
     p.finish()
 }
 
-struct Parser<'t> {
+/// Says what is wrong in a file, as [`parse`] would, and keeps nothing else: no tables, no memory.
+pub fn check_syntax(text: &[u8]) -> Vec<Fault> {
+    let mut p = Parser::<false>::new(text);
+    p.file();
+    if !p.sorted {
+        // Ids out of order: whether one stands twice takes a list of them.
+        return parse(text).faults;
+    }
+    p.out.faults.sort_by_key(|f| f.span.start);
+    p.out.faults
+}
+
+/// `KEEP`: fills the tables; without it only faults are collected.
+struct Parser<'t, const KEEP: bool> {
     text: &'t [u8],
     at: usize,
     out: Exchange,
@@ -49,7 +51,22 @@ struct Parser<'t> {
 /// The statement can't be read on.
 struct Lost;
 
-impl Parser<'_> {
+impl<'t, const KEEP: bool> Parser<'t, KEEP> {
+    fn new(text: &'t [u8]) -> Self {
+        Parser {
+        text,
+        at: 0,
+        out: Exchange::default(),
+        names: FxHashMap::default(),
+        recent: [(0, 0, u32::MAX); 64],
+        open: Vec::new(),
+        last_id: 0,
+        sorted: true,
+        spoiled: false,
+        section: None,
+        }
+    }
+
     fn finish(mut self) -> Exchange {
         self.close_section(self.text.len());
         if !self.sorted {
@@ -216,6 +233,9 @@ impl Parser<'_> {
     }
 
     fn keyword(&mut self, start: usize, end: usize) -> u32 {
+        if !KEEP {
+            return 0;
+        }
         let word = &self.text[start..end];
         let mut head = [0; 8];
         let n = word.len().min(8);
@@ -228,6 +248,8 @@ impl Parser<'_> {
             return name;
         }
         let clean: Vec<u8> = word.iter().filter(|b| **b >= 0x20).map(u8::to_ascii_uppercase).collect();
+        // A blank inside was reported; an underscore was meant.
+        let clean: Vec<u8> = clean.split(|b| *b == b' ').filter(|w| !w.is_empty()).collect::<Vec<_>>().join(&b'_');
         let name = match self.names.get(&clean[..]) {
             Some(n) => *n,
             None => {
@@ -292,7 +314,15 @@ impl Parser<'_> {
         body
     }
 
+    #[inline(always)]
     fn begin(&mut self, id: u64, start: usize) -> usize {
+        if id == 0 && self.last_id > 0 {
+            // A later section's own parameters stand between the ids.
+            self.sorted = false;
+        }
+        if !KEEP {
+            return 0;
+        }
         let nameless = self.keyword(start, start);
         self.out.instances.push(Instance {
             id,
@@ -307,7 +337,12 @@ impl Parser<'_> {
         self.out.instances.len() - 1
     }
 
+    #[inline(always)]
     fn end(&mut self, n: usize, damaged: bool) {
+        if !KEEP {
+            self.open.clear();
+            return;
+        }
         for open in self.open.drain(..) {
             // Lists that a fault cut short: what was read so far stays readable.
             let inside = self.out.values.len() as u32 - open - 1;
@@ -322,7 +357,9 @@ impl Parser<'_> {
 
     fn body(&mut self, n: usize) -> Result<(), Lost> {
         if self.byte() == b'(' {
-            self.out.instances[n].complex = true;
+            if KEEP {
+                self.out.instances[n].complex = true;
+            }
             self.at += 1;
             let mut first = true;
             loop {
@@ -334,7 +371,9 @@ impl Parser<'_> {
                 let (s, e) = self.name("a keyword of this complex instance, or `)`")?;
                 let k = self.keyword(s, e);
                 if first {
-                    self.out.instances[n].keyword = k;
+                    if KEEP {
+                        self.out.instances[n].keyword = k;
+                    }
                     first = false;
                 }
                 self.blank();
@@ -351,7 +390,9 @@ impl Parser<'_> {
             let (s, e) = self.name("an entity keyword, or `(`")?;
             self.blank();
             let e = if self.byte() == b'(' { e } else { self.joined_keyword(s, e) };
-            self.out.instances[n].keyword = self.keyword(s, e);
+            if KEEP {
+                self.out.instances[n].keyword = self.keyword(s, e);
+            }
             if self.byte() != b'(' {
                 return Err(self.unexpected("`(`"));
             }
@@ -379,13 +420,6 @@ impl Parser<'_> {
             let meant: Vec<&str> = written.split_whitespace().collect();
             self.fault(code::P21_BLANK_IN_KEYWORD, start, last, vec![written.clone(), meant.join("_")]);
             self.at = at;
-            let joined = meant.join("_");
-            // The table gets the name that was meant.
-            let key: Box<[u8]> = joined.as_bytes().into();
-            if !self.names.contains_key(&key) {
-                self.out.keywords.push(joined.into());
-                self.names.insert(key, self.out.keywords.len() as u32 - 1);
-            }
             return last;
         }
         end
@@ -419,12 +453,16 @@ impl Parser<'_> {
             return Err(Lost);
         }
         self.open.push(self.out.values.len() as u32);
-        self.out.values.push(Value::new(kind, start as u32, 0));
+        if KEEP {
+            self.out.values.push(Value::new(kind, start as u32, 0));
+        }
         Ok(())
     }
 
     fn close_list(&mut self) {
-        if let Some(open) = self.open.pop() {
+        if let Some(open) = self.open.pop()
+            && KEEP
+        {
             let inside = self.out.values.len() as u32 - open - 1;
             let v = &mut self.out.values[open as usize];
             *v = Value::new(v.kind(), v.start, inside);
@@ -484,7 +522,7 @@ impl Parser<'_> {
                 b',' | b')' => {
                     let before = if self.byte() == b',' { "`,`" } else { "`)`" };
                     self.fault(code::P21_EMPTY_PARAMETER, start, start + 1, vec![before.into()]);
-                    self.out.values.push(Value::new(Kind::Bad, start as u32, 0));
+                    self.push(Kind::Bad, start, start);
                 }
                 b if is(b, UPPER | LOWER) || b == b'!' => {
                     let (s, e) = self.name("a value")?;
@@ -522,15 +560,31 @@ impl Parser<'_> {
                         }
                         self.close_list();
                     }
-                    _ => return Err(self.unexpected("`,` or `)`")),
+                    _ => return Err(self.no_separator(start)),
                 }
             }
         }
     }
 
+    /// Something else than `,` or `)` follows a value. A string that ends in a comma, with a word behind it,
+    /// lacks its own apostrophe and took the next one's.
+    #[cold]
+    #[inline(never)]
+    fn no_separator(&mut self, value: usize) -> Lost {
+        let inside = self.text.get(value + 1..self.at).unwrap_or(&[]).trim_ascii_end();
+        let took = inside.strip_suffix(b"'").is_some_and(|s| matches!(s.trim_ascii_end().last(), Some(b',' | b'(')));
+        if took && self.text[value] == b'\'' && self.at < self.text.len() {
+            self.fault(code::P21_UNTERMINATED_STRING, value, value + 1, vec![]);
+            return Lost;
+        }
+        self.unexpected("`,` or `)`")
+    }
+
     #[inline(always)]
     fn push(&mut self, kind: Kind, start: usize, end: usize) {
-        self.out.values.push(Value::new(kind, start as u32, (end - start) as u32));
+        if KEEP {
+            self.out.values.push(Value::new(kind, start as u32, (end - start) as u32));
+        }
         self.at = end;
     }
 
@@ -627,7 +681,11 @@ impl Parser<'_> {
                 _ => return Err(self.unexpected("a resource <…> that closes")),
             }
         } else {
-            run(self.text, start + 1, DIGIT | UPPER | LOWER)
+            let end = run(self.text, start + 1, DIGIT | UPPER | LOWER);
+            if end == start + 1 {
+                return Err(self.unexpected("a value"));
+            }
+            end
         };
         self.push(Kind::Resource, start, end);
         Ok(())
@@ -721,7 +779,9 @@ impl Parser<'_> {
         if self.byte() == b'(' {
             self.at += 1;
             let n = self.begin(0, start);
-            self.out.instances[n].keyword = self.keyword(start, end);
+            if KEEP {
+                self.out.instances[n].keyword = self.keyword(start, end);
+            }
             let result = self.list();
             self.end(n, result.is_err());
             result?;
@@ -739,6 +799,10 @@ impl Parser<'_> {
 
     fn header_entity(&mut self) -> Result<(), Lost> {
         let start = self.at;
+        let word = run(self.text, start + usize::from(self.byte() == b'!'), UPPER | LOWER | DIGIT);
+        if peek(self.text, skip_blank(self.text, word)).0 != b'(' {
+            return Err(self.unexpected("an instance (#n=…;) or a section keyword"));
+        }
         let (s, e) = self.name("a section keyword or a header entity")?;
         self.blank();
         if self.byte() != b'(' {
@@ -746,7 +810,9 @@ impl Parser<'_> {
         }
         self.at += 1;
         let n = self.begin(0, start);
-        self.out.instances[n].keyword = self.keyword(s, e);
+        if KEEP {
+            self.out.instances[n].keyword = self.keyword(s, e);
+        }
         let body = self.list();
         let body = body.and_then(|()| self.semicolon());
         self.end(n, body.is_err());

@@ -63,7 +63,7 @@ fn one_mistake_one_message() {
     check("#1=A('\\X2\\00D\\X0\\');\n", &["8:7 p21/bad-escape"]);
     check("#1=A();\n#1=B();\n", &["9:1 p21/duplicate-id"]);
     check("#1 A();\n#2=B();\n", &["8:4 p21/unexpected"]);
-    check("#1=A(@@);\n", &["8:7 p21/unexpected"]);
+    check("#1=A(@@);\n", &["8:6 p21/unexpected"]);
     check("/* open\n#1=A();\n", &["8:1 p21/unterminated-comment"]);
 }
 

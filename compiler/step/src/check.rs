@@ -4,24 +4,14 @@ use gr_p21::{Exchange, Fault, Kind, Value};
 use gr_spec::{Code, code};
 use gr_text::Span;
 
+use crate::model::{Known, keyword_span, resolve, typed_keyword, value_span};
 use crate::schema::{Entity, Schema, Type, schema};
-
-/// Other spellings that public files use, and what the standard has. Accepted with a warning.
-static ALIASES: &[(&str, &str)] = &[
-    ("BIDIRECTIONAL_MILLING", "BIDIRECTIONAL"),
-    ("UNIDIRECTIONAL_MILLING", "UNIDIRECTIONAL"),
-    ("CENTER_DRILL", "CENTERDRILL"),
-    ("TOOL_DIMENSION", "MILLING_TOOL_DIMENSION"),
-    ("NGON_CLOSED_PROFILE", "NGON_PROFILE"),
-    ("WOORDRUFF_KEYSEAT_MILL", "WOODRUFF_KEYSEAT_MILL"),
-    ("WEEEK_OF_YEAR_AND_DAY_DATE", "WEEK_OF_YEAR_AND_DAY_DATE"),
-];
 
 /// Checks every instance. Instances that Part 21 already calls damaged are left alone.
 pub fn check(text: &[u8], file: &Exchange) -> Vec<Fault> {
     let schema = schema();
-    let mut check = Check { text, file, schema, faults: Vec::new(), known: Vec::new() };
-    check.known = file.keywords.iter().map(|k| check.resolve(k)).collect();
+    let mut check = Check { text, file, schema, faults: Vec::new(), known: Vec::new(), bodies: None };
+    check.known = file.keywords.iter().map(|k| resolve(schema, k)).collect();
     for n in 0..file.instances.len() as u32 {
         let i = &file.instances[n as usize];
         if !i.damaged && !i.complex && text.get(i.start as usize) == Some(&b'#') {
@@ -31,40 +21,23 @@ pub fn check(text: &[u8], file: &Exchange) -> Vec<Fault> {
     check.faults
 }
 
-/// What a keyword of the file is: rows of the table, and the standard's name when the file uses another.
-#[derive(Clone)]
-struct Known {
-    rows: Vec<u16>,
-    alias: Option<&'static str>,
-}
-
 struct Check<'a> {
     text: &'a [u8],
     file: &'a Exchange,
     schema: &'static Schema,
     faults: Vec<Fault>,
     known: Vec<Known>,
+    bodies: Option<bool>,
 }
 
 impl Check<'_> {
-    fn resolve(&self, keyword: &str) -> Known {
-        let alias = ALIASES.iter().find(|(a, _)| *a == keyword).map(|(_, b)| *b);
-        let rows = self.schema.find(alias.unwrap_or(keyword)).iter().map(|e| e.0).collect();
-        Known { rows, alias }
-    }
-
     #[cold]
     fn fault(&mut self, code: Code, span: Span, args: Vec<String>) {
         self.faults.push(Fault { code, span, args, related: None });
     }
 
     fn keyword_span(&self, n: u32) -> Span {
-        let i = &self.file.instances[n as usize];
-        let from = i.start as usize;
-        let eq = self.text[from..].iter().position(|b| *b == b'=').map_or(from, |p| from + p + 1);
-        let start = eq + self.text[eq..].iter().position(|b| *b > b' ').unwrap_or(0);
-        let len = self.text[start..].iter().position(|b| !b.is_ascii_alphanumeric() && *b != b'_' && *b != b'!').unwrap_or(0);
-        Span::new(start as u32, (start + len) as u32)
+        keyword_span(self.text, self.file, n)
     }
 
     fn instance(&mut self, n: u32) {
@@ -90,14 +63,18 @@ impl Check<'_> {
         if entity.is_abstract && entity.keyword != "ELEMENTARY_SURFACE" {
             self.fault(code::STEP_ABSTRACT_ENTITY, self.keyword_span(n), vec![entity.keyword.into()]);
         }
-        if fits.is_none() {
+        // The later edition of part 111 has four attributes, in another order: its tools tell.
+        if fits.is_none() || (entity.keyword == "CUTTING_COMPONENT" && count == 4 && self.first_edition_tools()) {
             self.arity(n, entity, count);
             return;
         }
         for (attribute, value) in entity.attributes.iter().zip(gr_p21::members(values)) {
             let kind = value[0].kind();
             if kind == Kind::Unset {
-                if !attribute.optional {
+                if !attribute.optional && matches!(attribute.ty, Type::String) {
+                    let span = self.span(value[0]);
+                    self.fault(code::STEP_MISSING_NAME, span, vec![entity.keyword.into(), attribute.name.into()]);
+                } else if !attribute.optional {
                     let span = self.span(value[0]);
                     self.fault(code::STEP_MISSING_VALUE, span, vec![entity.keyword.into(), attribute.name.into(), attribute.written.into()]);
                 }
@@ -107,22 +84,27 @@ impl Check<'_> {
         }
     }
 
+    /// Whether the tools are those of the first edition: a tool has a body.
+    fn first_edition_tools(&mut self) -> bool {
+        let file = self.file;
+        *self.bodies.get_or_insert_with(|| {
+            (0..file.instances.len() as u32)
+                .any(|n| file.keyword(n) == "MILLING_CUTTING_TOOL" && gr_p21::members(file.values_of(n)).count() == 6)
+        })
+    }
+
     #[cold]
     fn arity(&mut self, n: u32, entity: &Entity, count: usize) {
         // The standard's own example 1 writes CUTTING_COMPONENT with four of its five attributes.
         let code = if entity.keyword == "CUTTING_COMPONENT" && count == 4 { code::STEP_SHORT_CUTTING_COMPONENT } else { code::STEP_ATTRIBUTE_COUNT };
-        let names: Vec<&str> = entity.attributes.iter().map(|a| a.name).collect();
+        let full = self.schema.find(entity.keyword).first().map_or(entity, |e| self.schema.entity(*e));
+        let names: Vec<&str> = full.attributes.iter().map(|a| a.name).collect();
         let args = vec![entity.keyword.into(), names.len().to_string(), count.to_string(), names.join(", ")];
         self.fault(code, self.keyword_span(n), args);
     }
 
     fn span(&self, v: Value) -> Span {
-        let len = match v.kind() {
-            Kind::List => 1,
-            Kind::Typed => self.text[v.start as usize..].iter().position(|b| *b == b'(').unwrap_or(1) as u32,
-            _ => v.len(),
-        };
-        Span::new(v.start, v.start + len)
+        value_span(self.text, v)
     }
 
     /// `value` holds the value and, behind it, its members.
@@ -130,7 +112,13 @@ impl Check<'_> {
         let v = value[0];
         let good = match ty {
             Type::Any => true,
-            Type::Real => matches!(v.kind(), Kind::Real | Kind::Integer),
+            Type::Real => {
+                if matches!(v.kind(), Kind::Real | Kind::Integer) {
+                    self.range(entity, name, written, v);
+                    return;
+                }
+                false
+            }
             Type::Integer => v.kind() == Kind::Integer,
             Type::String => v.kind() == Kind::String,
             Type::Boolean => v.kind() == Kind::Enumeration && self.one_of(v, &["T", "F"]),
@@ -158,7 +146,7 @@ impl Check<'_> {
                     return;
                 }
                 Kind::Typed => {
-                    let keyword = self.typed_keyword(v);
+                    let keyword = typed_keyword(self.text, v);
                     match values.iter().find(|(k, _)| k.eq_ignore_ascii_case(&keyword)) {
                         Some((_, inner)) if value.len() == 2 => {
                             self.value(entity, name, written, inner, &value[1..]);
@@ -198,6 +186,19 @@ impl Check<'_> {
         }
     }
 
+    /// Numbers that no computer holds, and lengths that can't be negative.
+    #[inline(always)]
+    fn range(&mut self, entity: &Entity, name: &str, written: &str, v: Value) {
+        let Some(raw) = self.file.raw(self.text, v) else { return };
+        if (raw.len() > 30 || raw.contains(&b'E')) && !self.file.real(self.text, v).is_some_and(f64::is_finite) {
+            let span = self.span(v);
+            self.fault(code::STEP_NUMBER_RANGE, span, vec![entity.keyword.into(), name.into()]);
+        } else if raw[0] == b'-' && written.starts_with("positive_") {
+            let span = self.span(v);
+            self.fault(code::STEP_NEGATIVE_LENGTH, span, vec![entity.keyword.into(), name.into(), written.into()]);
+        }
+    }
+
     fn one_of(&self, v: Value, names: &[&str]) -> bool {
         let Some(raw) = self.file.raw(self.text, v) else { return false };
         let inside = &raw[1..raw.len() - 1];
@@ -212,12 +213,6 @@ impl Check<'_> {
             other => other,
         };
         names.iter().any(|n| n.eq_ignore_ascii_case(clean))
-    }
-
-    fn typed_keyword(&self, v: Value) -> String {
-        let text = &self.text[v.start as usize..];
-        let end = text.iter().position(|b| *b == b'(').unwrap_or(0);
-        text[..end].iter().filter(|b| **b > b' ').map(|b| *b as char).collect()
     }
 
     fn reference(&mut self, entity: &Entity, name: &str, written: &str, names: &[crate::schema::Name], v: Value) {

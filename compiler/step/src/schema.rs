@@ -99,6 +99,7 @@ pub struct Schema {
     pub entities: Vec<Entity>,
     by_keyword: FxHashMap<&'static str, Vec<EntityId>>,
     names: FxHashMap<&'static str, Name>,
+    texts: Vec<&'static str>,
 }
 
 static ENTITIES: &str = include_str!("../../../spec/step/entities.tsv");
@@ -122,6 +123,10 @@ impl Schema {
     /// Number of a name, if any entity has it.
     pub fn name(&self, lower: &str) -> Option<Name> {
         self.names.get(lower).copied()
+    }
+    /// A name's letters.
+    pub fn text_of(&self, name: Name) -> &'static str {
+        self.texts.get(name.0 as usize).copied().unwrap_or("")
     }
     /// Whether some edition of `keyword` is a `supertype`.
     pub fn is_a(&self, keyword: &str, supertype: &str) -> bool {
@@ -158,7 +163,11 @@ impl Schema {
             }
             map
         };
-        let mut schema = Schema { entities: Vec::with_capacity(rows.len()), by_keyword: FxHashMap::default(), names };
+        let mut texts = vec![""; names.len()];
+        for (text, name) in &names {
+            texts[name.0 as usize] = text;
+        }
+        let mut schema = Schema { entities: Vec::with_capacity(rows.len()), by_keyword: FxHashMap::default(), names, texts };
         for (i, row) in rows.iter().enumerate() {
             let attributes = row[5].split("; ").filter(|a| !a.is_empty()).map(|a| schema.attribute(a, &types)).collect();
             let mut is_a = Vec::new();

@@ -1,0 +1,194 @@
+//! Everything there is to say about a file: Part 21, schema, rules and lints, one message per mistake.
+
+use gr_p21::{Exchange, Fault};
+use gr_spec::{Severity, code};
+use gr_text::{Diagnostic, FileId, Fix, Span};
+
+use crate::dialect::{Dialect, dialect, schema_names};
+use crate::lint::Finding;
+use crate::model::Model;
+use crate::rules::{Origin, broken};
+
+/// Reads `text` and says what is wrong with it, in file order.
+pub fn diagnostics(text: &str, file: FileId) -> Vec<Diagnostic> {
+    let exchange = gr_p21::parse(text.as_bytes());
+    diagnostics_of(text.as_bytes(), &exchange, file)
+}
+
+/// As [`diagnostics`], of a file that was read already.
+pub fn diagnostics_of(text: &[u8], exchange: &Exchange, file: FileId) -> Vec<Diagnostic> {
+    let model = Model::new(text, exchange);
+    let mut out = Out { text, exchange, file, faulty: vec![false; exchange.instances.len()], list: Vec::new() };
+    for f in &exchange.faults {
+        out.fault(f);
+    }
+    let kind = dialect(&model);
+    out.schema(&model, kind);
+    if understood(&model, kind) {
+        out.layers(&model, kind);
+    } else {
+        out.dangling();
+    }
+    out.list.sort_by_key(|d| (d.primary().1.start, d.primary().1.end));
+    out.list
+}
+
+/// Whether the instances are worth comparing with ISO 14649.
+fn understood(model: &Model<'_>, kind: Dialect) -> bool {
+    match kind {
+        Dialect::Unknown | Dialect::Missing => {
+            let mut known = 0;
+            let mut all = 0;
+            for n in model.instances() {
+                all += 1;
+                known += usize::from(n.entity().is_some());
+            }
+            known * 2 >= all
+        }
+        other => other.is_14649(),
+    }
+}
+
+struct Out<'a> {
+    text: &'a [u8],
+    exchange: &'a Exchange,
+    file: FileId,
+    /// Statements that have had a message.
+    faulty: Vec<bool>,
+    list: Vec<Diagnostic>,
+}
+
+impl Out<'_> {
+    /// The statement around a place.
+    fn statement(&self, at: u32) -> Option<usize> {
+        let after = self.exchange.instances.partition_point(|i| i.start <= at);
+        let n = after.checked_sub(1)?;
+        let i = &self.exchange.instances[n];
+        (at <= i.end || i.damaged).then_some(n)
+    }
+
+    fn fault(&mut self, f: &Fault) {
+        let mut d = Diagnostic::new(f.code, self.file, f.span, &f.args);
+        if let Some((span, what)) = f.related {
+            d = d.label(self.file, span, what);
+        }
+        d.fixes.extend(self.mend(f));
+        self.list.push(d);
+        if let Some(n) = self.statement(f.span.start) {
+            self.faulty[n] = true;
+        }
+    }
+
+    /// The edit that mends a fault, where there is only one.
+    fn mend(&self, f: &Fault) -> Option<Fix> {
+        let c = f.code;
+        let arg = |n: usize| f.args.get(n).cloned();
+        let (title, new) = if c == code::P21_STRAY_QUOTE {
+            ("write an empty string".to_string(), "''".to_string())
+        } else if c == code::P21_MISSING_SEMICOLON {
+            ("end the statement with `;`".to_string(), ";".to_string())
+        } else if c == code::P21_LOWER_CASE || c == code::P21_BLANK_IN_KEYWORD || c == code::STEP_OTHER_SPELLING {
+            (format!("write {}", arg(1)?), arg(1)?)
+        } else if c == code::STEP_UNKNOWN_ENTITY {
+            let meant = arg(1)?.strip_prefix("; did you mean ")?.trim_end_matches('?').to_string();
+            (format!("write {meant}"), meant)
+        } else if c == code::STEP_MISSING_NAME {
+            ("write an empty string".to_string(), "''".to_string())
+        } else {
+            return None;
+        };
+        Some(Fix { title, edits: vec![(self.file, f.span, new)] })
+    }
+
+    fn schema(&mut self, model: &Model<'_>, kind: Dialect) {
+        let header = model.header("FILE_SCHEMA").map(|h| h.span());
+        let span = header.unwrap_or(Span::new(0, self.text.len().min(12) as u32));
+        let names = schema_names(model).join(", ");
+        let row = match kind {
+            Dialect::Ap238 => (code::STEP_AP238, vec![names]),
+            Dialect::Product(what) => (code::STEP_NO_PROCESS, vec![what.to_string(), names]),
+            Dialect::Unknown => (code::STEP_UNKNOWN_SCHEMA, vec![names]),
+            Dialect::Missing if !self.exchange.instances.is_empty() && header.is_none() => (code::STEP_NO_SCHEMA, vec![]),
+            _ => return,
+        };
+        self.list.push(Diagnostic::new(row.0, self.file, span, &row.1));
+    }
+
+    fn dangling(&mut self) {
+        for (n, id) in self.exchange.dangling(self.text) {
+            let v = self.exchange.values[n];
+            let span = Span::new(v.start, v.start + v.len());
+            if self.statement(v.start).is_none_or(|n| !self.faulty[n]) {
+                self.list.push(Diagnostic::new(code::P21_DANGLING_REFERENCE, self.file, span, &[id.to_string()]));
+            }
+        }
+    }
+
+    fn layers(&mut self, model: &Model<'_>, kind: Dialect) {
+        self.dangling();
+        let hurt = self.faulty.clone();
+        for f in crate::check::check(self.text, self.exchange) {
+            // References to nothing are reported above, also those the schema can't see.
+            let known = self.statement(f.span.start).is_some_and(|n| hurt[n]);
+            if !known && f.code != code::P21_DANGLING_REFERENCE {
+                self.fault(&f);
+            }
+        }
+        for d in &self.list {
+            if d.code == code::P21_DANGLING_REFERENCE
+                && let Some(n) = self.statement(d.primary().1.start)
+            {
+                self.faulty[n] = true;
+            }
+        }
+        // Another spelling is no reason to be silent about the rest.
+        let mut quiet = self.faulty.clone();
+        for d in self.list.iter().filter(|d| d.severity != Severity::Error) {
+            if let Some(n) = self.statement(d.primary().1.start)
+                && !hurt[n]
+                && d.code == code::STEP_OTHER_SPELLING
+            {
+                quiet[n] = false;
+            }
+        }
+        self.rules(model, &quiet);
+        let findings = crate::lint::lint(model, &|n| quiet.get(n as usize) == Some(&true));
+        for f in findings {
+            self.finding(f, kind);
+        }
+    }
+
+    fn rules(&mut self, model: &Model<'_>, quiet: &[bool]) {
+        for (node, rule) in broken(model) {
+            // Both speeds given: a lint explains the readings.
+            let both = rule.entity == "milling_technology" && rule.label == "WR1" && node.attr("spindle").is_some();
+            if quiet[node.index() as usize] || both {
+                continue;
+            }
+            let code = match rule.origin {
+                Origin::Process => code::STEP_WHERE_RULE,
+                Origin::Resource => code::STEP_RESOURCE_RULE,
+            };
+            let args = [node.keyword().to_string(), rule.says.to_string(), format!("{}.{}", rule.entity, rule.label)];
+            self.list.push(Diagnostic::new(code, self.file, node.keyword_span(), &args));
+        }
+    }
+
+    fn finding(&mut self, f: Finding, kind: Dialect) {
+        let mut d = Diagnostic::new(f.code, self.file, f.span, &f.args);
+        d.notes = f.notes;
+        for (span, text) in f.labels {
+            d = d.label(self.file, span, text);
+        }
+        if !f.also.is_empty() {
+            let shown: Vec<String> = f.also.iter().take(6).map(|id| format!("#{id}")).collect();
+            let more = f.also.len() - shown.len();
+            let tail = if more > 0 { format!(" and {more} more") } else { String::new() };
+            d = d.note(format!("the same in {}{tail}", shown.join(", ")));
+        }
+        if f.code == code::STEP_BOTH_SPEEDS && kind == Dialect::StepModeler {
+            d = d.note("the file was written by STEP Modeler (ST-GENERATOR), which has units of its own");
+        }
+        self.list.push(d);
+    }
+}

@@ -1,0 +1,158 @@
+//! Whole files: the damaged listing and its repair, fragments, probes, other schemas.
+
+mod examples;
+
+use examples::{data, diagnostics};
+use gr_text::{Diagnostic, LineIndex, Severity};
+use std::collections::BTreeMap;
+
+/// Statements by their first word (`#17`), one per line.
+fn statements(text: &str) -> BTreeMap<String, String> {
+    let lines = text.lines().filter(|l| l.starts_with('#'));
+    lines.filter_map(|l| l.split_once('=').map(|(id, _)| (id.to_string(), l.to_string()))).collect()
+}
+
+fn dense(s: &str) -> String {
+    s.chars().filter(|c| !c.is_whitespace()).collect()
+}
+
+/// Messages by the statement they are in; those outside of instances under their line's first word.
+fn by_statement(text: &str, all: &[Diagnostic]) -> BTreeMap<String, Vec<Diagnostic>> {
+    let lines = LineIndex::new(text.as_bytes());
+    let mut out: BTreeMap<String, Vec<Diagnostic>> = BTreeMap::new();
+    for d in all {
+        let line = lines.position(d.primary().1.start).0 as usize;
+        let words = text.lines().nth(line).unwrap_or("");
+        let key = words.split(['=', ':', ' ']).next().unwrap_or("").to_string();
+        out.entry(key).or_default().push(d.clone());
+    }
+    out
+}
+
+#[test]
+fn damaged_listing_one_message_each() {
+    let (damaged, repaired) = (data("three-faces-damaged.p21"), data("three-faces.p21"));
+    let (a, b) = (statements(&damaged), statements(&repaired));
+    assert_eq!((a.len(), b.len()), (732, 732), "a statement is swallowed");
+    let all = diagnostics(&damaged);
+    let found = by_statement(&damaged, &all);
+    let (mut blanks, mut harmed) = (0, 0);
+    let mut wrong = Vec::new();
+    // White space is content within keywords, which have none; elsewhere only inside of strings.
+    for (id, line) in &a {
+        let messages = found.get(id).map_or(&[][..], |v| v);
+        if *line == b[id] {
+            if let Some(d) = messages.iter().find(|d| d.severity == Severity::Error) {
+                wrong.push(format!("{id} is healthy: {}", d.message));
+            }
+            continue;
+        }
+        let keyword = |l: &str| l.split(['=', '(']).nth(1).unwrap_or("").to_string();
+        if dense(line) == dense(&b[id]) && keyword(line) == keyword(&b[id]) {
+            blanks += 1;
+            if !messages.is_empty() {
+                wrong.push(format!("{id} differs by blanks only: {:?}", messages.iter().map(|d| &d.message).collect::<Vec<_>>()));
+            }
+        } else {
+            harmed += 1;
+            let warning = id == "#53" || id == "#153";
+            let expected = if warning { Severity::Warning } else { Severity::Error };
+            if messages.len() != 1 || messages[0].severity != expected {
+                wrong.push(format!("{id}: {:?}: {line}", messages.iter().map(|d| &d.message).collect::<Vec<_>>()));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    assert_eq!((blanks, harmed), (31, 139));
+    let colons: Vec<_> = all.iter().filter(|d| d.code == gr_spec::code::P21_MISSING_SEMICOLON).collect();
+    let outside = colons.iter().filter(|d| !damaged[..d.primary().1.start as usize].rsplit('\n').next().unwrap_or("").starts_with('#'));
+    assert_eq!(outside.count(), 3, "ENDSEC: DATA: and ENDSEC:");
+}
+
+#[test]
+fn repaired_listing_is_read_whole() {
+    let text = data("three-faces.p21");
+    let all = diagnostics(&text);
+    assert!(all.iter().all(|d| d.severity != Severity::Error), "{:#?}", all.iter().find(|d| d.severity == Severity::Error));
+    let orphans = all.iter().filter(|d| d.code == gr_spec::code::STEP_ORPHAN_WORKINGSTEP).count();
+    assert_eq!(orphans, 14);
+}
+
+#[test]
+fn every_prefix_of_a_plan_is_survived() {
+    let text = data("slot-square-u.p21");
+    for n in (0..text.len()).filter(|n| text.is_char_boundary(*n)) {
+        diagnostics(&text[..n]);
+    }
+}
+
+#[test]
+fn fragments_get_located_errors() {
+    let text = data("test-program.p21");
+    let all = diagnostics(&text);
+    let lines = LineIndex::new(text.as_bytes());
+    let at: Vec<u32> = all.iter().filter(|d| d.severity == Severity::Error).map(|d| lines.position(d.primary().1.start).0 + 1).collect();
+    assert!(at.len() > 30, "{}", at.len());
+    for line in [6, 7, 8, 9, 10, 12, 25, 26, 30, 40, 44, 45] {
+        assert!(at.contains(&line), "nothing about line {line}");
+    }
+}
+
+#[test]
+fn wrapped_at_any_column_it_says_the_same() {
+    let text = data("slot-square-u.p21");
+    let body = &text[text.find("DATA;").expect("data")..];
+    let head = &text[..text.find("DATA;").expect("data")];
+    let messages = |t: &str| diagnostics(t).into_iter().map(|d| (d.code, d.message, d.notes)).collect::<Vec<_>>();
+    let whole = messages(&text);
+    let flat = body.replace('\n', "");
+    for width in [41, 44, 7] {
+        let lines: Vec<String> = flat.as_bytes().chunks(width).map(|c| String::from_utf8_lossy(c).into_owned()).collect();
+        assert_eq!(messages(&format!("{head}{}\n", lines.join("\n"))), whole, "{width}");
+    }
+}
+
+#[test]
+fn probes_with_the_schema() {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../p21/tests/probes");
+    let index = std::fs::read_to_string(folder.join("INDEX.tsv")).expect("index");
+    let mut wrong = Vec::new();
+    for row in index.lines().filter(|l| !l.starts_with('#')) {
+        let (name, faults) = row.split_once('\t').expect("columns");
+        let bytes = std::fs::read(folder.join(name)).expect("probe");
+        let text = gr_text::decode(bytes).text;
+        let lines = LineIndex::new(text.as_bytes());
+        let found: Vec<String> = diagnostics(&text)
+            .iter()
+            // A probe is a few statements, not a plan.
+            .filter(|d| d.severity != Severity::Hint)
+            .map(|d| {
+                let (l, c) = lines.position(d.primary().1.start);
+                format!("{}:{}:{}", l + 1, c + 1, d.code.def().code)
+            })
+            .collect();
+        let expected = if faults == "ok" { String::new() } else { faults.to_string() };
+        if found.join(" ") != expected {
+            wrong.push(format!("{name}: expected {expected}, found {found:?}"));
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn other_schemas_get_one_message() {
+    for (schema, code) in [("AP242_MANAGED_MODEL_BASED_3D_ENGINEERING_MIM_LF { 1 0 10303 442 1 1 4 }", "E0418"), ("INTEGRATED_CNC_SCHEMA", "E0419"), ("IFC4", "E0418"), ("FOO", "E0420")] {
+        let text = format!("ISO-10303-21;\nHEADER;\nFILE_DESCRIPTION((''),'2;1');\nFILE_NAME('','',(''),(''),'','','');\nFILE_SCHEMA(('{schema}'));\nENDSEC;\nDATA;\n#1=SOMETHING_ELSE('',#2);\n#2=SOMETHING_MORE('');\nENDSEC;\nEND-ISO-10303-21;\n");
+        let found: Vec<&str> = diagnostics(&text).iter().map(|d| d.code.def().code).collect();
+        assert_eq!(found, [code], "{schema}");
+    }
+}
+
+#[test]
+fn a_circle_of_plans_is_found_and_left() {
+    let text = examples::file("#2=WORKPLAN('a',(#10,#100),$,$,$);\n#100=WORKPLAN('b',(#101),$,$,$);\n#101=WORKPLAN('c',(#2),$,$,$);");
+    let found = diagnostics(&text);
+    let cycle: Vec<_> = found.iter().filter(|d| d.code == gr_spec::code::STEP_CYCLE).collect();
+    assert_eq!(cycle.len(), 1);
+    assert!(cycle[0].message.contains("#2 → #100 → #101 → #2"), "{}", cycle[0].message);
+}
