@@ -98,7 +98,7 @@ pub enum Call {
         /// End of A B C U V W.
         rest: [f64; 6],
     },
-    /// NURBS in the XY plane: control points and order.
+    /// NURBS in its plane: control points and order.
     NurbsFeed(Box<Nurbs>),
     /// G33.1.
     RigidTap([f64; 3], f64),
@@ -118,6 +118,9 @@ pub enum Call {
     SetMotionControlMode(PathMode),
     /// Naive CAM tolerance.
     SetNaivecamTolerance(f64),
+    /// LinuxCNC 2.10, G64 R: 0 trapezoidal or 1 smooth planner, and how sharp the smooth one may corner (0.1 … 1;
+    /// −1 with the other).
+    SetPlannerMode(i32, f64),
     /// Spindle number and 0 = constant rpm, else constant surface speed with this rpm limit.
     SetSpindleMode(i32, f64),
     /// Spindle number, rpm (or surface speed).
@@ -220,6 +223,8 @@ pub struct Nurbs {
     pub order: u32,
     /// Control points: the two plane coordinates and the weight.
     pub points: Vec<[f64; 3]>,
+    /// Plane; 2.9 has splines in XY only. XZ means Z, then X.
+    pub plane: Plane,
 }
 
 /// How execution came to a block; a node of a tree that the interpreter grows.

@@ -333,6 +333,13 @@ fn simple(call: &Call, out: &mut Vec<u8>) {
             push_fixed::<6>(out, *t);
             out.extend_from_slice(b")\n");
         }
+        Call::SetPlannerMode(kind, scale) => {
+            out.extend_from_slice(b"SET_PLANNER_MODE(type=");
+            push_int(out, i64::from(*kind));
+            out.extend_from_slice(b", peak_scale=");
+            push_fixed::<6>(out, *scale);
+            out.extend_from_slice(b")\n");
+        }
         Call::SetNaivecamTolerance(t) => line(out, "SET_NAIVECAM_TOLERANCE", "", [Arg::Num(*t)]),
         Call::SetSpindleMode(s, v) => line(out, "SET_SPINDLE_MODE", " ", [int(s), Arg::Num(*v)]),
         Call::SetSpindleSpeed(s, v) => line(out, "SET_SPINDLE_SPEED", ", ", [int(s), Arg::Num(*v)]),
@@ -441,7 +448,7 @@ mod tests {
         let calls = [
             Call::SetG5xOffset(1, p),
             Call::ArcFeed { first_end: 1.0, second_end: 2.0, first_axis: 3.0, second_axis: 4.0, rotation: -1, axis_end: -0.0, rest: [0.0; 6] },
-            Call::NurbsFeed(Box::new(Nurbs { order: 3, points: vec![[0.0; 3]; 4] })),
+            Call::NurbsFeed(Box::new(Nurbs { order: 3, points: vec![[0.0; 3]; 4], plane: Plane::Xy })),
             Call::SetMotionControlMode(PathMode::Continuous(0.1)),
             Call::StartSpeedFeedSynch(0, 1.5, false),
             Call::SetSpindleMode(0, 0.0),

@@ -302,8 +302,13 @@ impl<S: Sink> Interp<'_, S> {
                 || matches!(comp, 411 | 421)
                 || special == 100
                 || m7 == 19;
-            if !used {
+            // 2.10: G64 chooses the planner with R.
+            let planner = path && self.setup.version == gr_canon::Version::V2_10;
+            if !used && !planner {
                 return unused(rs274::RT_R_UNUSED, b'r');
+            }
+            if planner && m7 == 19 {
+                return Err(fault(code::AXIS_TWO_USERS, rs274::RT_R_AMBIGUOUS, "").at(b'r'));
             }
             if m7 == 19 && !(0.0..=360.0).contains(&b.or_zero(b'r')) {
                 return Err(bad_value(rs274::RT_M19_R, "M19", 'R'));

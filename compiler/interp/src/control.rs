@@ -6,7 +6,7 @@
 
 use std::sync::Arc;
 
-use gr_canon::{FileId, FrameId, Sink};
+use gr_canon::{FileId, FrameId, Sink, Version};
 use gr_gcode::{Control, Form, Keyword, LineKind, OLabel, Scan, Word};
 use gr_spec::{Rs274, code, rs274};
 use gr_text::Span;
@@ -490,7 +490,17 @@ impl<S: Sink> Interp<'_, S> {
             self.save_offset(label, keyword)?;
             self.skip = None;
         }
-        if keyword == Keyword::Program || self.level() != 0 {
+        if keyword == Keyword::Program {
+            return Ok(());
+        }
+        if self.level() != 0 {
+            let called = self.levels[self.level()].sub;
+            // Only the called subroutine may begin here, says 2.10.
+            if self.setup.version == Version::V2_10 && called != label.name {
+                let (inner, outer) = (self.full_name(label), self.symbols.name(called).to_string());
+                let fault = structure(rs274::RT_O_NESTED_CALLED, "a subroutine is defined inside another one");
+                return Err(with_args(fault, &[&inner, &outer]));
+            }
             return Ok(());
         }
         self.save_offset(label, keyword)?;
@@ -597,8 +607,9 @@ impl<S: Sink> Interp<'_, S> {
         let name = self.symbols.name(label.name).to_string();
         self.enter_frame(&format!("sub {name}"), self.place.frame, 0);
         self.skip = None;
-        self.go_to_sub(&name);
-        Ok(())
+        self.go_to_sub(&name).inspect_err(|_| {
+            self.levels.pop();
+        })
     }
 
     fn call_nothing(&mut self, label: Label) -> Res {
@@ -611,7 +622,7 @@ impl<S: Sink> Interp<'_, S> {
         Ok(())
     }
 
-    fn go_to_sub(&mut self, name: &str) {
+    fn go_to_sub(&mut self, name: &str) -> Res {
         let base = self.symbols.of(base_name(name));
         let label = Label { scope: GLOBAL, name: base };
         self.flow = Flow::Jump;
@@ -619,7 +630,7 @@ impl<S: Sink> Interp<'_, S> {
             self.place.file = at.file;
             self.next = at.line;
             self.shift = at.shift;
-            return;
+            return Ok(());
         }
         let from = self.place;
         let mut start = self.sequence();
@@ -629,8 +640,19 @@ impl<S: Sink> Interp<'_, S> {
             self.next = 0;
             self.shift = 0;
             start = 0;
+        } else if self.setup.version == Version::V2_10 && self.outside_main_file() {
+            // 2.10 looks ahead in the main program's file only.
+            let what = "the subroutine is neither known so far nor a file of its own";
+            let fault = structure(rs274::RT_O_NOT_FOUND, what);
+            return Err(with_args(fault, &[name, &format!("{name}.ngc")]));
         }
         self.skip = Some(Skip { label, to_sub: true, start, from: Some(from) });
+        Ok(())
+    }
+
+    /// The line stands in another file than the main program's first call.
+    fn outside_main_file(&self) -> bool {
+        self.levels[0].ret.as_ref().is_some_and(|ret| ret.place.file != self.place.file)
     }
 
     fn go_back_to(&mut self, at: &Offset) {

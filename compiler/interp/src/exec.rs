@@ -157,7 +157,7 @@ impl<S: Sink> Interp<'_, S> {
         }
         if let Some(g) = self.todo(Group::PathControl, step::PATH) {
             let (p, q) = (self.block.or_minus_one(b'p'), self.block.or_minus_one(b'q'));
-            self.convert_path(g, p, q)?;
+            self.convert_path(g, p, q, self.block.get(b'r'))?;
         }
         if let Some(g) = self.todo(Group::Distance, step::DISTANCE) {
             let incremental = u8::from(g == 910);
@@ -272,7 +272,7 @@ impl<S: Sink> Interp<'_, S> {
     }
 
     /// G61, G61.1, G64.
-    pub(crate) fn convert_path(&mut self, g: i16, tolerance: f64, naive: f64) -> Res {
+    pub(crate) fn convert_path(&mut self, g: i16, tolerance: f64, naive: f64, planner: Option<f64>) -> Res {
         not_with_comp(self.m.comp_side, rs274::RT_COMP_CONTROL_MODE, "a change of the path mode")?;
         match g {
             610 => {
@@ -287,6 +287,11 @@ impl<S: Sink> Interp<'_, S> {
                 let path = if tolerance >= 0.0 { tolerance } else { 0.0 };
                 self.m.path_mode = 2;
                 self.m.tolerance = path;
+                match planner {
+                    Some(r) if r <= 0.0 => self.emit(Call::SetPlannerMode(0, -1.0)),
+                    Some(r) => self.emit(Call::SetPlannerMode(1, r.clamp(0.1, 1.0))),
+                    None => {}
+                }
                 self.emit(Call::SetMotionControlMode(PathMode::Continuous(path)));
                 let naive = if naive >= 0.0 { naive } else { path };
                 self.m.naivecam = naive;

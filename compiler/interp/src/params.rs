@@ -141,6 +141,10 @@ impl<S: Sink> Interp<'_, S> {
             }
             return Ok(self.m.current[(index - 5420) as usize]);
         }
+        // 2.10: the machine position, however offsets and rotation stand.
+        if (5021..=5029).contains(&index) && self.setup.version == Version::V2_10 {
+            return Ok(self.machine_position()[(index - 5021) as usize]);
+        }
         let index = index as u32;
         if let Some(log) = &mut self.log {
             log.read(index);

@@ -475,15 +475,17 @@ impl<S: Sink> Interp<'_, S> {
         let now = self.modes();
         self.block.clear();
         let mut any = false;
-        if now.settings[1] != saved.settings[1] {
+        // 2.10 restores feed, speed and path mode whether they changed or not.
+        let always = self.setup.version == gr_canon::Version::V2_10;
+        if always || now.settings[1] != saved.settings[1] {
             self.block.set(b'f', format!("{:.1}", saved.settings[1]).parse().unwrap_or(0.0));
             any = true;
         }
-        if now.settings[2] != saved.settings[2] {
+        if always || now.settings[2] != saved.settings[2] {
             self.block.set(b's', format!("{:.0}", saved.settings[2]).parse().unwrap_or(0.0));
             any = true;
         }
-        let mut path = now.settings[3] != saved.settings[3] || now.settings[4] != saved.settings[4];
+        let mut path = always || now.settings[3] != saved.settings[3] || now.settings[4] != saved.settings[4];
         for i in [3, 4, 6, 7, 8, 9, 10, 11, 13, 14, 15, 16] {
             let code = saved.g[i];
             if code == now.g[i] || code == -1 {

@@ -4,7 +4,7 @@
 //! smaller Z; the moves found there are turned back before they are made. Facing (G72) is roughing of the
 //! contour turned by a quarter.
 
-use gr_canon::{Plane, Sink};
+use gr_canon::{Plane, Sink, Version};
 use gr_spec::{code, rs274};
 
 use crate::arc::general;
@@ -110,6 +110,8 @@ impl std::ops::Mul for Zx {
 /// A move that comes out.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Cut {
+    /// Rapid to where a finishing pass begins.
+    Approach(Zx),
     Rapid(Zx),
     Line(Zx),
     /// Counter-clockwise?, centre, end.
@@ -529,6 +531,7 @@ impl Contour {
         };
         let mirrored = matches!(self.turned, 1 | 2 | 5 | 6);
         match cut {
+            Cut::Approach(p) => Cut::Approach(back(p)),
             Cut::Rapid(p) => Cut::Rapid(back(p)),
             Cut::Line(p) => Cut::Line(back(p)),
             Cut::Arc(ccw, c, p) => Cut::Arc(ccw ^ mirrored, back(c), back(p)),
@@ -636,6 +639,18 @@ impl Contour {
         Ok(())
     }
 
+    /// 2.10: a contour that ends in the stock is led out of it, straight to the level of the start point.
+    fn close(&mut self, cycle: i16, start: Zx) {
+        let Some((first, last)) = self.segments.first().zip(self.segments.last()) else { return };
+        let (front, back, end) = (first.end - first.start, last.end - last.start, last.end);
+        let out = match cycle {
+            71 if back.z != 0.0 && front.x * (start.x - end.x) < 0.0 => Zx::new(end.z, start.x),
+            72 if back.x != 0.0 && front.z * (start.z - end.z) < 0.0 => Zx::new(start.z, end.x),
+            _ => return,
+        };
+        self.segments.push(Segment::line(end, out));
+    }
+
     /// G70: along the contour, `passes` times, from distance `far` to `near`.
     pub(crate) fn finish(&mut self, start: Zx, far: f64, near: f64, passes: f64, out: &mut Vec<Cut>) -> Trouble {
         self.segments.first_mut().ok_or("Not monotonic")?.start = start;
@@ -661,7 +676,7 @@ impl Contour {
             self.notes.append(&mut path.notes);
             moved?;
             let first = path.segments[0];
-            out.push(self.restored(Cut::Rapid(first.start)));
+            out.push(self.restored(Cut::Approach(first.start)));
             out.push(self.restored(Cut::Rapid(first.end)));
             out.extend(path.segments[1..].iter().map(|s| self.restored(s.draw())));
             pass -= 1;
@@ -991,7 +1006,8 @@ impl<S: Sink> Interp<'_, S> {
     fn rough_contour(&mut self, cycle: i16, kind: u8, q: f64, saved: (u8, u8)) -> Res {
         let words = self.block.clone();
         let start = self.rough_start(saved.0 != 0);
-        self.convert_straight(0)?;
+        let before = [self.m.current[0], self.m.current[2]];
+        self.rapid_to_contour()?;
         let mut reader = Reader {
             contour: Contour::default(),
             at: start,
@@ -1001,6 +1017,10 @@ impl<S: Sink> Interp<'_, S> {
         self.read_contour(q, &mut reader)?;
         if reader.contour.segments.len() <= 1 {
             return Ok(());
+        }
+        if self.setup.version == Version::V2_10 {
+            [self.m.current[0], self.m.current[2]] = before;
+            reader.contour.close(cycle, start);
         }
         let mut cuts = Vec::new();
         let done = self.rough_cuts(cycle, kind, &words, start, &mut reader.contour, &mut cuts)?;
@@ -1012,6 +1032,17 @@ impl<S: Sink> Interp<'_, S> {
             self.make_cut(cut)?;
         }
         done.map_err(|why| refuse(rs274::ROUGH_GEOMETRY, &why))
+    }
+
+    /// The rapid before a pass. 2.10 makes it without cutter compensation, which then enters at the contour.
+    fn rapid_to_contour(&mut self) -> Res {
+        if self.setup.version == Version::V2_9 {
+            return self.convert_straight(0);
+        }
+        let side = std::mem::replace(&mut self.m.comp_side, 0);
+        let done = self.convert_straight(0);
+        self.m.comp_side = side;
+        done
     }
 
     /// Where the block's X and Z lead.
@@ -1056,11 +1087,12 @@ impl<S: Sink> Interp<'_, S> {
 
     fn make_cut(&mut self, cut: Cut) -> Res {
         let end = match cut {
-            Cut::Rapid(p) | Cut::Line(p) | Cut::Arc(_, _, p) => p,
+            Cut::Approach(p) | Cut::Rapid(p) | Cut::Line(p) | Cut::Arc(_, _, p) => p,
         };
         self.block.set(b'x', end.x);
         self.block.set(b'z', end.z);
         match cut {
+            Cut::Approach(_) => self.rapid_to_contour(),
             Cut::Rapid(_) => self.convert_straight(0),
             Cut::Line(_) => self.convert_straight(10),
             Cut::Arc(ccw, centre, _) => {
@@ -1111,7 +1143,7 @@ mod tests {
         shaft().rough(&job(), &mut cuts).expect("a plain shaft");
         assert!(cuts.len() > 8);
         let ends = cuts.iter().map(|c| match c {
-            Cut::Rapid(p) | Cut::Line(p) | Cut::Arc(_, _, p) => *p,
+            Cut::Approach(p) | Cut::Rapid(p) | Cut::Line(p) | Cut::Arc(_, _, p) => *p,
         });
         assert!(ends.into_iter().all(|p| p.x >= 4.0 - 1e-9));
     }
@@ -1127,6 +1159,6 @@ mod tests {
     fn finishing_follows_the_contour_at_a_distance() {
         let mut cuts = Vec::new();
         shaft().finish(Zx::new(1.0, 10.0), 0.5, 0.0, 2.0, &mut cuts).expect("a plain shaft");
-        assert_eq!(cuts.iter().filter(|c| matches!(c, Cut::Rapid(_))).count(), 4);
+        assert_eq!(cuts.iter().filter(|c| matches!(c, Cut::Approach(_) | Cut::Rapid(_))).count(), 4);
     }
 }

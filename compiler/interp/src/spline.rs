@@ -1,6 +1,6 @@
 //! Splines: G5 (cubic), G5.1 (quadratic), G5.2 … G5.3 (NURBS), all sent as NURBS with their control points.
 
-use gr_canon::{Call, Nurbs, Plane, Sink};
+use gr_canon::{Call, Nurbs, Plane, Sink, Version};
 use gr_spec::{Rs274, code, rs274};
 
 use crate::{Fault, Interp, Res};
@@ -30,6 +30,12 @@ impl<S: Sink> Interp<'_, S> {
         if self.m.feed_mode != 2 {
             self.check_cutting_feed(rs274::ARC_ZERO_FEED, rs274::ARC_NO_F)?;
         }
+        if self.setup.version == Version::V2_10 {
+            if self.block.has_any(b"abc") {
+                return Err(words(rs274::SPLINE_ROTARY, "it can't move A, B or C"));
+            }
+            return Ok(());
+        }
         if self.m.plane() != Plane::Xy {
             return Err(words(rs274::SPLINE_PLANE, "the plane is not G17"));
         }
@@ -39,34 +45,62 @@ impl<S: Sink> Interp<'_, S> {
         Ok(())
     }
 
+    /// First and second axis of the plane of splines: 2.9 knows XY only; 2.10 has (Y, Z) and (Z, X) too.
+    fn spline_axes(&self) -> [usize; 2] {
+        match self.m.plane() {
+            Plane::Yz if self.setup.version == Version::V2_10 => [1, 2],
+            Plane::Xz if self.setup.version == Version::V2_10 => [2, 0],
+            _ => [0, 1],
+        }
+    }
+
+    fn spline_plane(&self) -> Plane {
+        match self.spline_axes() {
+            [1, 2] => Plane::Yz,
+            [2, 0] => Plane::Xz,
+            _ => Plane::Xy,
+        }
+    }
+
+    /// I and J belong to X and Z in the XZ plane, in this order.
+    fn spline_offset(&self, i: f64, j: f64) -> [f64; 2] {
+        if self.spline_plane() == Plane::Xz { [j, i] } else { [i, j] }
+    }
+
     fn send_spline(&mut self, order: u32, points: &[[f64; 2]]) {
         let points = points.iter().map(|p| [p[0], p[1], 1.0]).collect();
-        self.emit(Call::NurbsFeed(Box::new(Nurbs { order, points })));
+        self.emit(Call::NurbsFeed(Box::new(Nurbs { order, points, plane: self.spline_plane() })));
     }
 
     fn quadratic_spline(&mut self) -> Res {
         let (Some(i), Some(j)) = (self.block.get(b'i'), self.block.get(b'j')) else {
-            return Err(words(rs274::SPLINE_NO_IJ, "I or J is missing"));
+            let new = self.setup.version == Version::V2_10;
+            return Err(words(if new { rs274::SPLINE_NO_IJ_G6 } else { rs274::SPLINE_NO_IJ }, "I or J is missing"));
         };
-        let start = [self.m.current[0], self.m.current[1]];
-        let end = self.find_ends()?;
-        self.send_spline(3, &[start, [start[0] + i, start[1] + j], [end[0], end[1]]]);
-        self.m.current[..2].copy_from_slice(&end[..2]);
+        let [first, second] = self.spline_axes();
+        let start = [self.m.current[first], self.m.current[second]];
+        let ends = self.find_ends()?;
+        let (end, by) = ([ends[first], ends[second]], self.spline_offset(i, j));
+        self.send_spline(3, &[start, [start[0] + by[0], start[1] + by[1]], end]);
+        [self.m.current[first], self.m.current[second]] = end;
         Ok(())
     }
 
     fn cubic_spline(&mut self) -> Res {
-        let start = [self.m.current[0], self.m.current[1]];
-        let tangent = self.spline_tangent(start)?;
-        let end = self.find_ends()?;
+        let [one, two] = self.spline_axes();
+        let start = [self.m.current[one], self.m.current[two]];
+        let [i, j] = self.spline_tangent(start)?;
+        let tangent = self.spline_offset(i, j);
+        let ends = self.find_ends()?;
+        let end = [ends[one], ends[two]];
         let (Some(p), Some(q)) = (self.block.get(b'p'), self.block.get(b'q')) else {
             return Err(words(rs274::SPLINE_NO_PQ, "P or Q is missing"));
         };
         let first = [start[0] + tangent[0], start[1] + tangent[1]];
-        self.send_spline(4, &[start, first, [end[0] + p, end[1] + q], [end[0], end[1]]]);
+        self.send_spline(4, &[start, first, [end[0] + p, end[1] + q], end]);
         (self.m.cycle_i, self.m.cycle_j) = (-p, -q);
-        self.m.spline_tail = [end[0], end[1]];
-        self.m.current[..2].copy_from_slice(&end[..2]);
+        self.m.spline_tail = end;
+        [self.m.current[one], self.m.current[two]] = end;
         Ok(())
     }
 
@@ -87,14 +121,20 @@ impl<S: Sink> Interp<'_, S> {
 
     /// G5.2: one more control point.
     fn nurbs_point(&mut self) -> Res {
-        let (x, y) = (self.block.has(b'x'), self.block.has(b'y'));
+        let [one, two] = self.spline_axes();
+        let (x, y) = (self.block.has(b"xyz"[one]), self.block.has(b"xyz"[two]));
         let weight = self.block.get(b'p').unwrap_or(-1.0);
         let begun = !self.queue.spline.points.is_empty();
+        let texts = match self.spline_plane() {
+            Plane::Yz => [rs274::NURBS_ONE_AXIS_YZ, rs274::NURBS_P_ALONE_YZ],
+            Plane::Xz => [rs274::NURBS_ONE_AXIS_XZ, rs274::NURBS_P_ALONE_XZ],
+            _ => [rs274::NURBS_ONE_AXIS, rs274::NURBS_P_ALONE],
+        };
         if x != y {
-            return Err(words(rs274::NURBS_ONE_AXIS, "X or Y is missing"));
+            return Err(words(texts[0], "one axis of the plane is missing"));
         }
         if !x && weight > 0.0 && begun {
-            return Err(words(rs274::NURBS_P_ALONE, "P without X and Y is for the first control point only"));
+            return Err(words(texts[1], "P without axes is for the first control point only"));
         }
         if weight <= 0.0 && begun {
             return Err(words(rs274::NURBS_NO_P, "the weight P is missing or not greater than zero"));
@@ -108,14 +148,14 @@ impl<S: Sink> Interp<'_, S> {
         if self.queue.spline.points.is_empty() {
             let first = if !x && weight > 0.0 { weight } else { 1.0 };
             self.queue.spline.order = 3;
-            self.queue.spline.points.push([self.m.current[0], self.m.current[1], first]);
+            self.queue.spline.points.push([self.m.current[one], self.m.current[two], first]);
         }
         if let Some(order) = self.block.get(b'l').filter(|l| *l > 3.0) {
             self.queue.spline.order = order as u32;
         }
         if x {
             let end = self.find_ends()?;
-            self.queue.spline.points.push([end[0], end[1], weight]);
+            self.queue.spline.points.push([end[one], end[two], weight]);
         }
         self.m.motion = 52;
         Ok(())
@@ -131,9 +171,11 @@ impl<S: Sink> Interp<'_, S> {
             let order = spline.order;
             return Err(words(rs274::NURBS_TOO_FEW, "too few control points").arg(order));
         }
-        let spline = std::mem::take(&mut self.queue.spline);
+        let mut spline = std::mem::take(&mut self.queue.spline);
+        spline.plane = self.spline_plane();
         if let Some(last) = spline.points.last() {
-            self.m.current[..2].copy_from_slice(&last[..2]);
+            let [one, two] = self.spline_axes();
+            [self.m.current[one], self.m.current[two]] = [last[0], last[1]];
         }
         self.queue.spline.order = spline.order;
         self.emit(Call::NurbsFeed(Box::new(spline)));

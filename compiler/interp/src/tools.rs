@@ -183,6 +183,13 @@ impl<S: Sink> Interp<'_, S> {
             m.current[i] += change[i];
         }
         m.tool_offset = offset;
+        // 2.10 shows the offset that applies, not the loaded tool's.
+        if self.setup.version == Version::V2_10 {
+            let stored = self.machine_axes(&offset);
+            for (i, value) in stored.into_iter().enumerate() {
+                self.write_param(5401 + i as u32, value);
+            }
+        }
         Ok(())
     }
 

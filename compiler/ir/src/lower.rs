@@ -69,6 +69,9 @@ impl Lowering {
     }
 
     fn nurbs(&mut self, nurbs: &gr_canon::Nurbs, source: Source) {
+        if nurbs.plane != gr_canon::Plane::Xy {
+            return self.nurbs_as_lines(nurbs, source);
+        }
         let k = self.scale();
         let mut points = std::mem::take(&mut self.points);
         points.clear();
@@ -79,6 +82,24 @@ impl Lowering {
         }
         self.out.push_to(Op::Nurbs { order: nurbs.order, points: &points }, &end, source);
         self.points = points;
+    }
+
+    /// The spline operation lies in XY. Splines of the other planes (LinuxCNC 2.10 has them) become short lines,
+    /// 200 of a span: they stay nearer than a 20 000th of the control polygon.
+    fn nurbs_as_lines(&mut self, nurbs: &gr_canon::Nurbs, source: Source) {
+        const PIECES: usize = 200;
+        let k = self.scale();
+        let (first, second) = if nurbs.plane == gr_canon::Plane::Yz { (1, 2) } else { (2, 0) };
+        let points: Vec<f64> = nurbs.points.iter().flat_map(|p| [p[0] * k, p[1] * k, p[2]]).collect();
+        let spans = (nurbs.points.len() + 1).saturating_sub(nurbs.order as usize).max(1);
+        let count = spans * PIECES;
+        for i in 1..=count {
+            let share = i as f64 / count as f64;
+            let Some(p) = crate::geometry::nurbs_point(nurbs.order, &points, share) else { break };
+            let mut end = *self.out.pose();
+            (end.axes[first], end.axes[second]) = (p[0], p[1]);
+            self.out.push_to(Op::Linear, &end, source);
+        }
     }
 
     fn feed(&mut self, rate: f64, source: Source) {

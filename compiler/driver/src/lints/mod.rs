@@ -118,6 +118,14 @@ pub(crate) struct Summary {
     pub(crate) dives: Vec<Dive>,
 }
 
+impl Summary {
+    /// More dives may be missing.
+    #[inline]
+    pub(crate) fn is_full(&self) -> bool {
+        self.dives.len() >= stock::MOST_PER_CHUNK
+    }
+}
+
 /// The sink that the lints watch the stream through.
 pub(crate) struct Lints<'a> {
     pub(crate) rules: &'a Rules,
@@ -274,8 +282,13 @@ impl Lints<'_> {
                 self.cut(at, end);
             }
             Call::NurbsFeed(curve) => {
-                if let Some([x, y, _]) = curve.points.last() {
-                    let end = [*x, *y, self.position[2]];
+                if let Some([a, b, _]) = curve.points.last() {
+                    let mut end = self.position;
+                    match curve.plane {
+                        gr_canon::Plane::Yz => (end[1], end[2]) = (*a, *b),
+                        gr_canon::Plane::Xz => (end[2], end[0]) = (*a, *b),
+                        _ => (end[0], end[1]) = (*a, *b),
+                    }
                     self.cut(at, end);
                 }
             }
