@@ -57,6 +57,10 @@ fn run(cli: Cli) -> ExitCode {
         Command::Machine(args) => commands::machine::run(global, &args).into(),
         Command::Rs274(args) => commands::rs274::run("gcc-robot rs274".as_ref(), &args.arguments),
         Command::Init(args) => commands::init::run(global, &args).into(),
+        Command::Lsp(_) => match gr_lsp::run() {
+            Ok(()) => Exit::Ok.into(),
+            Err(_) => Exit::Io.into(),
+        },
         Command::Completions(args) => commands::completions::run(&args).into(),
     }
 }

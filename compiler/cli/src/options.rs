@@ -72,6 +72,8 @@ pub enum Command {
     Rs274(Rs274Args),
     /// Write a project file gcc-robot.toml
     Init(InitArgs),
+    /// Language server on standard input and output, for editors
+    Lsp(LspArgs),
     /// Print a completion script for a shell
     Completions(CompletionsArgs),
 }
@@ -393,4 +395,12 @@ pub struct Rs274Args {
     /// Options and files as for rs274, and --linuxcnc 2.9|2.10
     #[arg(trailing_var_arg = true, allow_hyphen_values = true, value_name = "ARGUMENTS")]
     pub arguments: Vec<std::ffi::OsString>,
+}
+
+/// Options of `lsp`.
+#[derive(Args, Debug)]
+pub struct LspArgs {
+    /// Accepted because editors pass it; there is no other way
+    #[arg(long)]
+    pub stdio: bool,
 }

@@ -81,7 +81,7 @@ pub fn station(
     if let Some(path) = named(&args.tools, section.and_then(|s| s.tools.as_ref())).or_else(|| ini_path(&setup, "EMCIO", "TOOL_TABLE")) {
         reader.tools(&path, &mut setup);
     } else {
-        setup.tools = assumed_tools();
+        setup.tools = gr_interp::assumed_tools();
     }
     if let Some(path) = named(&args.vars, section.and_then(|s| s.vars.as_ref())).or_else(|| ini_path(&setup, "RS274NGC", "PARAMETER_FILE")) {
         reader.vars(&path, &mut setup);
@@ -114,18 +114,6 @@ fn ini_path(setup: &Setup, section: &str, key: &str) -> Option<PathBuf> {
     let name = setup.ini.get(section, key)?;
     let path = setup.ini.folder.clone().unwrap_or_default().join(name);
     path.is_file().then_some(path)
-}
-
-/// Remark of tools that stand in for a table nobody named.
-pub const ASSUMED: &str = "assumed";
-
-/// Without a tool table nobody knows which tools there are: all of them, without length and diameter.
-fn assumed_tools() -> gr_interp::ToolTable {
-    let mut table = gr_interp::no_tools();
-    for number in 1..gr_interp::POCKETS as i32 {
-        table.rows.push(gr_interp::Tool { number, pocket: number, comment: ASSUMED.into(), ..gr_interp::Tool::default() });
-    }
-    table
 }
 
 /// The travel of a machine, where the INI file does not say otherwise.

@@ -38,6 +38,18 @@ pub fn no_tools() -> ToolTable {
     ToolTable { rows: vec![empty_row()] }
 }
 
+/// Remark of tools that stand in for a table nobody named.
+pub const ASSUMED: &str = "assumed";
+
+/// Without a tool table nobody knows which tools there are: all of them, without length and diameter.
+pub fn assumed_tools() -> ToolTable {
+    let mut table = no_tools();
+    for number in 1..POCKETS as i32 {
+        table.rows.push(Tool { number, pocket: number, comment: ASSUMED.into(), ..Tool::default() });
+    }
+    table
+}
+
 fn empty_row() -> Tool {
     Tool { number: -1, pocket: -1, ..Tool::default() }
 }

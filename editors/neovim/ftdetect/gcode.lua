@@ -1,0 +1,1 @@
+vim.filetype.add({ extension = { ngc = "gcode", nc = "gcode", tap = "gcode", gcode = "gcode" } })
