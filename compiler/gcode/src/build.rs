@@ -250,7 +250,10 @@ impl Tables {
     }
 
     fn name(&mut self, line: &lex::Line, token: usize) -> u32 {
-        let name = line.text(token, token + 1).trim_start_matches('<').trim_end_matches('>');
+        // The name of a label that is not closed goes on to the end of the line.
+        let open = line.tokens.get(token) == Some(&Token::OpenName);
+        let to = if open { line.tokens.len() } else { token + 1 };
+        let name = line.text(token, to).trim_start_matches('<').trim_end_matches('>');
         if let Some(id) = self.name_ids.get(name) {
             return *id;
         }

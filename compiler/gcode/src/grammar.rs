@@ -770,6 +770,28 @@ fn see<'t>(byte: u8) -> impl Parser<'t, Tokens<'t>, (), Extra> + Clone {
     must_see(byte, Problem::Unexpected)
 }
 
+/// `o<name` without its `>`: the controller takes the rest of the line as the name of a bare label.
+fn open_label<'t>() -> impl Parser<'t, Tokens<'t>, Item, Extra> + Clone {
+    custom(|inp: &mut Ref<'t, '_>| {
+        let from = inp.cursor();
+        if inp.peek() != Some(Token::Letter(b'o')) || ahead(inp, 1) != Some(Token::OpenName) {
+            return Err(unexpected(inp));
+        }
+        inp.skip();
+        let label = inp.cursor();
+        while inp.next().is_some() {}
+        let label_at: Range = inp.span_since(&label);
+        Ok(Item::Control {
+            keyword: Keyword::Program,
+            label: Some(Name::Named(label_at.start)),
+            label_at,
+            args: Vec::new(),
+            comments: Vec::new(),
+            at: inp.span_since(&from),
+        })
+    })
+}
+
 fn o_word<'t>(value: Boxed<'t, Expr>, ctx: Ctx<'t>) -> Boxed<'t, Vec<Item>> {
     let label = target(value.clone()).map_with(|label, e| (label, e.span()));
     let statement = just(Token::Letter(b'o'))
@@ -786,7 +808,7 @@ fn o_word<'t>(value: Boxed<'t, Expr>, ctx: Ctx<'t>) -> Boxed<'t, Vec<Item>> {
         .recover_with(via_parser(
             just(Token::Letter(b'o')).then(rest_of_line()).map_with(|_, e| Item::Bad { letter: b'o', at: e.span() }),
         ));
-    statement
+    choice((open_label(), statement))
         .then(choice((comment(), trailing())).repeated().collect::<Vec<_>>())
         .map(|(first, rest)| std::iter::once(first).chain(rest).collect())
         .boxed()

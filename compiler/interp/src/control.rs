@@ -56,8 +56,15 @@ pub(crate) struct Label {
     pub name: u32,
 }
 
+impl Label {
+    /// It belongs to a subroutine, not to the main program or to all.
+    pub fn is_subroutine_scope(&self) -> bool {
+        self.scope < MAIN
+    }
+}
+
 /// Where a label was met first.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub(crate) struct Offset {
     keyword: Keyword,
     file: FileId,
@@ -66,6 +73,12 @@ pub(crate) struct Offset {
     sequence: i32,
     shift: i32,
     repeats: i32,
+}
+
+impl Offset {
+    pub fn file(&self) -> FileId {
+        self.file
+    }
 }
 
 /// Skipping to a label.
@@ -165,6 +178,15 @@ fn first_real(words: &[Word]) -> Option<&Word> {
     if words.first().is_some_and(|w| w.letter == b'n') { words.get(1) } else { words.first() }
 }
 
+/// Whether skipping must look at a line: it may be the end of what is skipped, or an error.
+pub fn is_stop(scan: &Scan, line: u32) -> bool {
+    let Some(at) = scan.lines.get(line as usize) else { return false };
+    let control = first_real(scan.words(line)).is_some_and(|w| {
+        w.letter == b'o' || (w.letter == b'm' && w.form == Form::Literal && (w.value == 98.0 || w.value == 99.0))
+    });
+    control || at.kind == LineKind::Percent || at.faulty
+}
+
 fn base_name(name: &str) -> &str {
     name.rsplit('/').next().unwrap_or(name)
 }
@@ -183,13 +205,10 @@ impl<S: Sink> Interp<'_, S> {
         let mut index = FileIndex::default();
         for (c, chunk) in file.chunks.iter().enumerate() {
             let scan = &chunk.scan;
-            for (l, line) in scan.lines.iter().enumerate() {
+            for l in 0..scan.lines.len() {
                 let at = file.first_lines[c] + l as u32;
                 let words = scan.words(l as u32);
-                let control = first_real(words).is_some_and(|w| {
-                    w.letter == b'o' || (w.letter == b'm' && w.form == Form::Literal && (w.value == 98.0 || w.value == 99.0))
-                });
-                if control || line.kind == LineKind::Percent || line.faulty {
+                if is_stop(scan, l as u32) {
                     index.lines.push(at);
                 }
                 if let Some(n) = words.first().filter(|w| w.letter == b'n' && w.form == Form::Literal) {
@@ -204,6 +223,9 @@ impl<S: Sink> Interp<'_, S> {
 
     /// The next line from `line` on that skipping must look at; past the end if there is none.
     pub(crate) fn next_control(&mut self, line: u32) -> u32 {
+        if let Some(found) = self.files.next_control(self.place.file, line) {
+            return found;
+        }
         let index = self.index(self.place.file);
         let at = index.lines.partition_point(|l| *l < line);
         index.lines.get(at).copied().unwrap_or(u32::MAX)
@@ -319,6 +341,11 @@ impl<S: Sink> Interp<'_, S> {
         let Some(c) = control else {
             return if self.defining_sub { Ok(()) } else { Err(self.parse_fault(scan)) };
         };
+        if c.keyword == Keyword::Program && text.get(c.label_span.range()).is_some_and(|l| l.starts_with('<') && !l.ends_with('>')) {
+            let mut doubt = Fault::own(code::OWORD_NAME_OPEN);
+            doubt.span = Some(c.label_span);
+            self.warn(doubt);
+        }
         if is_macro(c.keyword) {
             return self.macro_line(scan, text, words, &c);
         }
@@ -835,7 +862,7 @@ impl<S: Sink> Interp<'_, S> {
         }
     }
 
-    fn unclosed_in(&mut self, id: FileId) {
+    pub(crate) fn unclosed_in(&mut self, id: FileId) {
         let index = self.index(id);
         let mut open: Vec<(Keyword, String, u32, Span)> = Vec::new();
         for line in index.lines.clone() {

@@ -19,6 +19,7 @@
 mod angle;
 mod arc;
 mod block;
+mod carry;
 mod comp;
 mod cycles;
 mod fault;
@@ -46,6 +47,8 @@ mod check;
 mod wide;
 
 pub use block::{Block, Group};
+pub use carry::Carry;
+pub use control::is_stop;
 pub use fault::{Fault, Res};
 pub use files::*;
 pub use params::Params;

@@ -30,6 +30,11 @@ pub trait Files {
         let (c, l) = file.locate(line)?;
         Some((file.chunks[c].clone(), l, file.first_lines[c]))
     }
+    /// The first line from `line` on that skipping must look at ([`is_stop`]), when it is known without the whole
+    /// file; `u32::MAX` past the last one.
+    fn next_control(&self, _id: FileId, _line: u32) -> Option<u32> {
+        None
+    }
     /// Nothing read of this file so far holds control flow or damage.
     fn is_plain(&self, _id: FileId) -> bool {
         false
@@ -470,6 +475,11 @@ impl<'a, S: Sink> Interp<'a, S> {
     /// Reads and executes the next block. `None`: there is more.
     pub fn step_block(&mut self) -> Option<End> {
         self.run_piece(1)
+    }
+
+    /// Runs to the end of a chunk or to a jump.
+    pub(crate) fn run_open_piece(&mut self) -> Option<End> {
+        self.run_piece(u64::MAX)
     }
 
     fn load(&self, file: FileId, line: u32) -> Option<(Chunk, u32, u32)> {

@@ -1,0 +1,116 @@
+//! What control flow leaves behind in the main program, between two lines outside of calls and loops: labels that
+//! were met, and what the last call and the last condition gave. Together with [`State`] and [`Params`] it is all
+//! that a run needs to go on.
+
+use gr_canon::{FileId, FrameId, Sink};
+
+use crate::control::{Label, Offset};
+use crate::{End, Files, Interp, Params, Setup, State};
+
+/// The label table and what goes with it, as plain data.
+#[derive(Clone, PartialEq, Eq, Hash, Debug, Default)]
+pub struct Carry {
+    /// In the order of their scopes and names.
+    labels: Vec<(u32, Box<str>, Box<str>, Offset)>,
+    /// An `if` ran, a loop is being left by `break` or `continue`, the last call gave a value.
+    switches: [bool; 4],
+    /// Value of the last condition and of the last call, as bits.
+    values: [u64; 2],
+}
+
+impl Carry {
+    /// An error makes the controller forget all labels.
+    pub fn forget_labels(&mut self) {
+        self.labels.clear();
+    }
+    /// Files that labels point into.
+    pub fn files(&self) -> impl Iterator<Item = FileId> {
+        self.labels.iter().map(|l| l.3.file())
+    }
+}
+
+impl<'a, S: Sink> Interp<'a, S> {
+    /// Goes on at a line of the main program, outside of calls and loops. `shift` is the line of the opening `%`,
+    /// 0 without one.
+    pub fn carry_on(
+        files: &'a mut dyn Files,
+        setup: &'a Setup,
+        sink: S,
+        (state, params, carry): (State, Params, &Carry),
+        main: FileId,
+        (line, shift): (u32, i32),
+    ) -> Self {
+        let mut run = Self::resume(files, setup, sink, (state, params), main, (line, shift));
+        for (scope, scope_name, name, at) in &carry.labels {
+            // The two scopes that are no subroutine keep their numbers.
+            let scope = if scope_name.is_empty() { *scope } else { run.symbols.of(scope_name) };
+            let name = run.symbols.of(name);
+            run.offsets.insert(Label { scope, name }, *at);
+        }
+        [run.executed_if, run.doing_break, run.doing_continue, run.value_returned] = carry.switches;
+        [run.test_value, run.return_value] = carry.values.map(f64::from_bits);
+        run
+    }
+
+    /// What control flow has left behind.
+    pub fn carry(&self) -> Carry {
+        let mut labels: Vec<_> = self
+            .offsets
+            .iter()
+            .map(|(label, at)| {
+                let scope = if label.is_subroutine_scope() { self.symbols.name(label.scope) } else { "" };
+                let fixed = if scope.is_empty() { label.scope } else { 0 };
+                (fixed, Box::from(scope), Box::from(self.symbols.name(label.name)), *at)
+            })
+            .collect();
+        labels.sort_by(|a, b| (a.0, &a.1, &a.2).cmp(&(b.0, &b.1, &b.2)));
+        Carry {
+            labels,
+            switches: [self.executed_if, self.doing_break, self.doing_continue, self.value_returned],
+            values: [self.test_value, self.return_value].map(f64::to_bits),
+        }
+    }
+
+    /// Outside of calls, loops and skipping, with nothing held back: what comes next depends on the state, the
+    /// parameters and [`Interp::carry`] alone.
+    pub fn at_rest(&self) -> bool {
+        self.levels.len() == 1
+            && self.levels[0].m98_left == -1
+            && self.levels[0].ret.is_none()
+            && self.skip.is_none()
+            && self.loops.is_empty()
+            && self.remaps.is_empty()
+            && !self.defining_sub
+            && self.sub_name.is_none()
+            && self.place.frame == FrameId::MAIN
+            && self.queue.is_empty()
+    }
+
+    /// Runs until the run is [at rest](Interp::at_rest) before a line that `stop` knows, or to the end.
+    pub fn run_until(&mut self, stop: &dyn Fn(u32) -> bool) -> Option<End> {
+        loop {
+            if let Some(end) = self.run_open_piece() {
+                return Some(end);
+            }
+            if self.at_rest() && stop(self.next) {
+                return None;
+            }
+        }
+    }
+
+    /// The line that comes next.
+    pub fn next_line(&self) -> u32 {
+        self.next
+    }
+
+    /// Branches and loops of a file that were opened and never closed.
+    pub fn unclosed_of(&mut self, file: FileId) -> Vec<crate::Finding> {
+        let before = std::mem::take(&mut self.findings);
+        self.unclosed_in(file);
+        std::mem::replace(&mut self.findings, before)
+    }
+    /// Files that were opened, in order.
+    pub fn opened_files(&self) -> &[FileId] {
+        &self.opened.order
+    }
+}
