@@ -37,7 +37,7 @@ mod residual;
 mod stitch;
 
 pub use clear::{Clear, Cleared, CutMode, Order, Rotation, Strategy, clear};
-pub use contour::{Contour, Lead, Side, contour, contour_closed, slot};
+pub use contour::{Contour, Lead, Side, contour, contour_closed, largest_tool, slot};
 pub use face::{Face, face};
 pub use geom::{Bounds, P2, Seg, Vertex};
 pub use motion::{Approach, Depth, Entry, Kind, Move, P3, Tag, levels, motion};

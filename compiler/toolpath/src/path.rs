@@ -130,6 +130,10 @@ impl Path2 {
     pub fn dist(&self, p: P2) -> f64 {
         self.segs.iter().map(|s| s.dist(p)).fold(f64::INFINITY, f64::min)
     }
+    /// Shortest distance from the corners of one curve to the other.
+    pub(crate) fn dist_to(&self, other: &Self) -> f64 {
+        self.segs.iter().map(|s| other.dist(s.a())).fold(f64::INFINITY, f64::min)
+    }
     /// Run backwards.
     pub fn reversed(&self) -> Self {
         Self { segs: self.segs.iter().rev().map(Seg::reversed).collect(), closed: self.closed }
