@@ -2,13 +2,19 @@
 //! program of it; [`table`] lists it for people; [`reference`] repeats the results of two published systems;
 //! [`stepnc`] writes a motion program back as STEP-NC. Reading Part 21 and checking the schema are elsewhere.
 
+mod drill;
+mod emit;
+mod explicit;
 pub mod frame;
+mod mill;
+mod plan;
 pub mod process;
 mod read;
 pub mod reference;
 pub mod table;
 
 use gr_text::{Diagnostic, FileId};
+pub use plan::{Options, Planned, plan};
 pub use process::{Process, Tool, Units};
 
 /// Reads the process of a file. Faults of syntax and schema are not told here.

@@ -1,0 +1,223 @@
+//! The drilling family: centre drilling, drilling, counter sinking, multistep drilling, boring, reaming,
+//! tapping.
+
+use gr_ir::{Op, Stop, Sync, Turn};
+use gr_text::code;
+
+use crate::emit::Emit;
+use crate::frame::Frame;
+use crate::process::*;
+
+/// Above the bottom of the last peck, rapids end here, mm.
+const ABOVE_LAST_PECK: f64 = 1.0;
+/// Drills break through by this much, mm.
+const BREAK_THROUGH: f64 = 1.0;
+/// More pecks than this are a mistake.
+const MOST_PECKS: f64 = 10_000.0;
+
+/// What a hole is to the operation.
+struct Job<'a> {
+    step: &'a Workingstep,
+    d: &'a Drilling,
+    frame: Frame,
+    depth: f64,
+    retract: f64,
+    feed: f64,
+}
+
+/// Drills every copy of a hole.
+pub(crate) fn drill(e: &mut Emit<'_>, step: &Workingstep, d: &Drilling, feature: &Feature, security: f64) {
+    let Some(depth) = depth(e, step, d, feature) else { return };
+    let Some(feed) = step.operation.technology.feed else { return };
+    let keyword = step.operation.keyword.as_str();
+    if matches!(keyword, "BACK_BORING" | "THREAD_DRILLING") {
+        let why = if keyword == "BACK_BORING" { ": how far the tool steps aside is not in the file" } else { "" };
+        return e.say(code::PLAN_NOT_LOWERED, step.operation.origin, &[keyword, why]);
+    }
+    checks(e, step, feature, depth);
+    for frame in &feature.copies {
+        let top = frame.origin[2].max(frame.point([0.0, 0.0, 0.0])[2]);
+        let retract = step.operation.retract.unwrap_or(if frame.upright() { security - top } else { 5.0 }).max(0.0);
+        let job = Job { step, d, frame: *frame, depth, retract, feed };
+        e.travel(job.at(retract), frame.z, security);
+        e.technology(&step.operation.technology, step.operation.functions);
+        match keyword {
+            "TAPPING" => tap(e, &job),
+            "MULTISTEP_DRILLING" => multistep(e, &job),
+            _ => once(e, &job),
+        }
+    }
+}
+
+impl Job<'_> {
+    /// On the axis, at a height over the feature.
+    fn at(&self, z: f64) -> [f64; 3] {
+        self.frame.point([0.0, 0.0, z])
+    }
+}
+
+fn depth(e: &mut Emit<'_>, step: &Workingstep, d: &Drilling, feature: &Feature) -> Option<f64> {
+    let tool = &step.operation.tool;
+    let r = tool.diameter / 2.0;
+    // Half angle at the tip: the standard measures it from the axis.
+    let tip = tool.tip_angle.map(|a| r / libm::tan(a)).filter(|t| t.is_finite() && *t > 0.0);
+    let hole = match &feature.shape {
+        Shape::Hole { diameter, bottom, .. } => Some((*diameter, *bottom)),
+        _ => None,
+    };
+    let given = d.depth.or(match step.operation.keyword.as_str() {
+        "CENTER_DRILLING" => None,
+        "COUNTER_SINKING" => hole.and_then(|(w, _)| Some(w / 2.0 / libm::tan(tool.tip_angle?))),
+        "REAMING" | "BORING" | "TAPPING" | "BACK_BORING" => Some(feature.depth),
+        _ => Some(match hole {
+            Some((_, HoleBottom::Through)) => {
+                feature.depth + tip.unwrap_or(0.0) + step.operation.overcut.unwrap_or(BREAK_THROUGH)
+            }
+            Some((_, HoleBottom::Conical(..))) => feature.depth + tip.unwrap_or(0.0),
+            _ => feature.depth,
+        }),
+    });
+    match given {
+        Some(v) if v.is_finite() && v > 0.0 && v < 1e6 => Some(v),
+        Some(v) => {
+            e.say(code::PLAN_BAD_SIZE, step.operation.origin, &[&step.operation.keyword, "cutting_depth", &v.to_string(), "above zero"]);
+            None
+        }
+        None => {
+            e.say(code::PLAN_MISSING_VALUE, step.operation.origin, &[&step.operation.keyword, "cutting_depth", "it does not follow from the feature"]);
+            None
+        }
+    }
+}
+
+fn checks(e: &mut Emit<'_>, step: &Workingstep, feature: &Feature, depth: f64) {
+    let tool = &step.operation.tool;
+    let name = format!("T{} '{}'", tool.number, tool.name);
+    if let Some(l) = tool.cutting_length.filter(|l| depth > *l + 1e-6) {
+        e.say(code::PLAN_DEEPER_THAN_EDGE, step.operation.origin, &[&step.operation.keyword, &depth.to_string(), &name, &l.to_string()]);
+    }
+    if let Shape::Hole { diameter, .. } = feature.shape {
+        let whole = !matches!(step.operation.keyword.as_str(), "CENTER_DRILLING" | "COUNTER_SINKING");
+        if whole && tool.diameter > diameter + 0.05 {
+            e.say(code::PLAN_TOOL_WIDER_THAN_FEATURE, step.operation.origin, &[&name, &tool.diameter.to_string(), &feature.keyword, &diameter.to_string()]);
+        }
+    }
+}
+
+/// One stroke down, and out again as the operation does.
+fn once(e: &mut Emit<'_>, job: &Job<'_>) {
+    let (d, o) = (job.d, &job.step.operation);
+    if let Some((test, waiting)) = d.test_cut {
+        e.feed(job.feed);
+        e.line(job.at(-test));
+        e.line(job.at(job.retract));
+        let wait = waiting.map_or(job.at(job.retract), |p| job.frame.point(p));
+        e.rapid(wait);
+        e.push(Op::Stop(Stop::Program));
+        e.rapid(job.at(job.retract));
+    }
+    down(e, job);
+    if d.dwell > 0.0 {
+        e.push(Op::Dwell(d.dwell));
+    }
+    let fed = d.feed_on_retract.is_some() || matches!(o.keyword.as_str(), "REAMING" | "BORING") && !d.stop_at_bottom;
+    if d.stop_at_bottom {
+        e.turn(Turn::Stop);
+    }
+    if fed {
+        e.feed(job.feed * d.feed_on_retract.unwrap_or(1.0));
+        e.line(job.at(job.retract));
+    } else {
+        e.rapid(job.at(job.retract));
+    }
+    if let Some(s) = o.technology.speed {
+        e.speed(s);
+    }
+}
+
+/// Feed to the bottom, slower where the strategy says.
+fn down(e: &mut Emit<'_>, job: &Job<'_>) {
+    let speed = job.step.operation.technology.speed;
+    let stage = |e: &mut Emit<'_>, feed: f64, cut: f64, z: f64| {
+        if let Some(s) = speed {
+            e.speed(s * cut);
+        }
+        e.feed(feed);
+        e.line(job.at(-z));
+    };
+    let first = job.d.first.filter(|f| f.1 < job.depth);
+    let last = job.d.last.filter(|l| l.1 < job.depth && job.depth - l.1 > first.map_or(0.0, |f| f.1));
+    if let Some((ratio, z)) = first {
+        stage(e, job.feed * ratio, job.d.cut[0].unwrap_or(1.0), z);
+    }
+    if let Some((ratio, z)) = last {
+        stage(e, job.feed, 1.0, job.depth - z);
+        stage(e, job.feed * ratio, job.d.cut[1].unwrap_or(1.0), job.depth);
+    } else {
+        stage(e, job.feed, 1.0, job.depth);
+    }
+}
+
+fn multistep(e: &mut Emit<'_>, job: &Job<'_>) {
+    let [first, by, retract, dwell] = job.d.peck.unwrap_or_default();
+    if !(first > 0.0 && by > 0.0 && retract >= 0.0) || job.depth / by > MOST_PECKS {
+        let text = format!("first {first}, then {by}");
+        return e.say(code::PLAN_BAD_SIZE, job.step.operation.origin, &["MULTISTEP_DRILLING", "depth_of_step", &text, "above zero"]);
+    }
+    let mut z = 0.0;
+    loop {
+        z = if z == 0.0 { first } else { z + by };
+        let bottom = z >= job.depth - 1e-9;
+        z = z.min(job.depth);
+        e.feed(job.feed);
+        e.line(job.at(-z));
+        if bottom {
+            break;
+        }
+        if dwell > 0.0 {
+            e.push(Op::Dwell(dwell));
+        }
+        // All the way out where the distance reaches that far, else just enough to break the chip.
+        let up = (-z + retract).min(job.retract);
+        e.rapid(job.at(up));
+        let clear = (-z + ABOVE_LAST_PECK).min(up);
+        if clear < up {
+            e.rapid(job.at(clear));
+        }
+    }
+    if job.d.dwell > 0.0 {
+        e.push(Op::Dwell(job.d.dwell));
+    }
+    match job.d.feed_on_retract {
+        Some(ratio) => {
+            e.feed(job.feed * ratio);
+            e.line(job.at(job.retract));
+        }
+        None => e.rapid(job.at(job.retract)),
+    }
+}
+
+fn tap(e: &mut Emit<'_>, job: &Job<'_>) {
+    let t = &job.step.operation.technology;
+    let Some(speed) = t.speed else { return };
+    let thread = match &job.step.feature.shape {
+        Shape::Thread { pitch, .. } => *pitch,
+        _ => None,
+    };
+    let pitch = job.step.operation.tool.pitch.or(thread).unwrap_or(job.feed * 60.0 / speed);
+    if job.d.floating_chuck {
+        let way = if t.clockwise { (Turn::Cw, Turn::Ccw) } else { (Turn::Ccw, Turn::Cw) };
+        e.feed(pitch * speed / 60.0);
+        e.line(job.at(-job.depth));
+        if job.d.dwell > 0.0 {
+            e.push(Op::Dwell(job.d.dwell));
+        }
+        e.turn(way.1);
+        e.line(job.at(job.retract));
+        e.turn(way.0);
+        return;
+    }
+    e.push(Op::SyncStart(Sync { spindle: 0, per_rev: pitch, velocity: false }));
+    e.push(Op::RigidTap { bottom: job.at(-job.depth), scale: 1.0 });
+    e.push(Op::SyncStop);
+}

@@ -1,0 +1,254 @@
+//! Writes motion: keeps tool, spindle, feed and coolant, and goes from place to place by the security plane.
+
+use gr_ir::{Arc, ArcPlane, Builder, Marker, Note, Op, Plane, Pose, Source, Turn, Units};
+use gr_text::{Code, Diagnostic, FileId, LineIndex};
+
+use crate::frame::{Frame, norm, sub};
+use crate::process::{Functions, Origin, Piece, Technology, Tool};
+
+/// Distances below this are none, mm.
+pub const TINY: f64 = 1e-9;
+
+pub(crate) struct Emit<'a> {
+    pub b: Builder,
+    pub lines: &'a LineIndex,
+    pub file: FileId,
+    pub out: Vec<Diagnostic>,
+    /// Write tool axes: some feature is not upright.
+    pub axes: bool,
+    pub source: Source,
+    /// Where the tool is, once it has moved.
+    pub at: Option<[f64; 3]>,
+    axis: [f64; 3],
+    tool: Option<u32>,
+    feed: Option<f64>,
+    speed: Option<f64>,
+    turn: Turn,
+    coolant: Functions,
+    locks: (bool, bool),
+}
+
+impl<'a> Emit<'a> {
+    pub fn new(lines: &'a LineIndex, file: FileId, axes: bool) -> Emit<'a> {
+        let source = Source { file, ..Source::default() };
+        Emit {
+            b: Builder::new(),
+            lines,
+            file,
+            out: Vec::new(),
+            axes,
+            source,
+            at: None,
+            axis: [0.0, 0.0, 1.0],
+            tool: None,
+            feed: None,
+            speed: None,
+            turn: Turn::Stop,
+            coolant: Functions::default(),
+            locks: (false, false),
+        }
+    }
+    pub fn begin(&mut self) {
+        self.push(Op::Units(Units::Mm));
+        self.push(Op::Plane(Plane::Xy));
+    }
+    pub fn say(&mut self, code: Code, origin: Origin, args: &[&str]) {
+        let args: Vec<String> = args.iter().map(|a| (*a).to_string()).collect();
+        let d = Diagnostic::new(code, self.file, origin.span, &args);
+        if !self.out.contains(&d) {
+            self.out.push(d);
+        }
+    }
+    pub fn from(&mut self, origin: Origin) {
+        self.source.line = self.lines.position(origin.span.start).0;
+    }
+    pub fn push(&mut self, op: Op<'_>) {
+        self.b.push(op, self.source);
+    }
+    pub fn note(&mut self, text: &str) {
+        self.push(Op::Note(Note::Comment, text));
+    }
+    pub fn mark(&mut self, marker: Marker, code: u64, text: &str) {
+        let code = i32::try_from(code).unwrap_or(i32::MAX);
+        self.push(Op::Begin { marker, code, text });
+    }
+
+    fn pose(&self, to: [f64; 3]) -> Pose {
+        let mut pose = *self.b.pose();
+        pose.axes[..3].copy_from_slice(&to.map(|c| c + 0.0));
+        pose.tool_axis = self.axes.then_some(self.axis);
+        pose
+    }
+    fn same(&self, to: [f64; 3]) -> bool {
+        self.at.is_some_and(|at| norm(sub(at, to)) < TINY)
+    }
+    pub fn rapid(&mut self, to: [f64; 3]) {
+        if !self.same(to) {
+            let pose = self.pose(to);
+            self.b.push_to(Op::Rapid, &pose, self.source);
+            self.at = Some(to);
+        }
+    }
+    pub fn line(&mut self, to: [f64; 3]) {
+        if !self.same(to) {
+            let pose = self.pose(to);
+            self.b.push_to(Op::Linear, &pose, self.source);
+            self.at = Some(to);
+        }
+    }
+    /// An arc, counter-clockwise seen against the normal, of `sweep` (may exceed a turn; < 0 the other way).
+    pub fn arc(&mut self, center: [f64; 3], normal: [f64; 3], to: [f64; 3], sweep: f64) {
+        let pose = self.pose(to);
+        let begun = (sweep.abs() / (2.0 * std::f64::consts::PI) - 1e-9).floor().max(0.0) as i32 + 1;
+        let turns = if sweep < 0.0 { -begun } else { begun };
+        let arc = if normal[2].abs() > 1.0 - 1e-12 {
+            Arc { plane: ArcPlane::Work(Plane::Xy), center, turns: if normal[2] > 0.0 { turns } else { -turns } }
+        } else {
+            Arc { plane: ArcPlane::Free(normal), center, turns }
+        };
+        self.b.push_to(Op::Arc(arc), &pose, self.source);
+        self.at = Some(to);
+    }
+    pub fn piece(&mut self, piece: &Piece, frame: &Frame) {
+        match *piece {
+            Piece::Line(p) => self.line(frame.point(p)),
+            Piece::Arc { center, normal, end } => self.arc(frame.point(center), frame.vector(normal), frame.point(end), 1e-3),
+        }
+    }
+    /// By way of the height `security` to a point, the tool standing along `axis` there. The way up goes along Z;
+    /// features on the side of a part are left along their own axis before.
+    pub fn travel(&mut self, to: [f64; 3], axis: [f64; 3], security: f64) {
+        let up = security.max(to[2]);
+        match self.at {
+            Some(at) => self.rapid([at[0], at[1], up.max(at[2])]),
+            None => {
+                let pose = *self.b.pose();
+                self.axis = axis;
+                let mut start = self.pose([pose.axes[0], pose.axes[1], up]);
+                start.tool_axis = self.axes.then_some(axis);
+                self.b.push_to(Op::Rapid, &start, self.source);
+                self.at = Some([pose.axes[0], pose.axes[1], up]);
+            }
+        }
+        let high = self.at.map_or(up, |a| a[2]);
+        if axis != self.axis {
+            self.axis = axis;
+            self.at = None;
+        }
+        self.rapid([to[0], to[1], high]);
+        self.rapid(to);
+    }
+    pub fn set_axis(&mut self, axis: [f64; 3]) {
+        self.axis = axis;
+    }
+    /// Straight up to a height.
+    pub fn lift(&mut self, security: f64) {
+        if let Some(at) = self.at.filter(|a| a[2] < security) {
+            self.rapid([at[0], at[1], security]);
+        }
+    }
+
+    pub fn feed(&mut self, mm_per_s: f64) {
+        if self.feed != Some(mm_per_s) {
+            self.feed = Some(mm_per_s);
+            self.push(Op::Feed { linear: mm_per_s, angular: mm_per_s.to_radians() });
+        }
+    }
+    pub fn speed(&mut self, rpm: f64) {
+        if self.speed != Some(rpm) {
+            self.speed = Some(rpm);
+            self.push(Op::SpindleSpeed { spindle: 0, speed: rpm });
+        }
+    }
+    pub fn turn(&mut self, turn: Turn) {
+        if self.turn != turn {
+            self.turn = turn;
+            self.push(Op::SpindleTurn { spindle: 0, turn });
+        }
+    }
+    pub fn coolant(&mut self, on: Functions) {
+        if self.coolant.flood && !on.flood || self.coolant.mist && !on.mist {
+            // One word ends both.
+            self.push(Op::Mist(false));
+            self.push(Op::Flood(false));
+            self.coolant = Functions::default();
+        }
+        if on.mist && !self.coolant.mist {
+            self.push(Op::Mist(true));
+        }
+        if on.flood && !self.coolant.flood {
+            self.push(Op::Flood(true));
+        }
+        self.coolant = on;
+    }
+    pub fn locks(&mut self, feed: bool, spindle: bool) {
+        if self.locks.0 != feed {
+            self.push(Op::Override(gr_ir::Override::Feed, !feed));
+        }
+        if self.locks.1 != spindle {
+            self.push(Op::Override(gr_ir::Override::Speed(0), !spindle));
+        }
+        self.locks = (feed, spindle);
+    }
+    pub fn technology(&mut self, t: &Technology, functions: Functions) {
+        if let Some(speed) = t.speed {
+            self.speed(speed);
+            let way = if t.clockwise { Turn::Cw } else { Turn::Ccw };
+            if self.turn != Turn::Stop && self.turn != way {
+                self.turn(Turn::Stop);
+            }
+            self.turn(way);
+        }
+        self.coolant(functions);
+        if let Some(f) = t.feed {
+            self.feed(f);
+        }
+        self.locks(t.lock_feed, t.lock_spindle);
+    }
+    pub fn stop_spindle(&mut self) {
+        self.coolant(Functions::default());
+        self.turn(Turn::Stop);
+    }
+    /// Puts a tool into the spindle, at a safe height, spindle and coolant off.
+    pub fn tool(&mut self, tool: &Tool, security: f64) {
+        if self.tool == Some(tool.number) {
+            return;
+        }
+        self.lift(security);
+        self.stop_spindle();
+        if self.tool.is_some() {
+            self.push(Op::Close(Marker::Tool));
+        }
+        let number = i32::try_from(tool.number).unwrap_or(i32::MAX);
+        self.mark(Marker::Tool, u64::from(tool.number), &tool.name);
+        self.push(Op::ToolPrepare(number));
+        self.push(Op::ToolChangeStart);
+        self.push(Op::ToolChange(number));
+        let mut offset = [0.0; 9];
+        offset[2] = tool.length.unwrap_or(0.0);
+        self.push(Op::ToolOffset(offset));
+        self.tool = Some(tool.number);
+        // The operator may have moved the machine.
+        self.at = None;
+    }
+    pub fn unload(&mut self, security: f64) {
+        self.lift(security);
+        self.stop_spindle();
+        if self.tool.take().is_some() {
+            self.push(Op::Close(Marker::Tool));
+        }
+        for op in [Op::ToolPrepare(0), Op::ToolChangeStart, Op::ToolChange(0), Op::ToolOffset([0.0; 9])] {
+            self.push(op);
+        }
+        self.at = None;
+    }
+    pub fn end(&mut self, security: f64) {
+        self.lift(security);
+        self.stop_spindle();
+        self.locks(false, false);
+        if self.tool.take().is_some() {
+            self.push(Op::Close(Marker::Tool));
+        }
+        self.push(Op::End);
+    }
+}

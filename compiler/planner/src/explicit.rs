@@ -1,0 +1,68 @@
+//! Explicit tool paths: cutter location trajectories one after another.
+
+use gr_ir::Op;
+use gr_text::code;
+
+use crate::emit::{Emit, TINY};
+use crate::frame::{Frame, norm, sub, unit};
+use crate::process::*;
+
+/// Follows the tool paths of an operation, in the frame of its feature. `first`: they begin a workingstep and the
+/// tool is elsewhere.
+pub(crate) fn follow(e: &mut Emit<'_>, paths: &[Toolpath], frame: &Frame, technology: Option<(&Technology, Functions)>, security: f64, first: bool) {
+    let mut joined = !first;
+    let mut by_plane = false;
+    let usual = technology.map(|t| t.1).unwrap_or_default();
+    for p in paths {
+        e.from(p.origin);
+        match &p.path {
+            PathKind::Feedstop(seconds) => e.push(Op::Dwell(*seconds)),
+            PathKind::BySecurityPlane => by_plane = true,
+            PathKind::Direct => by_plane = false,
+            PathKind::Location { curve, axis } => {
+                let axes = match axis.as_ref().map(|a| directions(a, curve, frame)) {
+                    Some(Some(axes)) => axes,
+                    Some(None) => {
+                        e.say(code::PLAN_CANNOT_CUT, p.origin, &["the tool path", "its tool axis does not have one direction for every point"]);
+                        continue;
+                    }
+                    None => vec![frame.z; curve.pieces.len() + 1],
+                };
+                let start = frame.point(curve.start);
+                let gap = e.at.is_none_or(|at| norm(sub(at, start)) > TINY);
+                if !joined || by_plane && gap {
+                    // What says it approaches begins above the material; anything else is reached at feed.
+                    let above = p.rapid || matches!(p.role.as_str(), "APPROACH" | "NON_CONTACT" | "NONCONTACT" | "CONNECT" | "LIFT");
+                    let over = if above { start } else { [start[0], start[1], security.max(start[2])] };
+                    e.travel(over, axes[0], security);
+                }
+                if let Some((t, _)) = technology {
+                    let own = p.technology.as_ref().unwrap_or(t);
+                    e.technology(own, p.functions.unwrap_or(usual));
+                    if let Some(f) = own.feed {
+                        e.feed(f * p.ratio.filter(|r| *r > 0.0 && r.is_finite()).unwrap_or(1.0));
+                    }
+                }
+                let rapid = p.rapid || technology.is_none();
+                let go = |e: &mut Emit<'_>, to| if rapid { e.rapid(to) } else { e.line(to) };
+                e.set_axis(axes[0]);
+                go(e, start);
+                for (piece, axis) in curve.pieces.iter().zip(&axes[1..]) {
+                    e.set_axis(*axis);
+                    match piece {
+                        Piece::Line(q) => go(e, frame.point(*q)),
+                        Piece::Arc { .. } => e.piece(piece, frame),
+                    }
+                }
+                joined = true;
+                by_plane = false;
+            }
+        }
+    }
+}
+
+fn directions(axis: &Curve, path: &Curve, frame: &Frame) -> Option<Vec<[f64; 3]>> {
+    let all: Vec<[f64; 3]> = std::iter::once(axis.start).chain(axis.pieces.iter().map(Piece::end)).collect();
+    (all.len() == path.pieces.len() + 1).then_some(())?;
+    all.into_iter().map(|d| unit(frame.vector(d))).collect()
+}

@@ -1,0 +1,265 @@
+//! The default planner: a process model becomes a motion program. Rapids go by the security plane, never into
+//! the part; what cannot be done is an error, never left out.
+
+use gr_ir::{Marker, Note, Op, Program, Stop};
+use gr_text::{Diagnostic, FileId, LineIndex, Severity, code};
+
+use crate::emit::Emit;
+use crate::process::*;
+use crate::{drill, explicit, mill};
+
+/// Above the part, where the security plane is inside it, mm.
+const ABOVE_STOCK: f64 = 5.0;
+
+/// What can be chosen.
+#[derive(Clone, PartialEq, Debug, Default)]
+pub struct Options {
+    /// How technology is read; none: as the header says.
+    pub units: Option<Units>,
+    /// Name of the file, for messages and the sources of operations.
+    pub name: String,
+    /// Greatest distance of a rough wall or a scallop from the true surface, mm; none: the part's tolerance, or 0.05.
+    pub tolerance: Option<f64>,
+}
+
+/// A planned program.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Planned {
+    /// What the file says.
+    pub process: Process,
+    /// Motion.
+    pub program: Program,
+    /// Tools, by number.
+    pub tools: Vec<Tool>,
+}
+
+/// Plans a file. Faults of syntax and schema are not told here; with an error there is no program.
+pub fn plan(text: &[u8], file: FileId, options: &Options) -> (Option<Planned>, Vec<Diagnostic>) {
+    let (process, tools, mut out) = crate::process(text, file, options.units);
+    let Some(process) = process else { return (None, out) };
+    let lines = LineIndex::new(text);
+    let tilted = process.steps().iter().any(|s| {
+        let axis = |t: &Toolpath| matches!(t.path, PathKind::Location { axis: Some(_), .. });
+        s.feature.copies.iter().any(|f| !f.upright()) || s.operation.toolpaths.iter().any(axis)
+    });
+    let mut p = Planner {
+        e: Emit::new(&lines, file, tilted),
+        security: 0.0,
+        setup: None,
+        setups: Vec::new(),
+        tolerance: tolerance(&process, options),
+    };
+    p.e.b.file(file, &options.name);
+    p.e.begin();
+    p.security = highest(&process);
+    p.elements(&process.elements);
+    let security = p.security;
+    p.e.end(security);
+    out.append(&mut p.e.out);
+    let failed = out.iter().any(|d| d.severity == Severity::Error);
+    let program = p.e.b.finish();
+    (if failed { None } else { Some(Planned { process, program, tools }) }, out)
+}
+
+fn tolerance(process: &Process, options: &Options) -> f64 {
+    // Some programs write micrometres: half a millimetre is no tolerance of a milled part.
+    let of = |t: f64| if t > 0.5 { t / 1000.0 } else { t };
+    let written = process.workpieces.iter().filter_map(|w| w.tolerance).map(of).find(|t| *t > 0.0);
+    options.tolerance.or(written).unwrap_or(0.05).clamp(0.001, 0.5)
+}
+
+fn highest(process: &Process) -> f64 {
+    process.steps().iter().map(|s| s.security.point[2]).fold(0.0, f64::max)
+}
+
+struct Planner<'a> {
+    e: Emit<'a>,
+    security: f64,
+    setup: Option<Setup>,
+    setups: Vec<u64>,
+    tolerance: f64,
+}
+
+impl Planner<'_> {
+    fn elements(&mut self, all: &[Element]) {
+        for element in all {
+            match element {
+                Element::Plan(p) => self.workplan(p),
+                Element::Step(s) => self.step(s),
+                Element::Rapid(r) => self.rapid(r),
+                Element::Function(f) => self.function(f),
+                Element::Probe(p) => self.probe(p),
+            }
+        }
+    }
+
+    fn workplan(&mut self, p: &Plan) {
+        let before = self.setup.clone();
+        if let Some(setup) = &p.setup {
+            self.change_setup(setup, p.origin);
+        }
+        self.elements(&p.elements);
+        if before.is_some() {
+            self.setup = before;
+        }
+    }
+
+    fn change_setup(&mut self, setup: &Setup, origin: Origin) {
+        if self.setup.as_ref().is_some_and(|s| s.origin.id == setup.origin.id) {
+            return;
+        }
+        self.e.from(origin);
+        let new = !self.setups.contains(&setup.origin.id);
+        if new {
+            self.setups.push(setup.origin.id);
+        }
+        let number = self.setups.iter().position(|s| *s == setup.origin.id).unwrap_or(0) + 1;
+        if let Some(before) = self.setup.clone() {
+            self.e.say(code::PLAN_NEW_SETUP, setup.origin, &[&format!("'{}'", setup.name), &format!("'{}'", before.name)]);
+            let security = self.security;
+            self.e.lift(security);
+            self.e.stop_spindle();
+            self.e.push(Op::Note(Note::Message, &format!("setup {}", setup.name)));
+            self.e.push(Op::Stop(Stop::Program));
+            self.e.push(Op::WorkOffset(number.min(9) as u8, [0.0; 9]));
+            self.e.at = None;
+        }
+        if let Some(f) = setup.frame.filter(|f| new && f.origin != [0.0; 3]) {
+            let at = format!("X{} Y{} Z{}", f.origin[0], f.origin[1], f.origin[2]);
+            self.e.say(code::PLAN_SETUP_ORIGIN, setup.origin, &[&format!("'{}'", setup.name), &at]);
+        }
+        self.setup = Some(setup.clone());
+    }
+
+    fn step(&mut self, s: &Workingstep) {
+        self.e.from(s.origin);
+        let name = if s.name.is_empty() { format!("#{}", s.origin.id) } else { format!("#{} {}", s.origin.id, s.name) };
+        self.e.mark(Marker::Workingstep, s.origin.id, &s.name);
+        self.e.note(&name);
+        self.height(s);
+        let security = self.security;
+        self.e.tool(&s.operation.tool, security);
+        self.e.mark(Marker::Feature, s.feature.origin.id, &s.feature.name);
+        if s.feature.copies.iter().any(|f| !f.upright()) {
+            let z = s.feature.frame.z;
+            let axis = format!("{:.4},{:.4},{:.4}", z[0] + 0.0, z[1] + 0.0, z[2] + 0.0);
+            self.e.say(code::PLAN_TILTED_TOOL, s.origin, &[&axis, "the program states the tool's axis"]);
+        }
+        self.cut(s);
+        self.e.lift(security);
+        self.e.push(Op::Close(Marker::Feature));
+        self.e.push(Op::Close(Marker::Workingstep));
+    }
+
+    /// The height for rapids: the security plane, unless the part reaches above it.
+    fn height(&mut self, s: &Workingstep) {
+        let written = s.security.point[2];
+        let mut height = written;
+        if let Some(top) = s.stock_top.filter(|t| *t > written + 1e-9) {
+            height = top + ABOVE_STOCK;
+            let (a, b) = (format!("the security plane at Z{written}"), format!("Z{height}"));
+            self.e.say(code::PLAN_APPROACH_CHANGED, s.origin, &[&a, &b, &format!("the raw part reaches up to Z{top}")]);
+        }
+        if self.security > height {
+            // Leave from where the step before was safe.
+            let before = self.security;
+            self.e.lift(before);
+        }
+        self.security = height;
+    }
+
+    fn cut(&mut self, s: &Workingstep) {
+        let o = &s.operation;
+        let security = self.security;
+        if o.technology.speed.is_none() {
+            self.e.say(code::PLAN_MISSING_VALUE, o.technology.origin, &["MILLING_TECHNOLOGY", "spindle", "nothing is cut with a spindle that stands"]);
+        }
+        if o.technology.contact_feed && o.toolpaths.is_empty() {
+            self.e.say(code::PLAN_NO_EFFECT, o.technology.origin, &["feedrate_reference .CCP.", "the operation", "the feed is that of the tool center"]);
+        }
+        if !o.toolpaths.is_empty() {
+            for frame in &s.feature.copies {
+                explicit::follow(&mut self.e, &o.toolpaths, frame, Some((&o.technology, o.functions)), security, true);
+            }
+            return;
+        }
+        match &o.kind {
+            OperationKind::Drill(d) => {
+                for f in targets(s) {
+                    drill::drill(&mut self.e, s, d, f, security);
+                }
+            }
+            OperationKind::Mill(m) => {
+                for f in targets(s) {
+                    mill::mill(&mut self.e, s, m, f, security, self.tolerance);
+                }
+            }
+            OperationKind::Other => self.e.say(code::PLAN_NOT_LOWERED, o.origin, &[&o.keyword, " without an explicit tool path"]),
+        }
+    }
+
+    fn rapid(&mut self, r: &Rapid) {
+        self.e.from(r.origin);
+        let security = self.security.max(r.security.point[2]);
+        self.e.lift(security);
+        let frame = crate::frame::Frame::default();
+        if r.toolpaths.is_empty() {
+            // Home is the machine's; the program ends its way at the security plane.
+            self.e.note("return home");
+        }
+        explicit::follow(&mut self.e, &r.toolpaths, &frame, None, security, true);
+        self.security = security;
+    }
+
+    fn function(&mut self, f: &Function) {
+        self.e.from(f.origin);
+        let security = self.security;
+        match &f.kind {
+            FunctionKind::Message(text) => self.e.push(Op::Note(Note::Message, text)),
+            FunctionKind::OptionalStop => self.e.push(Op::Stop(Stop::Optional)),
+            FunctionKind::ProgramStop => self.e.push(Op::Stop(Stop::Program)),
+            FunctionKind::ExchangePallet => {
+                self.e.lift(security);
+                self.e.stop_spindle();
+                self.e.push(Op::Stop(Stop::Pallet));
+                self.e.at = None;
+            }
+            FunctionKind::LoadTool(t) => self.e.tool(t, security),
+            FunctionKind::UnloadTool => self.e.unload(security),
+        }
+    }
+
+    fn probe(&mut self, p: &Probe) {
+        self.e.from(p.origin);
+        let security = self.security.max(p.security.point[2]);
+        let axis = [0.0, 0.0, 1.0];
+        self.e.stop_spindle();
+        self.e.travel(p.start, axis, security);
+        let far = p.distance.abs() * 2.0;
+        let to = std::array::from_fn(|i| p.start[i] + p.direction[i] * far);
+        let mut pose = *self.e.b.pose();
+        pose.axes[..3].copy_from_slice(&to);
+        self.e.feed(1.0);
+        let source = self.e.source;
+        self.e.b.push_to(Op::Probe(0), &pose, source);
+        let what = format!("probed position of {}", p.variable);
+        self.e.push(Op::RunTime(&what));
+        self.e.at = Some(to);
+        self.e.rapid(p.start);
+        self.e.lift(security);
+        self.security = security;
+    }
+}
+
+/// The features an operation works on: elements of a compound feature, or the feature itself.
+fn targets(s: &Workingstep) -> Vec<&Feature> {
+    let Shape::Compound(all) = &s.feature.shape else { return vec![&s.feature] };
+    let OperationKind::Drill(_) = s.operation.kind else { return all.iter().collect() };
+    // A drill belongs to the hole it fits best.
+    let width = |f: &&Feature| match f.shape {
+        Shape::Hole { diameter, .. } if diameter >= s.operation.tool.diameter - 0.05 => diameter,
+        _ => f64::INFINITY,
+    };
+    let best = all.iter().min_by(|a, b| width(a).total_cmp(&width(b)));
+    best.into_iter().collect()
+}
