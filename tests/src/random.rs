@@ -536,9 +536,9 @@ impl Writer {
             Step::Repeat { times, body, skip } => {
                 let o = self.label();
                 let n = 200 + o;
-                // `continue` is known in while and do loops only.
+                // No `continue` in the do loop: inside a repeat it makes rs274 (and us) go round for ever.
                 let (begin, end) = if *skip {
-                    (format!("#{n}=0\no{o} do\n#{n}=[#{n}+1]"), format!("o{o} continue\nM0\no{o} while [#{n} LT {times}]"))
+                    (format!("#{n}=0\no{o} do\n#{n}=[#{n}+1]"), format!("M0\no{o} while [#{n} LT {times}]"))
                 } else {
                     (format!("o{o} repeat [{times}]"), format!("o{o} endrepeat"))
                 };

@@ -67,7 +67,7 @@ pub struct Budgets {
 
 impl Default for Budgets {
     fn default() -> Self {
-        Budgets { blocks: 100_000_000, passes: 10_000_000, calls: 200_000_000 }
+        Budgets { blocks: 100_000_000, passes: 2_000_000, calls: 200_000_000 }
     }
 }
 
