@@ -331,23 +331,18 @@ impl<'a> Job<'a> {
         done.passes.push(Pass { path, role, link });
     }
 
-    /// From the inner curve to the next: straight on past its last corner until the next curve is met; without a
-    /// corner, slanting over from a step before the end.
+    /// From the inner curve to the next: its last side is extended until the next curve is met; where that is far
+    /// (smooth curves), slanting over from a step before the end.
     fn spiral_step(&self, next: &Path2, done: &mut Done) -> Option<(Path2, Path2)> {
         let last = done.passes.last_mut()?;
         if !last.path.is_closed() || last.role == Role::Wall {
             return None;
         }
         let (end, t) = (last.path.end(), last.path.end_tangent());
-        let corner = t.cross(last.path.start_tangent()).abs() > 0.1;
-        if corner {
-            let ray = Seg::Line { a: end, b: end + t * (3.0 * self.step) };
-            if let Some(hit) = first_hit(&ray, next) {
-                if self.fits(end, hit) {
-                    let way = Path2::polyline(&[end, hit], false).ok()?;
-                    return Some((next.starting_near(hit), way));
-                }
-            }
+        let ray = Seg::Line { a: end, b: end + t * (3.0 * self.step) };
+        if let Some(hit) = first_hit(&ray, next).filter(|&hit| self.fits(end, hit)) {
+            let way = Path2::polyline(&[end, hit], false).ok()?;
+            return Some((next.starting_near(hit), way));
         }
         let length = last.path.length();
         if self.step > self.what.radius + 1e-9 || length < 4.0 * self.step {
