@@ -156,3 +156,41 @@ fn a_circle_of_plans_is_found_and_left() {
     assert_eq!(cycle.len(), 1);
     assert!(cycle[0].message.contains("#2 → #100 → #101 → #2"), "{}", cycle[0].message);
 }
+
+#[test]
+fn any_byte_may_be_wrong() {
+    for name in ["slot-square-u.p21", "base.p21", "test-program.p21"] {
+        let text = data(name);
+        for n in 0..text.len() {
+            let mut bytes = text.clone().into_bytes();
+            bytes[n] = b"'\"(;/#.$)=,0A \n"[n % 15];
+            let Ok(broken) = String::from_utf8(bytes) else { continue };
+            for d in diagnostics(&broken) {
+                for l in &d.labels {
+                    assert!(l.span.start <= l.span.end && l.span.end as usize <= broken.len(), "{name} {n}: {d:?}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn one_wrong_byte_in_a_statement_loses_no_other() {
+    let text = data("base.p21");
+    let whole = gr_p21::parse(text.as_bytes());
+    let count = whole.instances.len();
+    for n in text.find("DATA;").expect("data") + 6..text.rfind("ENDSEC").expect("end") {
+        // Bytes that separate statements may join two of them.
+        if text.as_bytes()[n] < b' ' || matches!(text.as_bytes()[n], b'#' | b';' | b'=') || text[..n].ends_with('#') {
+            continue;
+        }
+        let mut bytes = text.clone().into_bytes();
+        bytes[n] = b"'\"(?.$)"[n % 7];
+        let broken = gr_p21::parse(&bytes);
+        let here = whole.instances.iter().position(|i| i.start as usize <= n && n < i.end as usize);
+        for (k, i) in whole.instances.iter().enumerate().filter(|(k, i)| Some(*k) != here && i.id > 0) {
+            let found = broken.find(i.id).unwrap_or_else(|| panic!("#{} is lost by byte {n}", i.id));
+            assert!(!broken.instances[found as usize].damaged, "#{} is damaged by byte {n} ({k} of {count})", i.id);
+        }
+    }
+}
