@@ -76,6 +76,37 @@ fn each_fault_has_its_diagnostic() {
     assert!(wrong.is_empty(), "{line}\n{}", wrong.join("\n"));
 }
 
+/// Each fault as people see it, one snapshot for each family of faults (`arc-…`, `comp-…`).
+#[test]
+fn each_fault_as_people_see_it() {
+    let tools = tempfile::tempdir().expect("a temporary folder");
+    std::fs::write(tools.path().join("tool.tbl"), TOOLS).expect("writable");
+    let mut families = std::collections::BTreeMap::<String, String>::new();
+    for file in programs("errors") {
+        let name = file.file_name().and_then(|n| n.to_str()).expect("plain names").to_string();
+        std::fs::copy(&file, tools.path().join(&name)).expect("writable");
+        let out = run(
+            Command::new(gcc_robot())
+                .args(["check", "--color", "never", "--tools", "tool.tbl", "--machine-units", "inch", &name])
+                .current_dir(tools.path()),
+            Duration::from_secs(60),
+        )
+        .expect("it starts");
+        assert!(!out.timed_out, "{name} ran into the time limit");
+        let family = name.split(['-', '.']).next().unwrap_or_default().to_string();
+        let text = families.entry(family).or_default();
+        text.push_str(&format!("──── {name}: {}\n{}{}\n", out.how(), out.output(), out.errors()));
+    }
+    let mut settings = insta::Settings::clone_current();
+    settings.set_prepend_module_to_snapshot(false);
+    settings.set_snapshot_path("../corpus/errors/snapshots");
+    settings.bind(|| {
+        for (family, text) in &families {
+            insta::assert_snapshot!(family.as_str(), text);
+        }
+    });
+}
+
 fn is_lint(code: &str) -> bool {
     // A probe that goes nowhere: rs274 is silent, we warn on purpose, and one shipped program has it.
     code == "E0256" || gr_spec::Code::find(code).is_some_and(|c| c.def().lint)

@@ -247,6 +247,10 @@ pub(crate) fn shape_of(scan: &Scan, text: &str, dialect: &'static Dialect) -> Sh
                         shape.jumps |= word.value as i64 == 99;
                     }
                 }
+                // G70, G71 and G72 name their contour subroutine.
+                b'q' if word.form == Form::Literal && words.iter().any(|w| w.letter == b'g' && (70.0..73.0).contains(&w.value)) => {
+                    labels.push(Label { name: word.value.to_string().into(), line: n, kind: LabelKind::Call });
+                }
                 b'n' if macros && word.form == Form::Literal => {
                     labels.push(Label { name: word.value.to_string().into(), line: n, kind: LabelKind::Number });
                 }

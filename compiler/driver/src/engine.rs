@@ -6,7 +6,7 @@ use std::sync::Arc;
 use gr_canon::{At, Call, CallFrame, Discard, FileId, FrameId, Mark, Sink};
 use gr_gcode::{Chunk, File, Form, LineKind};
 use gr_interp::{Files, Finding, Interp, Modal, Params, State, run_lines};
-use gr_spec::code;
+use gr_spec::{Severity, code};
 
 use crate::Options;
 use crate::db::{Db, Outline, Shape};
@@ -215,9 +215,17 @@ pub(crate) fn step(chunk: &Chunk, entry: &Boundary, env: Option<&Environment>, o
         environment: env.filter(|_| touched).map(|_| Environment { params: exit.params }),
         found,
         summary: lints.inner.summary,
-        end: End::of(exit.end, line),
+        end: End::of(exit.end, line).or_else(|| {
+            let at = exit.findings.iter().filter(|f| f.fault.rs.is_some()).map(|f| f.line);
+            at.filter(|l| ends_program(&chunk.scan, *l)).map(|line| End { line, stopped: true, program: true }).next()
+        }),
         impure: env.is_none() && touched,
     }
+}
+
+/// Whether a line has M2 or M30.
+fn ends_program(scan: &gr_gcode::Scan, line: u32) -> bool {
+    scan.words(line).iter().any(|w| w.letter == b'm' && w.form == Form::Literal && (w.value == 2.0 || w.value == 30.0))
 }
 
 fn percent_line(chunk: &Chunk, from: u32) -> u32 {
@@ -345,7 +353,7 @@ pub(crate) fn flow(stretch: &Stretch<'_>) -> FlowOutcome {
     // Whether that is a mistake depends on the dialect and on what the file is: see `finish`.
     findings.retain(|f| f.fault.code != code::PROGRAM_ENDS_EARLY);
     let fault_line = findings.iter().rev().find(|f| f.fault.rs.is_some() && f.file == *main).map_or(last_line, |f| f.line);
-    let end = match why {
+    let mut end = match why {
         gr_interp::End::Fault if early => None,
         gr_interp::End::Fault => End::of(why, fault_line),
         gr_interp::End::Percent => End::of(why, percent_after(file, from)),
@@ -357,6 +365,14 @@ pub(crate) fn flow(stretch: &Stretch<'_>) -> FlowOutcome {
     }
     drop_consequences(&mut findings, file, *line, *main);
     let mut found: Vec<Found> = findings.iter().filter_map(|f| of_finding(f, options)).collect();
+    let unreached = if early { unreached_end(file, &findings, *main) } else { None };
+    if let Some(line) = unreached {
+        // The end is there: what keeps the controller from it is the mistake.
+        end = Some(End { line, stopped: true, program: true });
+        for f in found.iter_mut().filter(|f| f.code == code::FLOW_UNCLOSED && f.place.file == *main) {
+            f.severity = Severity::Error;
+        }
+    }
     found.extend(lints.found);
     FlowOutcome { boundary: Boundary::new(state, lints.flags, false), found, frames, summary: lints.summary, end }
 }
@@ -377,6 +393,19 @@ fn drop_consequences(findings: &mut Vec<Finding>, file: &File, from: u32, main: 
         after_error |= f.fault.rs.is_some() && (f.file != main || f.line >= first_control);
         keep
     });
+}
+
+/// Line of an M2 or M30 that could not end the program: something before it is not closed, or that block itself
+/// has a mistake.
+fn unreached_end(file: &File, findings: &[Finding], main: FileId) -> Option<u32> {
+    let mut all = file.chunks.iter().zip(&file.first_lines).flat_map(|(chunk, first)| {
+        let scan = &chunk.scan;
+        (0..scan.lines.len() as u32).filter(move |l| ends_program(scan, *l)).map(move |l| first + l)
+    });
+    let explains = |f: &Finding, line: u32| {
+        f.file == main && if f.fault.code == code::FLOW_UNCLOSED { f.line < line } else { f.fault.rs.is_some() && f.line == line }
+    };
+    all.find(|line| findings.iter().any(|f| explains(f, *line)))
 }
 
 /// Line of the closing `%`.

@@ -156,7 +156,12 @@ impl<S: Sink> Interp<'_, S> {
             -1 => Ok(()),
             40 => {
                 if b.or_minus_one(b'p') == -1.0 {
-                    return Err(fault(code::WORD_MISSING, rs274::RT_G4_P_MISSING, "G4").arg("P").at(b'g'));
+                    // -1 is how the controller writes "no P".
+                    return Err(if b.has(b'p') {
+                        bad_value(rs274::RT_G4_P_MISSING, "G4", 'P')
+                    } else {
+                        fault(code::WORD_MISSING, rs274::RT_G4_P_MISSING, "G4").arg("P").at(b'g')
+                    });
                 }
                 if motion == 20 || motion == 30 {
                     return Err(fault(code::AXIS_TWO_USERS, rs274::RT_G4_WITH_ARC, ""));
@@ -193,11 +198,22 @@ impl<S: Sink> Interp<'_, S> {
         let bad = |rs, what: String, letter: u8| {
             Err(Fault::new(code::WORD_BAD_VALUE, rs).arg(l).own_args(&[&what, &char::from(letter).to_string()]).at(letter.to_ascii_lowercase()))
         };
+        let absent = |rs, what: &str, letter: &str| {
+            Err(Fault::new(code::WORD_MISSING, rs).arg(l).own_args(&[what, letter]).at(b'g'))
+        };
+        if !b.has(b'l') {
+            return absent(rs274::RT_G10_L, "G10", "L");
+        }
         if ![0, 1, 2, 10, 11, 20].contains(&l) {
             return bad(rs274::RT_G10_L, "G10".into(), b'L');
         }
         if p + 0.0001 - f64::from(p_int) > 0.0002 {
             return bad(rs274::RT_G10_P_INTEGER, format!("G10 L{l}"), b'P');
+        }
+        if l != 0 && !b.has(b'p') {
+            let system = l == 2 || l == 20;
+            let rs = if system { rs274::RT_G10_P_RANGE_SYSTEM } else { rs274::RT_G10_P_RANGE_TOOL };
+            return absent(rs, &format!("G10 L{l}"), "P");
         }
         if (l == 2 || l == 20) && !(0..=9).contains(&p_int) {
             return bad(rs274::RT_G10_P_RANGE_SYSTEM, format!("G10 L{l}"), b'P');

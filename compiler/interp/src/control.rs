@@ -865,6 +865,7 @@ impl<S: Sink> Interp<'_, S> {
     pub(crate) fn unclosed_in(&mut self, id: FileId) {
         let index = self.index(id);
         let mut open: Vec<(Keyword, String, u32, Span)> = Vec::new();
+        let main = self.opened.order.first() == Some(&id);
         for line in index.lines.clone() {
             let file = self.files.file(id);
             let Some((c, l)) = file.locate(line) else { continue };
@@ -877,13 +878,14 @@ impl<S: Sink> Interp<'_, S> {
             let here = Span::new(control.span.start.saturating_sub(start), control.span.end.saturating_sub(start));
             match control.keyword {
                 Keyword::If | Keyword::Repeat => open.push((control.keyword, label, line, here)),
-                Keyword::While if open.iter().any(|o| o.0 == Keyword::Do && o.1 == label) => {
-                    open.retain(|o| !(o.0 == Keyword::Do && o.1 == label));
-                }
+                // A file that is called may leave its `endsub` away and end with M2.
+                Keyword::Sub if main => open.push((control.keyword, label, line, here)),
+                Keyword::While if closes(&mut open, Keyword::Do, &label) => {}
                 Keyword::While | Keyword::Do => open.push((control.keyword, label, line, here)),
-                Keyword::Endif => open.retain(|o| !(o.0 == Keyword::If && o.1 == label)),
-                Keyword::Endwhile => open.retain(|o| !(o.0 == Keyword::While && o.1 == label)),
-                Keyword::Endrepeat => open.retain(|o| !(o.0 == Keyword::Repeat && o.1 == label)),
+                Keyword::Endsub => _ = closes(&mut open, Keyword::Sub, &label),
+                Keyword::Endif => _ = closes(&mut open, Keyword::If, &label),
+                Keyword::Endwhile => _ = closes(&mut open, Keyword::While, &label),
+                Keyword::Endrepeat => _ = closes(&mut open, Keyword::Repeat, &label),
                 _ => {}
             }
         }
@@ -1103,4 +1105,15 @@ fn is_macro(keyword: Keyword) -> bool {
             | Keyword::MacroDo
             | Keyword::MacroEnd
     )
+}
+
+/// Takes out of `open` what a statement with this label closes. A computed label (`o#1`, `o[…]`) may be any.
+fn closes(open: &mut Vec<(Keyword, String, u32, Span)>, keyword: Keyword, label: &str) -> bool {
+    let computed = |l: &str| l.contains(['#', '[']) && !l.contains('<');
+    let of = |o: &(Keyword, String, u32, Span), any: bool| {
+        o.0 == keyword && (o.1 == label || any && (computed(label) || computed(&o.1)))
+    };
+    let Some(at) = open.iter().rposition(|o| of(o, false)).or_else(|| open.iter().rposition(|o| of(o, true))) else { return false };
+    open.remove(at);
+    true
 }

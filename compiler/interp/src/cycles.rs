@@ -66,7 +66,7 @@ impl<S: Sink> Interp<'_, S> {
         };
         let repeats = self.block.get(b'l').map_or(1, |l| l as i32);
         if repeats == 0 {
-            return Err(word_missing("L (at least 1)", rs274::CYCLE_NO_REPEATS).at(b'l'));
+            return Err(word_missing("L of at least 1", rs274::CYCLE_NO_REPEATS).at(b'l'));
         }
         self.check_cycle_axes(plane)?;
         self.cycle_in_plane(g, plane, again, r, repeats)?;
@@ -218,7 +218,8 @@ impl<S: Sink> Interp<'_, S> {
                 return Err(word_missing("P", rs274::CYCLE_NO_P).arg(hole.g / 10));
             }
             730 | 830 if q.is_none() && !again => {
-                return Err(word_missing("Q", rs274::CYCLE_NO_Q).arg(hole.g / 10));
+                let fault = word_missing("Q", rs274::CYCLE_NO_Q).arg(hole.g / 10);
+                return Err(if self.block.has(b'q') { fault.named("Q greater than zero".into()).at(b'q') } else { fault });
             }
             870 if !again => {
                 if let Some(missing) = b"ijk".iter().find(|l| !self.block.has(**l)) {
@@ -383,7 +384,7 @@ impl<S: Sink> Interp<'_, S> {
 
     fn peck(&mut self, hole: &Hole) -> Res {
         if hole.peck <= 0.0 {
-            return Err(word_missing("Q (greater than zero)", rs274::CYCLE_Q_NOT_POSITIVE).at(b'q'));
+            return Err(word_missing("Q greater than zero", rs274::CYCLE_Q_NOT_POSITIVE).at(b'q'));
         }
         let clearance = self.peck_clearance(hole.g);
         let mut depth = hole.retract - hole.peck;

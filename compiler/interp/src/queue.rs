@@ -155,6 +155,9 @@ impl Queue {
             match item {
                 Item::Arc(arc) => move_arc_end(arc, p, self.start, tolerance)?,
                 Item::Line(line) => {
+                    if !matches!(plane, Plane::Xy | Plane::Xz) {
+                        return Err(wrong_plane(plane, line.rapid));
+                    }
                     // Backwards means that the corner lies before the start of the move.
                     let back = |s: [f64; 2]| line.dir[0] * (p[0] - s[0]) + line.dir[1] * (p[1] - s[1]) < 0.0;
                     if self.start.is_some_and(back) {
@@ -169,6 +172,12 @@ impl Queue {
         }
         Ok(())
     }
+}
+
+/// G17.1, G18.1 and G19.1 are let through while compensation is on; the next corner can't be found then.
+fn wrong_plane(plane: Plane, rapid: bool) -> Box<Fault> {
+    let rs = if rapid { rs274::COMP_BUG_PLANE } else { rs274::COMP_BUG_PLANE_FEED };
+    Fault::new(code::COMP_NOT_HERE, rs).arg(plane as u8).own_args(&["the working plane is one of the U, V, W axes"])
 }
 
 fn move_arc_end(arc: &mut ArcMove, p: [f64; 2], start: Option<[f64; 2]>, tolerance: f64) -> Res {

@@ -444,7 +444,7 @@ impl<S: Sink> Interp<'_, S> {
                 let saved = saved.clone();
                 self.restore_modes(&saved)
             }
-            _ => Err(Fault::new(code::WORD_MISSING, rs274::RT_M72).arg("M72").arg("M70 or M73 before it; no").at(b'm')),
+            _ => Err(Fault::new(code::WORD_MISSING, rs274::RT_M72).arg("M72").arg("M70 or M73 before it").at(b'm')),
         }
     }
 

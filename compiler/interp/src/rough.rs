@@ -886,7 +886,11 @@ pub(crate) struct Reader {
 }
 
 fn refuse(text: gr_spec::Rs274, why: &str) -> Box<Fault> {
-    Fault::new(code::ROUGH_CONTOUR, text).arg(why)
+    let fault = Fault::new(code::ROUGH_CONTOUR, text).arg(why);
+    match why {
+        "Not monotonic" => fault.named("it does not rise or fall all the way".into()),
+        _ => fault,
+    }
 }
 
 impl Reader {

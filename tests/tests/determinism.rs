@@ -1,0 +1,82 @@
+//! The same program gives the same bytes: in every target, every time, with one worker or several.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::Duration;
+
+use gr_tests::oracle::{gcc_robot, root};
+use gr_tests::process::{Ended, run};
+
+fn robot(dir: &Path, args: &[&str]) -> Ended {
+    let out = run(Command::new(gcc_robot()).args(args).current_dir(dir), Duration::from_secs(120)).expect("it starts");
+    assert!(!out.timed_out, "{args:?} ran into the time limit");
+    out
+}
+
+/// Programs of the corpus that need no INI file, in a folder of their own.
+fn programs(dir: &Path) -> Vec<String> {
+    let from = root().join("tests/corpus/accepted");
+    let mut names: Vec<String> = std::fs::read_dir(&from)
+        .expect("the corpus is there")
+        .filter_map(|e| Some(e.ok()?.file_name().to_str()?.to_string()))
+        .filter(|n| n.ends_with(".ngc") && !from.join(n).with_extension("ini").is_file())
+        .collect();
+    names.sort();
+    for name in &names {
+        std::fs::copy(from.join(name), dir.join(name)).expect("writable");
+    }
+    names
+}
+
+fn files(dir: &Path) -> Vec<(PathBuf, Vec<u8>)> {
+    let mut all: Vec<(PathBuf, Vec<u8>)> = std::fs::read_dir(dir)
+        .map(|entries| entries.filter_map(|e| e.ok()).filter(|e| e.path().is_file()).collect::<Vec<_>>())
+        .unwrap_or_default()
+        .into_iter()
+        .map(|e| (e.file_name().into(), std::fs::read(e.path()).expect("readable")))
+        .collect();
+    all.sort();
+    all
+}
+
+#[test]
+fn every_target_twice() {
+    let dir = tempfile::tempdir().expect("a temporary folder");
+    let names = programs(dir.path());
+    let mut made = 0;
+    for name in names.iter().step_by(4) {
+        for target in ["canon", "motion", "rs274ngc", "json", "csv", "svg", "png", "html", "sheet", "sheet-json", "sheet-html"] {
+            let once = || robot(dir.path(), &["build", "--target", target, name]);
+            let (a, b) = (once(), once());
+            made += usize::from(a.status == Some(0));
+            assert_eq!((a.status, a.errors()), (b.status, b.errors()), "{name} {target}");
+            assert!(a.stdout == b.stdout, "{name} {target}: other bytes the second time");
+        }
+    }
+    assert!(made > 100, "only {made} results");
+}
+
+#[test]
+fn one_worker_or_several() {
+    let dir = tempfile::tempdir().expect("a temporary folder");
+    let mut names = programs(dir.path());
+    // A mistake keeps everything from being written.
+    names.retain(|n| robot(dir.path(), &["check", n]).status == Some(0));
+    assert!(names.len() > 20);
+    let build = |jobs: &str, out: &str| {
+        let mut args = vec!["build", "--target", "canon", "-j", jobs, "-o", out];
+        args.extend(names.iter().map(String::as_str));
+        let ended = robot(dir.path(), &args);
+        assert_eq!(ended.status, Some(0), "{}", ended.errors());
+        files(&dir.path().join(out))
+    };
+    let (one, two, again) = (build("1", "one/"), build("2", "two/"), build("4", "four/"));
+    assert_eq!(one.len(), names.len());
+    assert!(one == two && two == again, "the number of workers changes the result");
+    let check = |jobs: &str| {
+        let ended = robot(dir.path(), &["check", "--message-format", "short", "-j", jobs, "."]);
+        (ended.status, ended.output(), ended.errors())
+    };
+    assert_eq!(check("1"), check("2"));
+    assert_eq!(check("2"), check("4"));
+}
