@@ -92,6 +92,8 @@ pub struct Job {
     pub files: Vec<(String, Vec<u8>)>,
     /// Further options.
     pub options: Vec<String>,
+    /// How long a run may take, where it is not [`LIMIT`].
+    pub limit: Option<Duration>,
 }
 
 /// What a run gave.
@@ -149,7 +151,7 @@ impl Job {
             command.args(["-v", "sim.var"]);
         }
         command.args(&self.options).args(["prog.ngc", "out.canon"]);
-        let ended = run(command, LIMIT).expect("the program starts");
+        let ended = run(command, self.limit.unwrap_or(LIMIT)).expect("the program starts");
         let read = |name: &str| String::from_utf8_lossy(&std::fs::read(at(name)).unwrap_or_default()).into_owned();
         Outcome { canon: read("out.canon"), params: read("sim.var"), ended }
     }

@@ -86,13 +86,23 @@ impl<S: Sink> Interp<'_, S> {
             return Ok(());
         }
         // Up to the damage the words count as usual: whatever is wrong there is found first.
-        let bad = scan.faults_of(line).first().map_or(u32::MAX, |f| f.span.start);
+        let first = scan.faults_of(line).first();
+        let bad = first.map_or(u32::MAX, |f| f.span.start);
+        // A NUL byte ends the line for the controller, and it says nothing.
+        let cut = first.is_some_and(|f| f.code == gr_spec::code::TEXT_NUL_BYTE);
         for w in words {
             let end = scan.word_span(text, line, w).end;
-            if w.form == Form::Bad || (w.start >= bad || end > bad) {
+            let beyond = w.start >= bad || end > bad;
+            if cut && beyond {
+                return Ok(());
+            }
+            if w.form == Form::Bad || beyond {
                 return Err(self.parse_fault(scan));
             }
             self.read_word(scan, text, w)?;
+        }
+        if cut {
+            return Ok(());
         }
         Err(self.parse_fault(scan))
     }
