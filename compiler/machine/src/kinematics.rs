@@ -1,3 +1,5 @@
+use crate::math::{Frame, euler_of};
+
 /// Position and direction of the tool.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct Pose {
@@ -17,6 +19,14 @@ impl Pose {
     /// From six coordinates.
     pub fn from_coordinates([x, y, z, a, b, c]: [f64; 6]) -> Pose {
         Pose { position: [x, y, z], rotation: [a, b, c] }
+    }
+    /// As a frame.
+    pub fn frame(&self) -> Frame {
+        Frame::new(self.position, self.rotation)
+    }
+    /// From a frame; the turns are those nearest to zero.
+    pub fn from_frame(frame: &Frame) -> Pose {
+        Pose { position: frame.position, rotation: euler_of(&frame.turn) }
     }
 }
 
@@ -59,6 +69,24 @@ pub enum KinematicsError {
     },
     /// A coordinate is infinite or not a number.
     NotFinite,
+    /// The joint values fit more than one assembly of a parallel machine within its limits.
+    Ambiguous {
+        /// Assemblies.
+        count: usize,
+    },
+    /// The parts of the machine can't be put together with these joint values.
+    NoAssembly,
+    /// The tool can't take this direction, whatever the joints do.
+    Direction,
+    /// The numerical search found no joint values; what is left over at the best it found.
+    NotFound {
+        /// Distance, mm.
+        distance: f64,
+        /// Angle, rad.
+        angle: f64,
+    },
+    /// The machine file is a template; these keys are missing.
+    Incomplete(Vec<String>),
 }
 
 impl std::fmt::Display for KinematicsError {
@@ -75,6 +103,20 @@ impl std::fmt::Display for KinematicsError {
             KinematicsError::OutOfPlane { word, .. } => write!(f, "{word} can't be changed by this machine"),
             KinematicsError::JointCount { wanted, given } => write!(f, "{given} joint values for {wanted} joints"),
             KinematicsError::NotFinite => write!(f, "a coordinate is not a finite number"),
+            KinematicsError::Ambiguous { count } => {
+                write!(f, "{count} positions of the tool fit these joint values within the limits")
+            }
+            KinematicsError::NoAssembly => write!(f, "no position of the tool fits these joint values"),
+            KinematicsError::Direction => write!(f, "the tool can't be turned into this direction"),
+            KinematicsError::NotFound { distance, angle } => write!(
+                f,
+                "no joint values were found; the nearest leave {} mm and {}°",
+                crate::short(*distance),
+                crate::short(angle.to_degrees())
+            ),
+            KinematicsError::Incomplete(keys) => {
+                write!(f, "the machine is a template; its file must still say {}", keys.join(", "))
+            }
         }
     }
 }
@@ -89,6 +131,47 @@ pub trait Kinematics: Send + Sync {
     fn forward(&self, joints: &[f64]) -> Result<Pose, KinematicsError>;
     /// All joint values that put the tool there, ordered by branch; at least one.
     fn inverse(&self, pose: &Pose) -> Result<Vec<Solution>, KinematicsError>;
+    /// Where the tool is, as a frame.
+    fn forward_frame(&self, joints: &[f64]) -> Result<Frame, KinematicsError> {
+        Ok(self.forward(joints)?.frame())
+    }
+    /// As [`Kinematics::inverse`], for a frame.
+    fn inverse_frame(&self, frame: &Frame) -> Result<Vec<Solution>, KinematicsError> {
+        self.inverse(&Pose::from_frame(frame))
+    }
+    /// Conditions of the mechanism that these joint values break, besides the limits of the joints themselves.
+    fn violations(&self, _joints: &[f64]) -> Vec<Violation> {
+        Vec::new()
+    }
+    /// Which turns the machine controls: all, only the direction of the tool's own axis (a spindle on a five-axis
+    /// machine), or none.
+    fn control(&self) -> Control {
+        Control::Full
+    }
+}
+
+/// How much of the tool's direction the joints decide.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Control {
+    /// All of it.
+    Full,
+    /// The tool axis; the turn about it follows by itself.
+    Axis,
+    /// None; the direction follows from the position.
+    Position,
+}
+
+/// A condition of the mechanism that does not hold.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Violation {
+    /// Stable name: `leg-1-short`, `spherical-2` …
+    pub name: &'static str,
+    /// For people: what it is that goes too far.
+    pub what: String,
+    /// Its value, mm or rad.
+    pub value: f64,
+    /// Its limit, mm or rad.
+    pub limit: f64,
 }
 
 /// The joint values, after a check of their number.

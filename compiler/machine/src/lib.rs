@@ -6,23 +6,54 @@
 //!
 //! | module | job |
 //! |---|---|
-//! | `schema` | the file format, its checks and their diagnostics |
+//! | `keys` | which keys a machine file may hold; the JSON Schema made from them |
+//! | `tree` | TOML with the place of every value; `extends` |
+//! | `schema` | from keys to a machine: checks and their diagnostics |
 //! | `library` | the machines that come with the program |
 //! | `kinematics` | the trait, poses, errors |
-//! | `planar` | planar arm with three turning joints |
-//! | `cartesian` | one prismatic joint per axis |
+//! | `planar`, `cartesian`, `scara`, `opw`, `ur`, `five_axis`, `prp`, `tricept`, `serial` | one kind of kinematics each |
+//! | `cell` | tools, frames, signals: what surrounds the joints |
+//! | `differential` | Jacobian, manipulability, condition |
+//! | `mobility` | degrees of freedom of a mechanism from its structure |
+//! | `identify` | OPW lengths of a chain of joint frames |
+//! | `math` | vectors and frames |
 
 mod cartesian;
+mod cell;
+pub mod differential;
+mod five_axis;
+mod identify;
+mod keys;
 mod kinematics;
 mod library;
+pub mod math;
+mod mobility;
+mod opw;
 mod planar;
+mod prp;
+mod scara;
 mod schema;
+mod serial;
+mod tree;
+mod tricept;
+mod ur;
 
 pub use cartesian::Cartesian;
-pub use kinematics::{Kinematics, KinematicsError, Pose, Solution};
-pub use library::{builtin, is_path, list, source};
+pub use cell::{Cell, Controller, Coupling, External, Rapid, Signal, Spindle, ToolData, Zones};
+pub use five_axis::{Carrier, FiveAxis, Rotary};
+pub use identify::{Fit, identify};
+pub use keys::json_schema;
+pub use kinematics::{Control, Kinematics, KinematicsError, Pose, Solution, Violation};
+pub use library::{builtin, is_path, list, reference, source, suggestion};
+pub use mobility::{Mobility, mobility};
+pub use opw::{Eight, Opw};
 pub use planar::Planar3r;
-pub use schema::parse;
+pub use prp::{SphericalAxis, TwoLegs, TwoLegsShape};
+pub use scara::Scara;
+pub use schema::{parse, parse_reference};
+pub use serial::{DhRow, Link, Serial};
+pub use tricept::{Tricept, TriceptShape};
+pub use ur::ParallelWrist;
 
 /// What sort of machine it is.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -61,6 +92,8 @@ pub struct Joint {
     pub speed: Option<f64>,
     /// Speed of a rapid move; none = `speed`.
     pub rapid: Option<f64>,
+    /// Greatest acceleration, mm/s² or rad/s².
+    pub acceleration: Option<f64>,
 }
 
 impl Joint {
@@ -86,12 +119,14 @@ fn short(value: f64) -> String {
 }
 
 /// What the words A B C mean on a robot.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, PartialEq, Eq, Debug)]
 pub enum Orientation {
     /// The tool keeps its direction; A B C are errors.
     Fixed,
     /// Turns about the fixed X, Y, Z.
     AbcEulerXyz,
+    /// The rotary axes of the machine the program was written for.
+    SourceMachine(String),
 }
 
 /// How the joints carry the tool.
@@ -101,6 +136,29 @@ pub enum Chain {
     Cartesian,
     /// Three turning joints in the XY plane: upper arm, forearm, tool (mm).
     Planar3r([f64; 3]),
+    /// Two parallel turning joints, a stroke, a wrist.
+    Scara(Scara),
+    /// Six joints with a spherical wrist.
+    Opw(Opw),
+    /// Six joints, three of them parallel, with an offset wrist.
+    ParallelWrist(ParallelWrist),
+    /// X Y Z and two rotary axes.
+    FiveAxis(FiveAxis),
+    /// Two legs and a column.
+    TwoLegs(Box<TwoLegs>),
+    /// Three legs, a tube and a wrist.
+    Tricept(Tricept),
+    /// Joints one after the other.
+    Serial(Serial),
+    /// A template: what its file doesn't say yet.
+    Incomplete {
+        /// Kind of kinematics.
+        kind: String,
+        /// Missing keys.
+        missing: Vec<String>,
+        /// Joints.
+        joints: usize,
+    },
 }
 
 /// A machine, in mm, rad and s.
@@ -124,6 +182,28 @@ pub struct Machine {
     pub start: Pose,
     /// The same in joint values; none = whatever solution comes first.
     pub start_joints: Option<Vec<f64>>,
+    /// Structure of the mechanism as people write it: `2UPS+PRP`.
+    pub structure: Option<String>,
+    /// What surrounds the joints: tools, frames, signals, controller.
+    pub cell: Cell,
+}
+
+/// Kinematics of a template: no values, only the names of the missing keys.
+struct Template {
+    joints: usize,
+    missing: Vec<String>,
+}
+
+impl Kinematics for Template {
+    fn joint_count(&self) -> usize {
+        self.joints
+    }
+    fn forward(&self, _: &[f64]) -> Result<Pose, KinematicsError> {
+        Err(KinematicsError::Incomplete(self.missing.clone()))
+    }
+    fn inverse(&self, _: &Pose) -> Result<Vec<Solution>, KinematicsError> {
+        Err(KinematicsError::Incomplete(self.missing.clone()))
+    }
 }
 
 impl Machine {
@@ -132,7 +212,58 @@ impl Machine {
         match &self.chain {
             Chain::Cartesian => Box::new(Cartesian::new(self.joints.iter().map(|j| j.kind).collect())),
             Chain::Planar3r(links) => Box::new(Planar3r::new(*links)),
+            Chain::Scara(k) => Box::new(*k),
+            Chain::Opw(k) => Box::new(*k),
+            Chain::ParallelWrist(k) => Box::new(*k),
+            Chain::FiveAxis(k) => Box::new(*k),
+            Chain::TwoLegs(k) => Box::new((**k).clone()),
+            Chain::Tricept(k) => Box::new(*k),
+            Chain::Serial(k) => Box::new(k.clone()),
+            Chain::Incomplete { missing, joints, .. } => Box::new(Template { joints: *joints, missing: missing.clone() }),
         }
+    }
+    /// Joint values as the controller counts them: the robot's own coupling of two joints applied.
+    pub fn controller_values(&self, joints: &[f64]) -> Vec<f64> {
+        let mut out = joints.to_vec();
+        if let Some(c) = &self.cell.coupling
+            && let (Some(value), Some(with)) = (joints.get(c.joint), joints.get(c.with))
+        {
+            out[c.joint] = value + c.factor * with;
+        }
+        out
+    }
+    /// The reverse of [`Machine::controller_values`].
+    pub fn joint_values(&self, controller: &[f64]) -> Vec<f64> {
+        let mut out = controller.to_vec();
+        if let Some(c) = &self.cell.coupling
+            && let (Some(value), Some(with)) = (controller.get(c.joint), controller.get(c.with))
+        {
+            out[c.joint] = value - c.factor * with;
+        }
+        out
+    }
+    /// Joints, or the value that a coupled joint has on the controller, outside their limits: index and value.
+    pub fn outside(&self, joints: &[f64]) -> Vec<(usize, f64)> {
+        let mut out: Vec<(usize, f64)> =
+            self.joints.iter().zip(joints).enumerate().filter(|(_, (j, v))| !j.allows(**v)).map(|(i, (_, v))| (i, *v)).collect();
+        if let Some(c) = &self.cell.coupling
+            && let Some(joint) = self.joints.get(c.joint)
+            && let Some(value) = self.controller_values(joints).get(c.joint)
+        {
+            let coupled = Joint { min: c.min.or(joint.min), max: c.max.or(joint.max), ..joint.clone() };
+            if !coupled.allows(*value) && !out.iter().any(|(i, _)| *i == c.joint) {
+                out.push((c.joint, *value));
+            }
+        }
+        out
+    }
+    /// The flange that puts the point of a tool on a pose given in the part's frame.
+    pub fn flange_for(&self, pose: &math::Frame, tool: &math::Frame) -> math::Frame {
+        self.cell.part_in_base().then(pose).then(&tool.inverse())
+    }
+    /// Degrees of freedom of the mechanism, from its structure.
+    pub fn mobility(&self) -> Option<Mobility> {
+        self.structure.as_deref().and_then(|s| mobility(s).ok())
     }
     /// Travel limits of the axes X Y Z A B C U V W, for a machine whose joints are its axes.
     pub fn travel(&self) -> Option<[(Option<f64>, Option<f64>); 9]> {
@@ -158,12 +289,10 @@ impl Machine {
         if !self.source.is_empty() {
             out += &format!("source: {}\n", self.source);
         }
-        out += &match &self.chain {
-            Chain::Cartesian => "kinematics: one joint per axis\n".to_string(),
-            Chain::Planar3r(l) => {
-                format!("kinematics: planar arm, links {}, {}, {} mm\n", short(l[0]), short(l[1]), short(l[2]))
-            }
-        };
+        out += &format!("kinematics: {}\n", self.chain.describe());
+        if let (Some(structure), Some(m)) = (&self.structure, self.mobility()) {
+            out += &format!("structure: {structure}, {} degrees of freedom\n", m.freedom);
+        }
         let p = &self.start;
         out += &format!(
             "start: X {} Y {} Z {} mm, A {} B {} C {}°\n",
@@ -187,6 +316,26 @@ impl Machine {
                 speed(j.rapid.or(j.speed)),
             );
         }
-        out
+        out + &self.cell.describe(&self.joints)
+    }
+}
+
+impl Chain {
+    /// In words.
+    fn describe(&self) -> String {
+        let list = |v: &[f64]| v.iter().map(|l| short(*l)).collect::<Vec<_>>().join(", ");
+        match self {
+            Chain::Cartesian => "one joint per axis".to_string(),
+            Chain::Planar3r(l) => format!("planar arm, links {} mm", list(l)),
+            Chain::Scara(_) => "SCARA arm".to_string(),
+            Chain::Opw(k) => format!("arm with spherical wrist, a1 a2 b c1 c2 c3 c4 = {} mm", list(&k.lengths())),
+            Chain::ParallelWrist(k) => format!("arm with offset wrist, d1 a2 a3 d4 d5 d6 = {} mm", list(&k.lengths())),
+            Chain::FiveAxis(_) => "three linear and two rotary axes, tool point control".to_string(),
+            Chain::TwoLegs(_) => "two legs and a column with a turning arm".to_string(),
+            Chain::Tricept(k) if k.reference => "three legs, tube and wrist; leg points by the source's equations".to_string(),
+            Chain::Tricept(_) => "three legs, tube and wrist; rigid platform".to_string(),
+            Chain::Serial(_) => "chain of joints, inverse by search".to_string(),
+            Chain::Incomplete { kind, missing, .. } => format!("{kind}, a template: its file must still say {}", missing.join(", ")),
+        }
     }
 }

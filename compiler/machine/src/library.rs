@@ -1,11 +1,8 @@
+use crate::schema::parse_reference;
 use crate::{Machine, parse};
 use gr_text::FileId;
 
-/// Id and text of the machine files that come with the program.
-const FILES: &[(&str, &str)] = &[
-    ("generic/mill3", include_str!("../../../spec/machines/generic/mill3.toml")),
-    ("ufmg/plano-3r", include_str!("../../../spec/machines/ufmg/plano-3r.toml")),
-];
+include!(concat!(env!("OUT_DIR"), "/library.rs"));
 
 /// Ids of the built-in machines, in order.
 pub fn list() -> impl Iterator<Item = &'static str> {
@@ -22,6 +19,16 @@ pub fn builtin(id: &str) -> Option<Machine> {
     source(id).and_then(|text| parse(FileId(0), text).ok())
 }
 
+/// A built-in machine as its publication has it.
+pub fn reference(id: &str) -> Option<Machine> {
+    source(id).and_then(|text| parse_reference(FileId(0), text).ok())
+}
+
+/// The id that a misspelt one most likely means.
+pub fn suggestion(id: &str) -> Option<&'static str> {
+    crate::keys::suggestion(id, &list().collect::<Vec<_>>())
+}
+
 /// Whether what `--machine` was given is a path rather than an id. An id is `maker/model` of a built-in machine;
 /// everything else is looked up as a file.
 pub fn is_path(name: &str) -> bool {
@@ -32,12 +39,34 @@ pub fn is_path(name: &str) -> bool {
 mod tests {
     use super::*;
 
+    const SHOWN: &[&str] = &[
+        "abb/irb2400",
+        "comau/tricept806",
+        "fanuc/lr-mate-200id",
+        "generic/mill3",
+        "generic/mill5-ac-table",
+        "ufmg/plano-3r",
+        "unb/router",
+        "universal-robots/ur5",
+        "usp/2ups-prp",
+    ];
+
+    #[test]
+    fn the_catalogue() {
+        insta::assert_snapshot!(list().map(|id| format!("{id}  {}\n", builtin(id).unwrap().title)).collect::<String>());
+        assert_eq!(suggestion("abb/irb240"), Some("abb/irb2400"));
+    }
+
     #[test]
     fn every_file_is_good_and_named_as_it_says() {
         for id in list() {
             let machine = parse(FileId(0), source(id).unwrap()).unwrap_or_else(|e| panic!("{id}: {e:?}"));
             assert_eq!(machine.id, id);
-            insta::assert_snapshot!(id.replace('/', "_"), machine.describe());
+            parse_reference(FileId(0), source(id).unwrap()).unwrap_or_else(|e| panic!("{id}: {e:?}"));
+            assert!(!machine.source.is_empty() && !machine.joints.is_empty(), "{id}");
+            if SHOWN.contains(&id) {
+                insta::assert_snapshot!(id.replace('/', "_"), machine.describe());
+            }
         }
     }
 

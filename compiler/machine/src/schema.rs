@@ -1,94 +1,53 @@
 //! The machine file: what it may hold, and what is wrong with it when it doesn't.
 
-use crate::{Chain, Joint, JointKind, Kind, Machine, Orientation, Pose};
+use crate::cell::{Cell, Controller, Coupling, External, Rapid, Signal, Spindle, ToolData, Zones};
+use crate::five_axis::{Carrier, FiveAxis, Rotary};
+use crate::keys::{self, ROOT, suggestion};
+use crate::math::{Frame, norm, scale};
+use crate::prp::{SphericalAxis, TwoLegs, TwoLegsShape};
+use crate::tree::{self, Node, Value};
+use crate::{
+    Chain, DhRow, Joint, JointKind, Kind, Link, Machine, Opw, Orientation, ParallelWrist, Pose, Scara, Serial, Tricept,
+    TriceptShape,
+};
 use gr_text::{Diagnostic, FileId, Span, code};
-use serde::Deserialize;
-use toml::Spanned;
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct File {
-    format: Spanned<i64>,
-    id: Spanned<String>,
-    title: String,
-    kind: KindKey,
-    #[serde(default)]
-    source: String,
-    orientation: Option<OrientationKey>,
-    kinematics: Spanned<KinematicsTable>,
-    #[serde(default)]
-    start: StartTable,
-    #[serde(default)]
-    joint: Vec<Spanned<JointTable>>,
-}
-
-#[derive(Deserialize, Clone, Copy)]
-#[serde(rename_all = "kebab-case")]
-enum KindKey {
-    Mill,
-    Lathe,
-    Robot,
-}
-
-#[derive(Deserialize, Clone, Copy)]
-#[serde(rename_all = "kebab-case")]
-enum OrientationKey {
-    Fixed,
-    AbcEulerXyz,
-}
-
-#[derive(Deserialize, Clone, Copy, PartialEq)]
-enum ChainKey {
-    #[serde(rename = "cartesian")]
-    Cartesian,
-    #[serde(rename = "planar-3r")]
-    Planar3r,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct KinematicsTable {
-    kind: ChainKey,
-    links: Option<Spanned<Vec<f64>>>,
-}
-
-#[derive(Deserialize, Default)]
-#[serde(deny_unknown_fields, default)]
-struct StartTable {
-    position: [f64; 3],
-    rotation: [f64; 3],
-    joints: Option<Spanned<Vec<f64>>>,
-}
-
-#[derive(Deserialize, Clone, Copy, PartialEq)]
-#[serde(rename_all = "kebab-case")]
-enum JointKey {
-    Revolute,
-    Prismatic,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct JointTable {
-    name: String,
-    #[serde(rename = "type")]
-    kind: JointKey,
-    word: Option<Spanned<String>>,
-    min: Option<Spanned<f64>>,
-    max: Option<Spanned<f64>>,
-    speed: Option<Spanned<f64>>,
-    rapid: Option<Spanned<f64>>,
-}
+use std::ops::Range;
 
 /// Reads a machine file. Every fault found is in the list.
 pub fn parse(file: FileId, text: &str) -> Result<Machine, Vec<Diagnostic>> {
-    let raw: File = toml::from_str(text).map_err(|e| vec![syntax(file, &e)])?;
+    parse_as(file, text, false)
+}
+
+/// The same, with the file's `[reference]` laid over it: the model as its publication has it.
+pub fn parse_reference(file: FileId, text: &str) -> Result<Machine, Vec<Diagnostic>> {
+    parse_as(file, text, true)
+}
+
+fn parse_as(file: FileId, text: &str, reference: bool) -> Result<Machine, Vec<Diagnostic>> {
     let mut check = Check { file, found: Vec::new() };
-    let machine = check.machine(&raw);
+    let mut root = match tree::read(text) {
+        Ok(root) => root,
+        Err(e) => return Err(vec![syntax(file, &e)]),
+    };
+    check.extend(&mut root);
+    if !check.found.is_empty() {
+        return Err(check.found);
+    }
+    for (place, message) in keys::faults(&root, ROOT, "a machine file") {
+        check.found.push(Diagnostic::new(code::MACHINE_BAD_FILE, file, span(place), &[message]));
+    }
+    if !check.found.is_empty() {
+        return Err(check.found);
+    }
+    let overlay = root.remove("reference");
+    if let (true, Some(overlay)) = (reference, overlay) {
+        root.overlay(overlay);
+    }
+    let machine = check.machine(&root);
     if check.found.is_empty() { Ok(machine) } else { Err(check.found) }
 }
 
-fn span(range: std::ops::Range<usize>) -> Span {
+fn span(range: Range<usize>) -> Span {
     let clip = |v: usize| u32::try_from(v).unwrap_or(u32::MAX);
     Span::new(clip(range.start), clip(range.end))
 }
@@ -99,174 +58,577 @@ fn syntax(file: FileId, error: &toml::de::Error) -> Diagnostic {
     Diagnostic::new(code::MACHINE_BAD_FILE, file, place, &[message])
 }
 
+/// A kind of kinematics: keys it needs, keys it may have, its joints (`R`, `P`; empty = any).
+struct KindRow {
+    name: &'static str,
+    needs: &'static [&'static str],
+    may: &'static [&'static str],
+    joints: &'static str,
+    words: &'static str,
+}
+
+const KINDS: &[KindRow] = &[
+    KindRow { name: "cartesian", needs: &[], may: &[], joints: "", words: "one to nine joints, X Y Z U V W prismatic, A B C revolute" },
+    KindRow { name: "planar-3r", needs: &["links"], may: &[], joints: "RRR", words: "three revolute joints" },
+    KindRow { name: "scara", needs: &["links", "height"], may: &[], joints: "RRPR", words: "four joints: revolute, revolute, prismatic, revolute" },
+    KindRow { name: "opw", needs: &["lengths"], may: &["offsets", "signs"], joints: "RRRRRR", words: "six revolute joints" },
+    KindRow { name: "ur", needs: &["lengths"], may: &[], joints: "RRRRRR", words: "six revolute joints" },
+    KindRow { name: "five-axis", needs: &["rotary"], may: &["pivot"], joints: "PPPRR", words: "five joints: three prismatic, two revolute" },
+    KindRow {
+        name: "parallel-2ups-prp",
+        needs: &["base_joints", "platform_joints", "arm", "yaw", "universal", "spherical"],
+        may: &["spherical_axis", "reference_pose"],
+        joints: "PPP",
+        words: "three prismatic joints: two legs and the column",
+    },
+    KindRow {
+        name: "tricept",
+        needs: &["base_radius", "platform_radius", "wrist_offset", "flange_offset"],
+        may: &["first_leg", "model"],
+        joints: "PPPRRR",
+        words: "six joints: three prismatic legs, three revolute wrist axes",
+    },
+    KindRow { name: "dh", needs: &[], may: &["tip"], joints: "", words: "at least one joint, each with `dh`" },
+    KindRow { name: "mdh", needs: &[], may: &["tip"], joints: "", words: "at least one joint, each with `dh`" },
+    KindRow { name: "origins", needs: &[], may: &["tip"], joints: "", words: "at least one joint, each with `origin` and `axis`" },
+];
+
 struct Check {
     file: FileId,
     found: Vec<Diagnostic>,
 }
 
 impl Check {
-    fn value(&mut self, range: std::ops::Range<usize>, message: impl Into<String>) {
-        self.found.push(Diagnostic::new(code::MACHINE_BAD_VALUE, self.file, span(range), &[message.into()]));
+    fn fault(&mut self, code: gr_text::Code, place: &Range<usize>, args: &[String]) {
+        self.found.push(Diagnostic::new(code, self.file, span(place.clone()), args));
     }
 
-    fn machine(&mut self, raw: &File) -> Machine {
-        if *raw.format.get_ref() != 1 {
-            self.value(raw.format.span(), format!("format {} is not known; this program reads 1", raw.format.get_ref()));
+    fn value(&mut self, place: &Range<usize>, message: impl Into<String>) {
+        self.fault(code::MACHINE_BAD_VALUE, place, &[message.into()]);
+    }
+
+    /// Lays the file over the built-in machine it extends. Built-in files extend at most one other.
+    fn extend(&mut self, root: &mut Node) {
+        let Some(word) = root.get("extends").cloned() else { return };
+        let Some(id) = word.text() else { return };
+        let known: Vec<&str> = crate::list().collect();
+        let Some(base) = crate::source(id).and_then(|text| tree::read(text).ok()) else {
+            let hint = suggestion(id, &known).map_or("`gcc-robot machine list` shows the ids".into(), |s| format!("did you mean `{s}`?"));
+            self.fault(code::MACHINE_EXTENDS, &word.span, &[id.to_string(), hint]);
+            root.remove("extends");
+            return;
+        };
+        let mut base = base;
+        base.moved_to(&word.span);
+        base.remove("template");
+        if base.get("extends").is_some() {
+            self.extend(&mut base);
         }
-        if !good_id(raw.id.get_ref()) {
-            self.value(raw.id.span(), "an id is `maker/model` in lower-case letters, digits and `-`");
+        let over = std::mem::replace(root, base);
+        root.overlay(over);
+    }
+
+    fn machine(&mut self, raw: &Node) -> Machine {
+        if let Some(format) = raw.get("format")
+            && format.number() != Some(1.0)
+        {
+            self.value(&format.span, format!("format {} is not known; this program reads 1", format.number().unwrap_or(0.0)));
         }
-        let joints: Vec<Joint> = raw.joint.iter().map(|j| self.joint(j)).collect();
-        self.names(raw);
-        let chain = self.chain(raw);
+        let id = raw.get("id");
+        if let Some(id) = id.filter(|id| !id.text().is_some_and(good_id)) {
+            self.value(&id.span, "an id is `maker/model` in lower-case letters, digits and `-`");
+        }
+        let list = raw.get("joint").map_or(&[][..], Node::list);
+        self.finite(raw);
+        let joints: Vec<Joint> = list.iter().map(|j| self.joint(j)).collect();
+        self.names(list);
+        let chain = self.chain(raw, list, &joints);
         let machine = self.built(raw, joints, chain);
+        self.structure(raw, &machine);
         if self.found.is_empty() {
             self.start_agrees(raw, &machine);
         }
         machine
     }
 
-    fn built(&mut self, raw: &File, joints: Vec<Joint>, chain: Chain) -> Machine {
-        Machine {
-            id: raw.id.get_ref().clone(),
-            title: raw.title.clone(),
-            kind: match raw.kind {
-                KindKey::Mill => Kind::Mill,
-                KindKey::Lathe => Kind::Lathe,
-                KindKey::Robot => Kind::Robot,
+    /// Every number of the file.
+    fn finite(&mut self, node: &Node) {
+        match &node.value {
+            Value::Number(n) if !n.is_finite() => {
+                self.value(&node.span, "a value must be a finite number; leave a limit out when there is none");
+            }
+            Value::List(l) => l.iter().for_each(|n| self.finite(n)),
+            Value::Table(t) => t.iter().for_each(|e| self.finite(&e.node)),
+            _ => {}
+        }
+    }
+
+    fn built(&mut self, raw: &Node, joints: Vec<Joint>, chain: Chain) -> Machine {
+        let orientation = raw.get("orientation").and_then(Node::text).map(|o| match o {
+            "fixed" => Orientation::Fixed,
+            "abc-euler-xyz" => Orientation::AbcEulerXyz,
+            other => Orientation::SourceMachine(other.trim_start_matches("source-machine:").to_string()),
+        });
+        let start = raw.get("start");
+        let place = |key: &str| start.and_then(|s| s.array::<3>(key)).unwrap_or_default();
+        let start_joints = start.and_then(|s| s.get("joints")).and_then(|given| self.joint_values(given, &joints, "start"));
+        let cell = self.cell(raw, &joints);
+        let mut machine = Machine {
+            id: raw.string("id").unwrap_or_default(),
+            title: raw.string("title").unwrap_or_default(),
+            kind: match raw.get("kind").and_then(Node::text) {
+                Some("lathe") => Kind::Lathe,
+                Some("robot") => Kind::Robot,
+                _ => Kind::Mill,
             },
-            source: raw.source.clone(),
-            orientation: raw.orientation.map(|o| match o {
-                OrientationKey::Fixed => Orientation::Fixed,
-                OrientationKey::AbcEulerXyz => Orientation::AbcEulerXyz,
-            }),
-            start: Pose { position: raw.start.position, rotation: raw.start.rotation.map(f64::to_radians) },
-            start_joints: self.start_joints(raw, &joints),
+            source: raw.string("source").unwrap_or_default(),
+            orientation,
+            start: Pose { position: place("position"), rotation: place("rotation").map(f64::to_radians) },
+            start_joints,
+            structure: raw.string("structure"),
             chain,
             joints,
+            cell,
+        };
+        if start.is_none() {
+            default_start(&mut machine);
         }
+        machine
     }
 
     /// The two ways to give the start must mean the same.
-    fn start_agrees(&mut self, raw: &File, machine: &Machine) {
-        let (Some(given), Some(joints)) = (&raw.start.joints, &machine.start_joints) else { return };
-        let Ok(pose) = machine.kinematics().forward(joints) else { return };
-        let same = pose.coordinates().iter().zip(machine.start.coordinates()).all(|(p, q)| (p - q).abs() < 1e-6);
-        if !same {
-            self.value(given.span(), "these joint values put the tool elsewhere than `position` and `rotation` say");
+    fn start_agrees(&mut self, raw: &Node, machine: &Machine) {
+        let given = raw.get("start").and_then(|s| s.get("joints"));
+        let (Some(given), Some(joints)) = (given, &machine.start_joints) else { return };
+        if raw.get("start").is_none_or(|s| s.get("position").is_none()) {
+            return;
+        }
+        let Ok(pose) = machine.kinematics().forward_frame(joints) else { return };
+        let (shift, turn) = pose.error_to(&machine.start.frame());
+        if norm(shift) > 1e-6 || norm(turn) > 1e-6 {
+            self.value(&given.span, "these joint values put the tool elsewhere than `position` and `rotation` say");
         }
     }
 
-    fn joint(&mut self, raw: &Spanned<JointTable>) -> Joint {
-        let j = raw.get_ref();
-        for v in [&j.min, &j.max, &j.speed, &j.rapid].into_iter().flatten() {
-            if !v.get_ref().is_finite() {
-                self.value(v.span(), "a limit must be a finite number; leave the key out when there is no limit");
+    fn structure(&mut self, raw: &Node, machine: &Machine) {
+        let Some(given) = raw.get("structure") else { return };
+        match crate::mobility(given.text().unwrap_or_default()) {
+            Err(e) => self.value(&given.span, e),
+            Ok(m) if m.freedom != machine.joints.len() as i64 => {
+                let args = [given.text().unwrap_or_default().to_string(), m.freedom.to_string(), machine.joints.len().to_string()];
+                self.fault(code::MACHINE_MOBILITY, &given.span, &args);
+            }
+            Ok(_) => {}
+        }
+    }
+
+    fn joint(&mut self, j: &Node) -> Joint {
+        for v in ["speed", "rapid", "acceleration"].into_iter().filter_map(|k| j.get(k)) {
+            if v.number().is_some_and(|n| n <= 0.0) {
+                self.value(&v.span, "a speed must be above zero");
             }
         }
-        for v in [&j.speed, &j.rapid].into_iter().flatten() {
-            if *v.get_ref() <= 0.0 {
-                self.value(v.span(), "a speed must be above zero");
-            }
-        }
-        if let (Some(min), Some(max)) = (&j.min, &j.max)
-            && min.get_ref() >= max.get_ref()
+        if let (Some(min), Some(max)) = (j.value_of("min"), j.get("max"))
+            && let Some(top) = max.number()
+            && min >= top
         {
-            self.value(max.span(), format!("max {} is not above min {}", max.get_ref(), min.get_ref()));
+            self.value(&max.span, format!("max {top} is not above min {min}"));
         }
-        let letter = j.word.as_ref().and_then(|w| match w.get_ref().as_bytes() {
+        let letter = j.get("word").and_then(|w| match w.text().unwrap_or_default().as_bytes() {
             [b @ b'A'..=b'Z'] => Some(*b as char),
             _ => {
-                self.value(w.span(), "a word is one upper-case letter");
+                self.value(&w.span, "a word is one upper-case letter");
                 None
             }
         });
-        let revolute = j.kind == JointKey::Revolute;
-        let unit = |v: &Option<Spanned<f64>>| v.as_ref().map(|v| if revolute { v.get_ref().to_radians() } else { *v.get_ref() });
+        let revolute = j.get("type").and_then(Node::text) == Some("revolute");
+        let unit = |key: &str| j.value_of(key).map(|v| if revolute { v.to_radians() } else { v });
         Joint {
-            name: j.name.clone(),
+            name: j.string("name").unwrap_or_default(),
             kind: if revolute { JointKind::Revolute } else { JointKind::Prismatic },
             word: letter,
-            min: unit(&j.min),
-            max: unit(&j.max),
-            speed: unit(&j.speed),
-            rapid: unit(&j.rapid),
+            min: unit("min"),
+            max: unit("max"),
+            speed: unit("speed"),
+            rapid: unit("rapid"),
+            acceleration: unit("acceleration"),
         }
     }
 
-    fn names(&mut self, raw: &File) {
-        for (i, joint) in raw.joint.iter().enumerate() {
-            let (earlier, this) = (&raw.joint[..i], joint.get_ref());
-            if earlier.iter().any(|e| e.get_ref().name == this.name) {
-                self.value(joint.span(), format!("there is another joint with the name `{}`", this.name));
+    fn names(&mut self, list: &[Node]) {
+        for (i, joint) in list.iter().enumerate() {
+            let earlier = &list[..i];
+            let same = |key: &str| joint.string(key).is_some() && earlier.iter().any(|e| e.string(key) == joint.string(key));
+            let name = joint.string("name").unwrap_or_default();
+            if same("name") {
+                self.value(&joint.span, format!("there is another joint with the name `{name}`"));
             }
-            let word = |j: &JointTable| j.word.as_ref().map(|w| w.get_ref().clone());
-            if word(this).is_some() && earlier.iter().any(|e| word(e.get_ref()) == word(this)) {
-                self.value(joint.span(), format!("there is another joint with the word of `{}`", this.name));
+            if same("word") {
+                self.value(&joint.span, format!("there is another joint with the word of `{name}`"));
             }
         }
     }
 
-    fn chain(&mut self, raw: &File) -> Chain {
-        let table = raw.kinematics.get_ref();
-        let kinds: Vec<JointKey> = raw.joint.iter().map(|j| j.get_ref().kind).collect();
-        let (fits, name, needs) = match table.kind {
-            ChainKey::Planar3r => {
-                (kinds == [JointKey::Revolute; 3], "planar-3r", "three revolute joints")
-            }
-            ChainKey::Cartesian => (cartesian(&kinds), "cartesian", "one to nine joints, X Y Z U V W prismatic, A B C revolute"),
+    fn chain(&mut self, raw: &Node, list: &[Node], joints: &[Joint]) -> Chain {
+        let none = Chain::Incomplete { kind: String::new(), missing: Vec::new(), joints: joints.len() };
+        let Some(table) = raw.get("kinematics") else { return none };
+        let Some(row) = KINDS.iter().find(|k| table.string("kind").as_deref() == Some(k.name)) else { return none };
+        let kinds: String = joints.iter().map(|j| if j.kind == JointKind::Revolute { 'R' } else { 'P' }).collect();
+        let fits = match row.name {
+            "cartesian" => cartesian(joints),
+            _ if row.joints.is_empty() => !kinds.is_empty() && kinds.len() <= 32,
+            _ => kinds == row.joints,
         };
         if !fits {
-            let has = format!("{} ({} revolute)", kinds.len(), kinds.iter().filter(|k| **k == JointKey::Revolute).count());
-            let args = [name.to_string(), needs.to_string(), has];
-            self.found.push(Diagnostic::new(code::MACHINE_JOINTS, self.file, span(raw.kinematics.span()), &args));
+            let has = format!("{} ({} revolute)", kinds.len(), kinds.matches('R').count());
+            self.fault(code::MACHINE_JOINTS, &table.span, &[row.name.to_string(), row.words.to_string(), has]);
         }
-        match table.kind {
-            ChainKey::Cartesian => {
-                if let Some(links) = &table.links {
-                    self.value(links.span(), "`cartesian` has no links");
+        for e in table.entries() {
+            let own = |k: &&&str| **k == e.key;
+            if e.key != "kind" && row.needs.iter().find(own).is_none() && row.may.iter().find(own).is_none() {
+                self.value(&e.key_span, format!("`{}` has no `{}`", row.name, e.key));
+            }
+        }
+        let missing: Vec<String> = row.needs.iter().filter(|k| table.get(k).is_none()).map(|k| (*k).to_string()).collect();
+        if !missing.is_empty() {
+            if raw.get("template").and_then(Node::flag) != Some(true) {
+                self.fault(code::MACHINE_MISSING_KEY, &table.span, &[row.name.to_string(), missing.join("`, `")]);
+            }
+            return Chain::Incomplete { kind: row.name.to_string(), missing, joints: joints.len() };
+        }
+        if !fits {
+            return none;
+        }
+        self.kinematics(row.name, table, list, joints).unwrap_or(none)
+    }
+
+    fn kinematics(&mut self, kind: &str, table: &Node, list: &[Node], joints: &[Joint]) -> Option<Chain> {
+        let number = |key: &str| table.value_of(key).unwrap_or(0.0);
+        Some(match kind {
+            "cartesian" => Chain::Cartesian,
+            "planar-3r" => {
+                let l = self.lengths::<3>(table, "links", "three lengths above zero: upper arm, forearm, tool", |l| l[0] > 0.0 && l[1] > 0.0 && l[2] >= 0.0)?;
+                Chain::Planar3r(l)
+            }
+            "scara" => {
+                let l = self.lengths::<2>(table, "links", "two lengths above zero", |l| l[0] > 0.0 && l[1] > 0.0)?;
+                Chain::Scara(Scara::new(l, number("height")))
+            }
+            "opw" => self.opw(table)?,
+            "ur" => {
+                let good = |l: &[f64; 6]| l[1] != 0.0 && l[2] != 0.0;
+                Chain::ParallelWrist(ParallelWrist::new(self.lengths::<6>(table, "lengths", "six: d1 a2 a3 d4 d5 d6, a2 and a3 not zero", good)?))
+            }
+            "five-axis" => self.five_axis(table)?,
+            "parallel-2ups-prp" => self.two_legs(table, joints)?,
+            "tricept" => {
+                for key in ["base_radius", "platform_radius", "flange_offset", "wrist_offset"] {
+                    if let Some(n) = table.get(key).filter(|n| n.number().is_some_and(|v| v < 0.0 || (v == 0.0 && key.ends_with("radius")))) {
+                        self.value(&n.span, format!("`{key}` must be above zero"));
+                    }
                 }
-                Chain::Cartesian
+                let shape = TriceptShape {
+                    base_radius: number("base_radius"),
+                    platform_radius: number("platform_radius"),
+                    wrist_offset: number("wrist_offset"),
+                    flange_offset: number("flange_offset"),
+                    first: number("first_leg").to_radians(),
+                };
+                Chain::Tricept(Tricept { shape, reference: table.string("model").as_deref() == Some("reference") })
             }
-            ChainKey::Planar3r => Chain::Planar3r(self.links(raw, table)),
+            _ => Chain::Serial(self.serial(kind, table, list, joints)?),
+        })
+    }
+
+    fn lengths<const N: usize>(&mut self, table: &Node, key: &str, what: &str, good: impl Fn(&[f64; N]) -> bool) -> Option<[f64; N]> {
+        let given = table.get(key)?;
+        match table.array::<N>(key).filter(&good) {
+            Some(l) => {
+                let most = l.iter().fold(0.0f64, |m, v| m.max(v.abs()));
+                if most < 10.0 && kind_is_arm(table) {
+                    self.value(&given.span, format!("the longest of `{key}` is {most}: lengths are in mm, these look like metres"));
+                }
+                Some(l)
+            }
+            None => {
+                self.value(&given.span, format!("`{key}` are {what}"));
+                None
+            }
         }
     }
 
-    fn links(&mut self, raw: &File, table: &KinematicsTable) -> [f64; 3] {
-        let Some(links) = &table.links else {
-            self.value(raw.kinematics.span(), "`links` is missing: upper arm, forearm, tool in mm");
-            return [1.0; 3];
+    fn opw(&mut self, table: &Node) -> Option<Chain> {
+        let good = |l: &[f64; 7]| l[4] > 0.0 && libm::hypot(l[1], l[5]) > 0.0;
+        let lengths = self.lengths::<7>(table, "lengths", "seven: a1 a2 b c1 c2 c3 c4, with c2 and the forearm above zero", good)?;
+        let signs = table.array::<6>("signs").unwrap_or([1.0; 6]);
+        if signs.iter().any(|s| s.abs() != 1.0) {
+            self.value(&table.get("signs")?.span, "a sign is 1 or -1");
+        }
+        let offsets = table.array::<6>("offsets").unwrap_or_default().map(f64::to_radians);
+        Some(Chain::Opw(Opw::new(lengths, offsets, signs)))
+    }
+
+    fn five_axis(&mut self, table: &Node) -> Option<Chain> {
+        let given = table.get("rotary")?;
+        let mut all = Vec::new();
+        for r in given.list() {
+            let unit = match r.string("axis").as_deref() {
+                Some("A") => [1.0, 0.0, 0.0],
+                Some("B") => [0.0, 1.0, 0.0],
+                _ => [0.0, 0.0, 1.0],
+            };
+            let v = r.array::<3>("direction").unwrap_or(unit);
+            if norm(v) < 1e-9 {
+                self.value(&r.span, "`direction` has no length");
+                return None;
+            }
+            let on = if r.string("on").as_deref() == Some("head") { Carrier::Head } else { Carrier::Table };
+            all.push(Rotary { on, axis: scale(v, 1.0 / norm(v)), point: r.array::<3>("point").unwrap_or_default() });
+        }
+        let Ok(rotary) = <[Rotary; 2]>::try_from(all) else {
+            self.value(&given.span, "`rotary` are two axes, the one nearer to the bed first");
+            return None;
         };
-        match links.get_ref()[..] {
-            [a, b, c] if [a, b, c].iter().all(|l| l.is_finite()) && a > 0.0 && b > 0.0 && c >= 0.0 => [a, b, c],
-            _ => {
-                self.value(links.span(), "`links` are three lengths above zero: upper arm, forearm, tool");
-                [1.0; 3]
-            }
-        }
-    }
-
-    fn start_joints(&mut self, raw: &File, joints: &[Joint]) -> Option<Vec<f64>> {
-        let given = raw.start.joints.as_ref()?;
-        if given.get_ref().len() != joints.len() {
-            self.value(given.span(), format!("{} start values for {} joints", given.get_ref().len(), joints.len()));
+        if norm(crate::math::cross(rotary[0].axis, rotary[1].axis)) < 1e-6 {
+            self.value(&given.span, "the two rotary axes are parallel");
             return None;
         }
-        let mut values = Vec::with_capacity(joints.len());
-        for (v, j) in given.get_ref().iter().zip(joints) {
-            let v = if j.kind == JointKind::Revolute { v.to_radians() } else { *v };
-            if !j.allows(v) || !v.is_finite() {
-                self.value(given.span(), format!("the start value of joint `{}` is outside its limits", j.name));
+        Some(Chain::FiveAxis(FiveAxis::new(rotary, table.value_of("pivot").unwrap_or(0.0))))
+    }
+
+    fn two_legs(&mut self, table: &Node, joints: &[Joint]) -> Option<Chain> {
+        let points = |key: &str| -> Option<[[f64; 3]; 2]> {
+            let list: Vec<[f64; 3]> = table.get(key)?.list().iter().filter_map(|p| p.numbers().try_into().ok()).collect();
+            list.try_into().ok()
+        };
+        let limits = |j: &Joint| (j.min.unwrap_or(f64::NEG_INFINITY), j.max.unwrap_or(f64::INFINITY));
+        for key in ["arm", "yaw"] {
+            let node = table.get(key)?;
+            if node.numbers().first() >= node.numbers().get(1) {
+                self.value(&node.span, format!("`{key}` is the least and the greatest value"));
             }
-            values.push(v);
         }
-        Some(values)
+        let (base, platform) = (points("base_joints")?, points("platform_joints")?);
+        if base[0] == base[1] || platform[0] == platform[1] {
+            self.value(&table.get("base_joints")?.span, "both legs have the same joint: the machine can't hold its yaw");
+            return None;
+        }
+        let ([a, b], [y, z]) = (table.array::<2>("arm")?, table.array::<2>("yaw")?.map(f64::to_radians));
+        let reference = table.array::<3>("reference_pose").map_or([(a + b) / 2.0, 0.0, 0.0], |r| [r[0], r[1].to_radians(), r[2]]);
+        let shape = TwoLegsShape {
+            base,
+            platform,
+            arm: (a, b),
+            yaw: (y, z),
+            legs: [limits(&joints[0]), limits(&joints[1])],
+            column: limits(&joints[2]),
+            universal: table.value_of("universal")?.to_radians(),
+            spherical: table.value_of("spherical")?.to_radians(),
+            spherical_axis: match table.string("spherical_axis").as_deref() {
+                Some("base") => SphericalAxis::Base,
+                _ => SphericalAxis::Platform,
+            },
+            reference,
+        };
+        Some(Chain::TwoLegs(Box::new(TwoLegs { shape })))
+    }
+
+    fn serial(&mut self, kind: &str, table: &Node, list: &[Node], joints: &[Joint]) -> Option<Serial> {
+        let tip = table.array::<6>("tip").map_or(Frame::IDENTITY, six);
+        let limits = |j: &Joint| (j.min.unwrap_or(f64::NEG_INFINITY), j.max.unwrap_or(f64::INFINITY));
+        let (mut rows, mut links) = (Vec::new(), Vec::new());
+        for (node, joint) in list.iter().zip(joints) {
+            let wanted = if kind == "origins" { "origin" } else { "dh" };
+            if node.get(wanted).is_none() {
+                self.fault(code::MACHINE_MISSING_KEY, &node.span, &[kind.to_string(), wanted.to_string()]);
+                continue;
+            }
+            if let Some([a, d, alpha, theta]) = node.array::<4>("dh") {
+                rows.push((DhRow { a, d, alpha: alpha.to_radians(), theta: theta.to_radians() }, joint.kind, limits(joint)));
+            }
+            if let Some(origin) = node.array::<6>("origin") {
+                let axis = node.array::<3>("axis").unwrap_or([0.0, 0.0, 1.0]);
+                if norm(axis) < 1e-9 {
+                    self.value(&node.span, "`axis` has no length");
+                    continue;
+                }
+                links.push(Link { origin: six(origin), axis: scale(axis, 1.0 / norm(axis)), kind: joint.kind, limits: limits(joint) });
+            }
+        }
+        Some(match kind {
+            "dh" => {
+                let chain = Serial::dh(&rows);
+                let end = chain.tip().then(&tip);
+                Serial::new(chain.links().to_vec(), end)
+            }
+            "mdh" => Serial::mdh(&rows, tip),
+            _ => Serial::new(links, tip),
+        })
+    }
+
+    fn joint_values(&mut self, given: &Node, joints: &[Joint], what: &str) -> Option<Vec<f64>> {
+        let values = given.numbers();
+        if values.len() != joints.len() {
+            self.value(&given.span, format!("{} {what} values for {} joints", values.len(), joints.len()));
+            return None;
+        }
+        let mut out = Vec::with_capacity(values.len());
+        for (v, j) in values.into_iter().zip(joints) {
+            let v = if j.kind == JointKind::Revolute { v.to_radians() } else { v };
+            if !j.allows(v) || !v.is_finite() {
+                self.value(&given.span, format!("the {what} value of joint `{}` is outside its limits", j.name));
+            }
+            out.push(v);
+        }
+        Some(out)
+    }
+
+    fn cell(&mut self, raw: &Node, joints: &[Joint]) -> Cell {
+        let frames = raw.get("frames");
+        let frame = |key: &str| frames.and_then(|f| f.get(key)).map_or(Frame::IDENTITY, place);
+        let list = |key: &str| raw.get(key).map_or(&[][..], Node::list);
+        let home = raw.get("home").and_then(|h| h.get("joints"));
+        let home = home.and_then(|given| self.joint_values(given, joints, "home"));
+        let whole = |t: &Node, key: &str| t.value_of(key).map(|v| v as u64);
+        let controller = raw.get("controller").map_or(Controller::default(), |c| Controller {
+            name: c.string("name"),
+            lines: whole(c, "lines"),
+            points: whole(c, "points"),
+            bytes: whole(c, "bytes"),
+        });
+        let number = |table: &str, key: &str| raw.get(table).and_then(|t| t.value_of(key));
+        Cell {
+            base: frame("base"),
+            table: frame("table"),
+            part: frame("part"),
+            frames: list("frame").iter().map(|f| (f.string("name").unwrap_or_default(), place(f))).collect(),
+            tools: self.tools(list("tool")),
+            spindle: raw.get("spindle").and_then(|s| self.spindle(s)),
+            external: list("external").iter().filter_map(|e| self.external(e)).collect(),
+            home,
+            coupling: raw.get("coupling").and_then(|c| self.coupling(c, joints)),
+            controller,
+            io: raw.get("io").map_or(&[][..], Node::entries).iter().map(|e| (e.key.clone(), signal(&e.node))).collect(),
+            rapid: raw.get("rapid").and_then(Node::text).map(|r| if r == "joint" { Rapid::Joint } else { Rapid::Linear }),
+            rapid_speed: number("speed", "rapid"),
+            joint_speed: number("speed", "joint"),
+            zones: Zones { default: number("zone", "default"), max: number("zone", "max") },
+        }
+    }
+
+    fn tools(&mut self, list: &[Node]) -> std::collections::BTreeMap<u32, ToolData> {
+        let mut out = std::collections::BTreeMap::new();
+        for t in list {
+            let number = t.value_of("number").unwrap_or(0.0) as u32;
+            let tool = ToolData {
+                name: t.string("name").unwrap_or_default(),
+                frame: place(t),
+                diameter: t.value_of("diameter"),
+                mass: t.value_of("mass"),
+            };
+            if out.insert(number, tool).is_some() {
+                self.value(&t.span, format!("there is another tool {number}"));
+            }
+        }
+        out
+    }
+
+    fn spindle(&mut self, s: &Node) -> Option<Spindle> {
+        let speed = (s.value_of("min_speed"), s.value_of("max_speed"));
+        if let (Some(min), Some(max)) = speed
+            && min > max
+        {
+            self.value(&s.get("max_speed")?.span, format!("max_speed {max} is below min_speed {min}"));
+        }
+        Some(Spindle { frame: place(s), speed, controlled: s.get("controlled").and_then(Node::flag).unwrap_or(true) })
+    }
+
+    fn external(&mut self, e: &Node) -> Option<External> {
+        let joint = self.joint(e);
+        let axis = e.array::<3>("axis").unwrap_or([0.0, 0.0, 1.0]);
+        if norm(axis) < 1e-9 {
+            self.value(&e.span, "`axis` has no length");
+            return None;
+        }
+        Some(External {
+            joint,
+            carries_machine: e.string("carries").as_deref() == Some("machine"),
+            axis: scale(axis, 1.0 / norm(axis)),
+            point: e.array::<3>("point").unwrap_or_default(),
+        })
+    }
+
+    fn coupling(&mut self, c: &Node, joints: &[Joint]) -> Option<Coupling> {
+        let names: Vec<&str> = joints.iter().map(|j| j.name.as_str()).collect();
+        let mut index = |key: &str| {
+            let node = c.get(key)?;
+            let name = node.text()?;
+            let found = names.iter().position(|n| *n == name);
+            if found.is_none() {
+                let hint = suggestion(name, &names).map_or(String::new(), |s| format!("; did you mean `{s}`?"));
+                self.value(&node.span, format!("there is no joint `{name}`{hint}"));
+            }
+            found
+        };
+        let (joint, with) = (index("joint"), index("with"));
+        let (joint, with) = (joint?, with?);
+        if joint == with {
+            self.value(&c.span, "a joint can't be coupled with itself");
+        }
+        let angle = |key: &str| c.value_of(key).map(f64::to_radians);
+        Some(Coupling { joint, with, factor: c.value_of("factor")?, min: angle("min"), max: angle("max") })
     }
 }
 
-fn cartesian(kinds: &[JointKey]) -> bool {
-    (1..=9).contains(&kinds.len())
-        && kinds.iter().enumerate().all(|(i, k)| ((3..6).contains(&i)) == (*k == JointKey::Revolute))
+/// An arm of which the file says no start begins at home, or with its joints at 0 or their nearest limit.
+fn default_start(machine: &mut Machine) {
+    if matches!(machine.chain, Chain::Cartesian | Chain::Planar3r(_) | Chain::Incomplete { .. }) {
+        return;
+    }
+    let nearest = |j: &Joint| 0f64.max(j.min.unwrap_or(f64::NEG_INFINITY)).min(j.max.unwrap_or(f64::INFINITY));
+    let joints = machine.cell.home.clone().unwrap_or_else(|| machine.joints.iter().map(nearest).collect());
+    if let Ok(pose) = machine.kinematics().forward(&joints) {
+        (machine.start, machine.start_joints) = (pose, Some(joints));
+    }
+}
+
+fn kind_is_arm(table: &Node) -> bool {
+    matches!(table.string("kind").as_deref(), Some("opw" | "ur" | "scara"))
+}
+
+fn signal(t: &Node) -> Signal {
+    let signal = t.string("signal");
+    Signal {
+        value: t.value_of("value").or(signal.as_ref().map(|_| 1.0)),
+        signal,
+        routine: t.string("routine"),
+        wait: t.string("wait"),
+        seconds: t.value_of("seconds"),
+    }
+}
+
+fn place(t: &Node) -> Frame {
+    let [x, y, z] = t.array::<3>("position").unwrap_or_default();
+    let [a, b, c] = t.array::<3>("rotation").unwrap_or_default();
+    six([x, y, z, a, b, c])
+}
+
+fn six([x, y, z, a, b, c]: [f64; 6]) -> Frame {
+    Frame { turn: square_euler([a, b, c]), position: [x, y, z] }
+}
+
+/// Turns in degrees; quarter turns come out without rounding.
+fn square_euler(degrees: [f64; 3]) -> crate::math::M3 {
+    let mut turn = crate::math::euler(degrees.map(f64::to_radians));
+    if degrees.iter().all(|d| d % 90.0 == 0.0) {
+        turn.iter_mut().flatten().for_each(|v| *v = libm::round(*v));
+    }
+    turn
+}
+
+fn cartesian(joints: &[Joint]) -> bool {
+    (1..=9).contains(&joints.len())
+        && joints.iter().enumerate().all(|(i, j)| ((3..6).contains(&i)) == (j.kind == JointKind::Revolute))
 }
 
 fn good_id(id: &str) -> bool {
@@ -296,7 +658,7 @@ mod tests {
             parse(FileId(0), good).unwrap_or_else(|e| panic!("{}: {e:?}", row.code));
             tried += 1;
         }
-        assert_eq!(tried, 3);
+        assert_eq!(tried, 6);
     }
 
     #[test]

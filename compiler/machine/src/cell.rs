@@ -1,0 +1,225 @@
+//! What surrounds the joints of a machine: tools, frames, spindle, signals, external axes, controller.
+
+use crate::math::Frame;
+use crate::{Joint, short};
+use std::collections::BTreeMap;
+
+/// Everything a machine file says besides joints and kinematics.
+#[derive(Clone, PartialEq, Debug, Default)]
+pub struct Cell {
+    /// Base of the machine in the cell.
+    pub base: Frame,
+    /// Table in the base.
+    pub table: Frame,
+    /// Part on the table.
+    pub part: Frame,
+    /// Named frames in the base, for G54 … G59.3 and robot programs.
+    pub frames: BTreeMap<String, Frame>,
+    /// Tools, by number.
+    pub tools: BTreeMap<u32, ToolData>,
+    /// Spindle on the flange.
+    pub spindle: Option<Spindle>,
+    /// Rails and positioners.
+    pub external: Vec<External>,
+    /// Joint values of the home position, mm or rad.
+    pub home: Option<Vec<f64>>,
+    /// Two joints that the controller counts together.
+    pub coupling: Option<Coupling>,
+    /// Limits of the controller's files.
+    pub controller: Controller,
+    /// What M words do, by word: `M3`, `S`, `M62` …
+    pub io: BTreeMap<String, Signal>,
+    /// How a rapid is made.
+    pub rapid: Option<Rapid>,
+    /// Speed of a rapid of the tool point, mm/s.
+    pub rapid_speed: Option<f64>,
+    /// Joint speed of a rapid, per cent of the greatest.
+    pub joint_speed: Option<f64>,
+    /// Corner zones.
+    pub zones: Zones,
+}
+
+/// A tool.
+#[derive(Clone, PartialEq, Debug)]
+pub struct ToolData {
+    /// Its name on the controller.
+    pub name: String,
+    /// Its point and direction in the spindle, or on the flange where there is no spindle.
+    pub frame: Frame,
+    /// Diameter, mm.
+    pub diameter: Option<f64>,
+    /// Mass, kg.
+    pub mass: Option<f64>,
+}
+
+/// A spindle.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Spindle {
+    /// Its nose on the flange.
+    pub frame: Frame,
+    /// Turns per minute.
+    pub speed: (Option<f64>, Option<f64>),
+    /// Whether the control can switch it.
+    pub controlled: bool,
+}
+
+/// An axis outside the arm.
+#[derive(Clone, PartialEq, Debug)]
+pub struct External {
+    /// Name, type, limits and speeds.
+    pub joint: Joint,
+    /// Carries the machine (rail) rather than the part (positioner).
+    pub carries_machine: bool,
+    /// Unit vector.
+    pub axis: [f64; 3],
+    /// A point on it, mm.
+    pub point: [f64; 3],
+}
+
+/// The controller counts a joint together with another: its value = joint + factor · with.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Coupling {
+    /// Index of the joint whose value differs.
+    pub joint: usize,
+    /// Index of the other.
+    pub with: usize,
+    /// −1 on FANUC arms, 1 on arms with a parallelogram.
+    pub factor: f64,
+    /// Least value on the controller; none = the joint's own.
+    pub min: Option<f64>,
+    /// Greatest value on the controller; none = the joint's own.
+    pub max: Option<f64>,
+}
+
+/// What a controller's program files may hold.
+#[derive(Clone, PartialEq, Debug, Default)]
+pub struct Controller {
+    /// For people: `IRC5`.
+    pub name: Option<String>,
+    /// Lines per file.
+    pub lines: Option<u64>,
+    /// Points per file.
+    pub points: Option<u64>,
+    /// Bytes per file.
+    pub bytes: Option<u64>,
+}
+
+/// What a word does.
+#[derive(Clone, PartialEq, Debug, Default)]
+pub struct Signal {
+    /// Output that is set.
+    pub signal: Option<String>,
+    /// To this value.
+    pub value: Option<f64>,
+    /// Routine that is called.
+    pub routine: Option<String>,
+    /// Input that is waited for.
+    pub wait: Option<String>,
+    /// For at most or at least this long, s.
+    pub seconds: Option<f64>,
+}
+
+/// How a rapid is made.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Rapid {
+    /// All joints start and stop together.
+    Joint,
+    /// In a straight line of the tool point.
+    Linear,
+}
+
+/// Corner zones, mm.
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
+pub struct Zones {
+    /// Where the program doesn't say.
+    pub default: Option<f64>,
+    /// Never more.
+    pub max: Option<f64>,
+}
+
+impl Cell {
+    /// The part's frame in the base.
+    pub fn part_in_base(&self) -> Frame {
+        self.table.then(&self.part)
+    }
+    /// Tool point on the flange: spindle, then tool. An unknown tool is the spindle's nose.
+    pub fn tool_frame(&self, number: u32) -> Frame {
+        let nose = self.spindle.as_ref().map_or(Frame::IDENTITY, |s| s.frame);
+        self.tools.get(&number).map_or(nose, |t| nose.then(&t.frame))
+    }
+
+    pub(crate) fn describe(&self, joints: &[Joint]) -> String {
+        let mut out = String::new();
+        let frame = |f: &Frame| {
+            let p = crate::Pose::from_frame(f);
+            let turn = p.rotation.map(|r| short(r.to_degrees())).join(", ");
+            format!("{} mm, turned {turn}°", p.position.map(short).join(", "))
+        };
+        for (name, f) in [("base", &self.base), ("table", &self.table), ("part", &self.part)] {
+            if *f != Frame::IDENTITY {
+                out += &format!("{name} at {}\n", frame(f));
+            }
+        }
+        for (name, f) in &self.frames {
+            out += &format!("frame {name} at {}\n", frame(f));
+        }
+        if let Some(s) = &self.spindle {
+            let turns = |v: Option<f64>| v.map_or("no limit".into(), short);
+            let switch = if s.controlled { "" } else { ", switched by hand" };
+            out += &format!("spindle at {}, {} to {} rev/min{switch}\n", frame(&s.frame), turns(s.speed.0), turns(s.speed.1));
+        }
+        for (number, t) in &self.tools {
+            out += &format!("tool {number} {}: point at {}\n", t.name, frame(&t.frame));
+        }
+        for e in &self.external {
+            let limit = |v: Option<f64>| v.map_or("no limit".into(), |v| e.joint.show(v));
+            let what = if e.carries_machine { "carries the machine" } else { "carries the part" };
+            out += &format!("external axis {}: from {} to {}, {what}\n", e.joint.name, limit(e.joint.min), limit(e.joint.max));
+        }
+        if let (Some(c), true) = (&self.coupling, !joints.is_empty()) {
+            let name = |i: usize| joints.get(i).map_or("", |j| j.name.as_str());
+            let sign = if c.factor < 0.0 { "−" } else { "+" };
+            out += &format!("the controller's {0} is {0} {sign} {1}\n", name(c.joint), name(c.with));
+        }
+        if let Some(home) = &self.home {
+            out += &format!("home: {}\n", joints.iter().zip(home).map(|(j, v)| j.show(*v)).collect::<Vec<_>>().join(", "));
+        }
+        for (word, s) in &self.io {
+            out += &format!("{word}: {}\n", s.describe());
+        }
+        out + &self.controller.describe()
+    }
+}
+
+impl Controller {
+    fn describe(&self) -> String {
+        let limits = [("lines", self.lines), ("points", self.points), ("bytes", self.bytes)];
+        let limits: Vec<String> = limits.iter().filter_map(|(what, n)| n.map(|n| format!("{n} {what}"))).collect();
+        match (&self.name, limits.is_empty()) {
+            (None, true) => String::new(),
+            (name, true) => format!("controller: {}\n", name.as_deref().unwrap_or("")),
+            (name, false) => {
+                format!("controller: {}, at most {} per file\n", name.as_deref().unwrap_or("not named"), limits.join(", "))
+            }
+        }
+    }
+}
+
+impl Signal {
+    fn describe(&self) -> String {
+        let mut parts = Vec::new();
+        if let Some(r) = &self.routine {
+            parts.push(format!("calls {r}"));
+        }
+        if let Some(s) = &self.signal {
+            parts.push(self.value.map_or(format!("sets {s}"), |v| format!("sets {s} to {}", short(v))));
+        }
+        if let Some(w) = &self.wait {
+            parts.push(format!("waits for {w}"));
+        }
+        if let Some(s) = self.seconds {
+            parts.push(format!("{} s", short(s)));
+        }
+        parts.join(", ")
+    }
+}

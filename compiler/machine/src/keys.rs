@@ -1,0 +1,463 @@
+//! The keys of a machine file: their names, types and meanings. The reader checks against these tables, and the
+//! JSON Schema for editors is made from them, so the two can't differ.
+
+use crate::tree::{Node, Value};
+use std::fmt::Write as _;
+use std::ops::Range;
+
+/// Type of a value.
+#[derive(Clone, Copy)]
+pub(crate) enum Type {
+    Text,
+    Number,
+    Whole,
+    Flag,
+    /// One of these words.
+    Choice(&'static [&'static str]),
+    /// One of these words, or something that starts with the last one.
+    Open(&'static [&'static str]),
+    /// A list of this many numbers; 0 = any.
+    Numbers(usize),
+    /// A list of this many lists of three numbers.
+    Points(usize),
+    Table(&'static [Key]),
+    /// A table in which no key is required.
+    Part(&'static [Key]),
+    Tables(&'static [Key]),
+    /// Tables by free keys.
+    Map(&'static [Key]),
+}
+
+pub(crate) struct Key {
+    pub name: &'static str,
+    pub kind: Type,
+    pub required: bool,
+    pub doc: &'static str,
+}
+
+const fn key(name: &'static str, kind: Type, doc: &'static str) -> Key {
+    Key { name, kind, required: false, doc }
+}
+const fn must(name: &'static str, kind: Type, doc: &'static str) -> Key {
+    Key { name, kind, required: true, doc }
+}
+
+use Type::{Choice, Flag, Map, Number, Numbers, Open, Part, Points, Table, Tables, Text, Whole};
+
+pub(crate) const KINDS: &[&str] = &[
+    "cartesian", "planar-3r", "scara", "opw", "ur", "five-axis", "parallel-2ups-prp", "tricept", "dh", "mdh", "origins",
+];
+
+pub(crate) static ROOT: &[Key] = &[
+    must("format", Whole, "Version of the format: 1."),
+    must("id", Text, "`maker/model`, lower case."),
+    key("extends", Text, "Id of a built-in machine; what this file says is laid over it."),
+    key("template", Flag, "This file is to be extended; keys may be missing."),
+    must("title", Text, "Name for people."),
+    must("kind", Choice(&["mill", "lathe", "robot"]), "Sort of machine."),
+    key("source", Text, "Where the numbers come from."),
+    key("orientation", Open(&["fixed", "abc-euler-xyz", "source-machine:"]), "What the words A B C mean on a robot."),
+    key("structure", Text, "Structure of the mechanism, `2UPS+PRP`; its degrees of freedom must equal the joints."),
+    key("rapid", Choice(&["joint", "linear"]), "How a rapid move is made."),
+    must("kinematics", Table(KINEMATICS), "How the joints carry the tool."),
+    key("start", Table(START), "Where a program starts."),
+    key("home", Table(HOME), "Home position."),
+    key("joint", Tables(JOINT), "Joints, from the base to the tool."),
+    key("external", Tables(EXTERNAL), "Rails and positioners."),
+    key("coupling", Table(COUPLING), "Two joints that the controller counts together."),
+    key("frames", Table(FRAMES), "Base, table and part."),
+    key("frame", Tables(FRAME), "More frames in the base, by name: `G54`, `fixture` …"),
+    key("spindle", Table(SPINDLE), "Spindle on the flange."),
+    key("tool", Tables(TOOL), "Tools and their points."),
+    key("speed", Table(SPEED), "Speeds where the program says nothing."),
+    key("zone", Table(ZONE), "Corner zones, mm."),
+    key("controller", Table(CONTROLLER), "Limits of the controller's files."),
+    key("io", Map(SIGNAL), "What M3 M4 M5 S M6 M7 M8 M9 M62 … M68 do."),
+    key("reference", Table(REFERENCE), "Laid over the file in the reference mode: the model of the publication."),
+];
+
+static KINEMATICS: &[Key] = &[
+    must("kind", Choice(KINDS), "Kind of kinematics."),
+    key("links", Numbers(0), "`planar-3r`: upper arm, forearm, tool; `scara`: two links, mm."),
+    key("height", Number, "`scara`: height of the tool at stroke 0, mm."),
+    key("lengths", Numbers(0), "`opw`: a1 a2 b c1 c2 c3 c4; `ur`: d1 a2 a3 d4 d5 d6, mm."),
+    key("offsets", Numbers(6), "`opw`: joint value at which the model angle is 0, degrees."),
+    key("signs", Numbers(6), "`opw`: direction of each joint, 1 or -1."),
+    key("rotary", Tables(ROTARY), "`five-axis`: two rotary axes, the one nearer to the bed first."),
+    key("pivot", Number, "`five-axis`: from the crossing of the head's axes to the spindle nose, mm."),
+    key("base_joints", Points(2), "`parallel-2ups-prp`: centres of the universal joints on the base, mm."),
+    key("platform_joints", Points(2), "`parallel-2ups-prp`: centres of the spherical joints on the platform, mm."),
+    key("arm", Numbers(2), "`parallel-2ups-prp`: least and greatest length of the arm, mm."),
+    key("yaw", Numbers(2), "`parallel-2ups-prp`: least and greatest yaw, degrees."),
+    key("universal", Number, "`parallel-2ups-prp`: greatest angle of the universal joints, degrees."),
+    key("spherical", Number, "`parallel-2ups-prp`: greatest angle of the spherical joints, degrees."),
+    key("spherical_axis", Choice(&["platform", "base"]), "`parallel-2ups-prp`: what the middle direction of the spherical joints belongs to."),
+    key("reference_pose", Numbers(3), "`parallel-2ups-prp`: arm length, yaw, height of the middle direction; mm, degrees."),
+    key("base_radius", Number, "`tricept`: radius of the base joints' circle, mm."),
+    key("platform_radius", Number, "`tricept`: radius of the platform joints' circle, mm."),
+    key("wrist_offset", Number, "`tricept`: from the platform to the centre of the wrist, mm."),
+    key("flange_offset", Number, "`tricept`: from the centre of the wrist to the flange, mm."),
+    key("first_leg", Number, "`tricept`: direction of the first leg from X, degrees."),
+    key("model", Choice(&["rigid", "reference"]), "`tricept`: rigid platform, or leg points by the source's equations."),
+    key("tip", Numbers(6), "`dh`, `mdh`, `origins`: flange in the last joint: x y z mm, turns about X Y Z degrees."),
+];
+
+static ROTARY: &[Key] = &[
+    must("on", Choice(&["table", "head"]), "Turns the part or the spindle."),
+    must("axis", Choice(&["A", "B", "C"]), "Its letter: A about X, B about Y, C about Z."),
+    key("direction", Numbers(3), "Vector along the axis, where it is not along X, Y or Z."),
+    key("point", Numbers(3), "A point on the axis of a table, mm."),
+];
+
+static START: &[Key] = &[
+    key("position", Numbers(3), "X Y Z, mm."),
+    key("rotation", Numbers(3), "Turns about X, Y, Z, degrees."),
+    key("joints", Numbers(0), "The same in joint values, mm or degrees."),
+];
+
+static HOME: &[Key] = &[must("joints", Numbers(0), "Joint values, mm or degrees.")];
+
+static JOINT: &[Key] = &[
+    must("name", Text, "Name, for people and for `extends`."),
+    must("type", Choice(&["revolute", "prismatic"]), "Turns or slides."),
+    key("word", Text, "Its word in joint-space G-code: one upper-case letter."),
+    key("min", Number, "Lower limit, mm or degrees."),
+    key("max", Number, "Upper limit, mm or degrees."),
+    key("speed", Number, "Greatest speed, mm/s or degrees/s."),
+    key("rapid", Number, "Speed of a rapid move; else `speed`."),
+    key("acceleration", Number, "Greatest acceleration, mm/s² or degrees/s²."),
+    key("dh", Numbers(4), "`dh`, `mdh`: a, d (mm), alpha, theta (degrees); the joint value adds to theta or d."),
+    key("origin", Numbers(6), "`origins`: frame in the joint before: x y z mm, turns about X Y Z degrees."),
+    key("axis", Numbers(3), "`origins`: vector it turns about or slides along."),
+];
+
+static EXTERNAL: &[Key] = &[
+    must("name", Text, "Name on the controller: `E1`."),
+    must("type", Choice(&["revolute", "prismatic"]), "Turns or slides."),
+    must("carries", Choice(&["machine", "part"]), "Rail or positioner."),
+    key("axis", Numbers(3), "Vector; else Z."),
+    key("point", Numbers(3), "A point on it, mm."),
+    key("min", Number, "Lower limit, mm or degrees."),
+    key("max", Number, "Upper limit, mm or degrees."),
+    key("speed", Number, "Greatest speed."),
+    key("rapid", Number, "Speed of a rapid move."),
+    key("acceleration", Number, "Greatest acceleration."),
+];
+
+static COUPLING: &[Key] = &[
+    must("joint", Text, "Joint whose value differs on the controller."),
+    must("with", Text, "The joint it is counted with."),
+    must("factor", Number, "controller = joint + factor · with: -1 on FANUC arms, 1 with a parallelogram."),
+    key("min", Number, "Least value on the controller, degrees; else the joint's."),
+    key("max", Number, "Greatest value on the controller, degrees; else the joint's."),
+];
+
+static PLACE: &[Key] = &[
+    key("position", Numbers(3), "X Y Z, mm."),
+    key("rotation", Numbers(3), "Turns about the fixed X, Y, Z, degrees."),
+];
+
+static FRAMES: &[Key] = &[
+    key("base", Table(PLACE), "The machine in the cell."),
+    key("table", Table(PLACE), "The table in the base."),
+    key("part", Table(PLACE), "The part on the table."),
+];
+
+static FRAME: &[Key] = &[
+    must("name", Text, "Name."),
+    key("position", Numbers(3), "X Y Z in the base, mm."),
+    key("rotation", Numbers(3), "Turns about the fixed X, Y, Z, degrees."),
+];
+
+static SPINDLE: &[Key] = &[
+    key("position", Numbers(3), "Nose on the flange, mm."),
+    key("rotation", Numbers(3), "Turns of the nose, degrees."),
+    key("min_speed", Number, "Turns per minute."),
+    key("max_speed", Number, "Turns per minute."),
+    key("controlled", Flag, "Whether the program can switch it; else true."),
+];
+
+static TOOL: &[Key] = &[
+    must("number", Whole, "T number."),
+    must("name", Text, "Name on the controller."),
+    key("position", Numbers(3), "Tool point on the spindle nose or flange, mm."),
+    key("rotation", Numbers(3), "Turns of the tool, degrees."),
+    key("diameter", Number, "mm."),
+    key("mass", Number, "kg."),
+];
+
+static SPEED: &[Key] = &[
+    key("rapid", Number, "Tool point speed of a rapid, mm/s."),
+    key("joint", Number, "Joint speed of a rapid, per cent of the greatest."),
+];
+
+static ZONE: &[Key] = &[
+    key("default", Number, "Where the program doesn't say, mm."),
+    key("max", Number, "Never more, mm."),
+];
+
+static CONTROLLER: &[Key] = &[
+    key("name", Text, "`IRC5`, `KRC4` …"),
+    key("lines", Whole, "Most lines per file."),
+    key("points", Whole, "Most points per file."),
+    key("bytes", Whole, "Most bytes per file."),
+];
+
+static SIGNAL: &[Key] = &[
+    key("signal", Text, "Output that is set."),
+    key("value", Number, "To this value; else 1."),
+    key("routine", Text, "Routine that is called."),
+    key("wait", Text, "Input that is waited for."),
+    key("seconds", Number, "Time of the wait, s."),
+];
+
+static REFERENCE: &[Key] = &[
+    key("kinematics", Part(KINEMATICS), "Kinematics of the publication."),
+    key("joint", Tables(JOINT_OVER), "Joints of the publication, by name."),
+    key("source", Text, "Where the numbers come from."),
+];
+
+static JOINT_OVER: &[Key] = &[
+    must("name", Text, "Name of a joint above."),
+    key("type", Choice(&["revolute", "prismatic"]), "Turns or slides."),
+    key("word", Text, "Its word."),
+    key("min", Number, "Lower limit."),
+    key("max", Number, "Upper limit."),
+    key("speed", Number, "Greatest speed."),
+    key("rapid", Number, "Speed of a rapid move."),
+    key("acceleration", Number, "Greatest acceleration."),
+    key("dh", Numbers(4), "Denavit–Hartenberg row."),
+    key("origin", Numbers(6), "Frame in the joint before."),
+    key("axis", Numbers(3), "Vector."),
+];
+
+/// Words that may stand in `[io]`.
+fn io_word(word: &str) -> bool {
+    word == "S" || (word.strip_prefix('M').is_some_and(|n| !n.is_empty() && n.len() <= 3 && n.bytes().all(|b| b.is_ascii_digit())))
+}
+
+/// Faults of form: place and message.
+pub(crate) fn faults(node: &Node, keys: &'static [Key], place: &str) -> Vec<(Range<usize>, String)> {
+    let mut out = Vec::new();
+    table(node, keys, place, false, &mut out);
+    out
+}
+
+fn table(node: &Node, keys: &'static [Key], place: &str, partial: bool, out: &mut Vec<(Range<usize>, String)>) {
+    let names: Vec<&str> = keys.iter().map(|k| k.name).collect();
+    for e in node.entries() {
+        match keys.iter().find(|k| k.name == e.key) {
+            Some(k) => value(&e.node, k, place, out),
+            None => {
+                let hint = match suggestion(&e.key, &names) {
+                    Some(s) => format!("; did you mean `{s}`?"),
+                    None => format!("; keys here are {}", names.join(", ")),
+                };
+                out.push((e.key_span.clone(), format!("`{}` is not a key of {place}{hint}", e.key)));
+            }
+        }
+    }
+    for k in keys.iter().filter(|k| k.required && !partial && node.get(k.name).is_none()) {
+        out.push((node.span.clone(), format!("`{}` is missing in {place}: {}", k.name, k.doc)));
+    }
+}
+
+fn value(node: &Node, key: &Key, place: &str, out: &mut Vec<(Range<usize>, String)>) {
+    let name = key.name;
+    let mut wants = |what: &str| out.push((node.span.clone(), format!("`{name}` of {place} must be {what}")));
+    match (key.kind, &node.value) {
+        (Text, Value::Text(_)) | (Number, Value::Number(_)) | (Flag, Value::Flag(_)) => {}
+        (Whole, Value::Number(n)) if n.fract() == 0.0 && *n >= 0.0 && *n <= 9e15 => {}
+        (Choice(words), Value::Text(t)) | (Open(words), Value::Text(t)) if words.contains(&t.as_str()) => {}
+        (Open(words), Value::Text(t)) if words.last().is_some_and(|w| t.len() > w.len() && t.starts_with(w)) => {}
+        (Choice(words) | Open(words), Value::Text(t)) => {
+            let hint = suggestion(t, words).map_or(String::new(), |s| format!("; did you mean \"{s}\"?"));
+            wants(&format!("one of \"{}\"{hint}", words.join("\", \"")));
+        }
+        (Numbers(n), Value::List(l)) if l.iter().all(|v| v.number().is_some()) => {
+            if n > 0 && l.len() != n {
+                wants(&format!("a list of {n} numbers, not {}", l.len()));
+            }
+        }
+        (Points(n), Value::List(l)) if l.len() == n && l.iter().all(|p| p.numbers().len() == 3 && p.list().len() == 3) => {}
+        (Table(keys), Value::Table(_)) => table(node, keys, &format!("`[{name}]`"), false, out),
+        (Part(keys), Value::Table(_)) => table(node, keys, &format!("`[{name}]`"), true, out),
+        (Tables(keys), Value::List(l)) => {
+            for item in l {
+                if matches!(item.value, Value::Table(_)) {
+                    table(item, keys, &format!("`[[{name}]]`"), false, out);
+                } else {
+                    out.push((item.span.clone(), format!("`{name}` must be a list of tables")));
+                }
+            }
+        }
+        (Map(keys), Value::Table(entries)) => {
+            for e in entries {
+                if !io_word(&e.key) {
+                    out.push((e.key_span.clone(), format!("`{}` is no word of `[{name}]`; words are S and M0 … M999", e.key)));
+                }
+                table(&e.node, keys, &format!("`[{name}.{}]`", e.key), false, out);
+            }
+        }
+        (kind, _) => wants(&what(kind)),
+    }
+}
+
+fn what(kind: Type) -> String {
+    match kind {
+        Text => "text in quotes".into(),
+        Number => "a number".into(),
+        Whole => "a whole number".into(),
+        Flag => "true or false".into(),
+        Choice(words) | Open(words) => format!("one of \"{}\"", words.join("\", \"")),
+        Numbers(0) => "a list of numbers".into(),
+        Numbers(n) => format!("a list of {n} numbers"),
+        Points(n) => format!("a list of {n} points of three numbers"),
+        Table(_) | Part(_) | Map(_) => "a table".into(),
+        Tables(_) => "a list of tables".into(),
+    }
+}
+
+/// The option a misspelt word most likely means.
+pub(crate) fn suggestion<'a>(word: &str, options: &[&'a str]) -> Option<&'a str> {
+    let start = |o: &str| o.len() >= 3 && word.len() >= 3 && (word.starts_with(o) || o.starts_with(word));
+    let near = |o: &&str| (distance(word, o), usize::from(!start(o)));
+    let best = options.iter().copied().min_by_key(near)?;
+    if distance(word, best) <= 1 + word.len() / 4 {
+        return Some(best);
+    }
+    options.iter().copied().find(|o| start(o))
+}
+
+fn distance(a: &str, b: &str) -> usize {
+    let b: Vec<char> = b.chars().collect();
+    let mut row: Vec<usize> = (0..=b.len()).collect();
+    for (i, ca) in a.chars().enumerate() {
+        let mut corner = row[0];
+        row[0] = i + 1;
+        for (k, cb) in b.iter().enumerate() {
+            let here = (corner + usize::from(ca != *cb)).min(row[k] + 1).min(row[k + 1] + 1);
+            (corner, row[k + 1]) = (row[k + 1], here);
+        }
+    }
+    row[b.len()]
+}
+
+/// The JSON Schema of machine files (draft 2020-12), for editors. `spec/machines/machine.schema.json` holds this text.
+pub fn json_schema() -> String {
+    let mut out = String::from("{\n  \"$schema\": \"https://json-schema.org/draft/2020-12/schema\",\n  \"title\": \"gcc-robot machine file\",\n");
+    out += "  \"description\": \"Lengths in mm, angles in degrees, time in seconds.\",\n";
+    object(&mut out, ROOT, 1, Level::Root);
+    out += "\n}\n";
+    out
+}
+
+fn quoted(text: &str) -> String {
+    format!("\"{}\"", text.replace('\\', "\\\\").replace('"', "\\\""))
+}
+
+/// Which keys of a table are required.
+#[derive(Clone, Copy, PartialEq)]
+enum Level {
+    Root,
+    Inner,
+    Part,
+}
+
+fn object(out: &mut String, keys: &[Key], depth: usize, level: Level) {
+    let pad = "  ".repeat(depth);
+    let required = |all: &[Key]| -> String {
+        all.iter().filter(|k| k.required).map(|k| quoted(k.name)).collect::<Vec<_>>().join(", ")
+    };
+    let _ = write!(out, "{pad}\"type\": \"object\",\n{pad}\"additionalProperties\": false,\n");
+    if level == Level::Root {
+        let _ = write!(
+            out,
+            "{pad}\"required\": [\"format\", \"id\"],\n{pad}\"anyOf\": [{{ \"required\": [\"extends\"] }}, {{ \"required\": [\"title\", \"kind\", \"kinematics\"] }}],\n"
+        );
+    } else if level == Level::Inner && keys.iter().any(|k| k.required) {
+        let _ = writeln!(out, "{pad}\"required\": [{}],", required(keys));
+    }
+    let _ = writeln!(out, "{pad}\"properties\": {{");
+    for (i, k) in keys.iter().enumerate() {
+        let _ = writeln!(out, "{pad}  {}: {{\n{pad}    \"description\": {},", quoted(k.name), quoted(k.doc));
+        property(out, k, depth + 2);
+        let _ = writeln!(out, "\n{pad}  }}{}", if i + 1 < keys.len() { "," } else { "" });
+    }
+    let _ = write!(out, "{pad}}}");
+}
+
+fn property(out: &mut String, k: &Key, depth: usize) {
+    let pad = "  ".repeat(depth);
+    let list = |words: &[&str]| words.iter().map(|w| quoted(w)).collect::<Vec<_>>().join(", ");
+    let _ = match k.kind {
+        Text => write!(out, "{pad}\"type\": \"string\""),
+        Number => write!(out, "{pad}\"type\": \"number\""),
+        Whole if k.name == "format" => write!(out, "{pad}\"const\": 1"),
+        Whole => write!(out, "{pad}\"type\": \"integer\",\n{pad}\"minimum\": 0"),
+        Flag => write!(out, "{pad}\"type\": \"boolean\""),
+        Choice(words) => write!(out, "{pad}\"enum\": [{}]", list(words)),
+        Open(words) => {
+            let (last, rest) = words.split_last().map_or(("", words), |(l, r)| (*l, r));
+            write!(out, "{pad}\"anyOf\": [{{ \"enum\": [{}] }}, {{ \"type\": \"string\", \"pattern\": \"^{last}.+\" }}]", list(rest))
+        }
+        Numbers(0) => write!(out, "{pad}\"type\": \"array\",\n{pad}\"items\": {{ \"type\": \"number\" }}"),
+        Numbers(n) => write!(
+            out,
+            "{pad}\"type\": \"array\",\n{pad}\"items\": {{ \"type\": \"number\" }},\n{pad}\"minItems\": {n},\n{pad}\"maxItems\": {n}"
+        ),
+        Points(n) => write!(
+            out,
+            "{pad}\"type\": \"array\",\n{pad}\"items\": {{ \"type\": \"array\", \"items\": {{ \"type\": \"number\" }}, \"minItems\": 3, \"maxItems\": 3 }},\n{pad}\"minItems\": {n},\n{pad}\"maxItems\": {n}"
+        ),
+        Table(keys) => {
+            object(out, keys, depth, Level::Inner);
+            Ok(())
+        }
+        Part(keys) => {
+            object(out, keys, depth, Level::Part);
+            Ok(())
+        }
+        Tables(keys) | Map(keys) => {
+            let map = matches!(k.kind, Map(_));
+            let _ = if map {
+                writeln!(out, "{pad}\"type\": \"object\",\n{pad}\"additionalProperties\": false,\n{pad}\"patternProperties\": {{\n{pad}\"^(S|M[0-9]{{1,3}})$\": {{")
+            } else {
+                writeln!(out, "{pad}\"type\": \"array\",\n{pad}\"items\": {{")
+            };
+            object(out, keys, depth + 1, Level::Inner);
+            write!(out, "\n{pad}{}", if map { "} }" } else { "}" })
+        }
+    };
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn schema_file_is_up_to_date() {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../spec/machines/machine.schema.json");
+        let text = json_schema();
+        if std::env::var_os("UPDATE_SCHEMA").is_some() {
+            std::fs::write(path, &text).unwrap();
+        }
+        assert_eq!(std::fs::read_to_string(path).unwrap(), text, "run the test with UPDATE_SCHEMA=1");
+    }
+
+    #[test]
+    fn braces_of_the_schema_match() {
+        let text = json_schema();
+        let count = |c: char| text.chars().filter(|x| *x == c).count();
+        assert_eq!(count('{'), count('}'));
+        assert_eq!(count('['), count(']'));
+    }
+
+    #[test]
+    fn misspelt_words() {
+        assert_eq!(suggestion("maximum", &["min", "max", "speed"]), Some("max"));
+        assert_eq!(suggestion("lenghts", &["links", "lengths"]), Some("lengths"));
+        assert_eq!(suggestion("opv", &["opw", "ur"]), Some("opw"));
+        assert_eq!(suggestion("banana", &["opw", "ur"]), None);
+    }
+}
