@@ -59,7 +59,7 @@ fn judged(name: &str, region: &Region, what: &Clear, entry: &Entry, depth: &Dept
     let plan = clear(region, what).unwrap_or_else(|e| panic!("{name} {what:?}: {e}"));
     let inset = what.radius + what.allowance;
     let moves = motion(&plan.passes, depth, entry, Some(region), inset).unwrap();
-    let mut judge = Judge::new(region, what.radius + 1.0, 0.1);
+    let mut judge = Judge::new(region, what.radius + 1.0, if what.radius > 1.5 { 0.1 } else { 0.08 });
     let v = judge.run(&moves, what.radius, depth.bottom, what.allowance, true);
     assert!(v.gouge < 0.005, "{name} {what:?} {entry:?}: gouge {v:?}");
     assert_eq!(v.crashes, 0, "{name} {what:?} {entry:?}: {v:?}");
