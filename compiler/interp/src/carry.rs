@@ -98,6 +98,10 @@ impl<'a, S: Sink> Interp<'a, S> {
         }
     }
 
+    /// Whether this line is the next one to be executed, not skipped.
+    pub fn comes_to(&self, file: FileId, line: u32) -> bool {
+        self.skip.is_none() && self.place.file == file && self.next == line
+    }
     /// The line that comes next.
     pub fn next_line(&self) -> u32 {
         self.next

@@ -115,6 +115,9 @@ impl<S: Sink> Interp<'_, S> {
         if (5420..=5428).contains(&index) {
             return self.m.current[(index - 5420) as usize];
         }
+        if (5021..=5029).contains(&index) && self.setup.version == gr_canon::Version::V2_10 {
+            return self.machine_position()[(index - 5021) as usize];
+        }
         if let Some(log) = &mut self.log {
             log.read(index as u32);
         }
