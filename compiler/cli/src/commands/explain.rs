@@ -110,13 +110,18 @@ fn code(def: &CodeDef, dialect: &Dialect) -> String {
     if !def.errors.is_empty() {
         text.push_str("\nIt can raise:\n");
         for code in def.errors.iter().filter_map(|e| Code::find(e)) {
-            text.push_str(&format!("  {} {}\n", code.def().code, code.def().message));
+            text.push_str(&format!("  {} {}\n", code.def().code, open(code.def().message)));
         }
     }
     if !def.source.is_empty() {
         text.push_str(&format!("\nSource: {}\n", def.source));
     }
     text
+}
+
+/// A message without what only a program can fill in.
+fn open(message: &str) -> String {
+    (0..8).fold(message.to_string(), |text, n| text.replace(&format!("{{{n}}}"), "…"))
 }
 
 fn argument(a: &ArgDef) -> String {
