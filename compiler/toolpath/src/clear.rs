@@ -331,6 +331,14 @@ impl<'a> Job<'a> {
         done.passes.push(Pass { path, role, link });
     }
 
+    /// The next curve from where the last side of this one, made longer, meets it.
+    fn extended(&self, path: &Path2, next: &Path2) -> Option<(Path2, Path2)> {
+        let end = path.end();
+        let ray = Seg::Line { a: end, b: end + path.end_tangent() * (3.0 * self.step) };
+        let hit = first_hit(&ray, next).filter(|&hit| self.fits(end, hit))?;
+        Some((next.starting_near(hit), Path2::polyline(&[end, hit], false).ok()?))
+    }
+
     /// From the inner curve to the next: its last side is extended until the next curve is met; where that is far
     /// (smooth curves), slanting over from a step before the end.
     fn spiral_step(&self, next: &Path2, done: &mut Done) -> Option<(Path2, Path2)> {
@@ -338,17 +346,23 @@ impl<'a> Job<'a> {
         if !last.path.is_closed() || last.role == Role::Wall {
             return None;
         }
-        let (end, t) = (last.path.end(), last.path.end_tangent());
-        let ray = Seg::Line { a: end, b: end + t * (3.0 * self.step) };
-        if let Some(hit) = first_hit(&ray, next).filter(|&hit| self.fits(end, hit)) {
-            let way = Path2::polyline(&[end, hit], false).ok()?;
-            return Some((next.starting_near(hit), way));
+        if let Some((next, way)) = self.extended(&last.path, next) {
+            return Some((next, way));
+        }
+        // With a step of at most the radius the last bit of a turn is cut by its neighbours.
+        let bit = last.path.segs().last().map_or(0.0, Seg::len);
+        if self.step <= self.what.radius + 1e-9 && bit <= 1.5 * self.step {
+            let shorter = last.path.part(0.0, last.path.length() - bit);
+            if let Some((shorter, found)) = shorter.and_then(|s| self.extended(&s, next).map(|f| (s, f))) {
+                last.path = shorter;
+                return Some(found);
+            }
         }
         let length = last.path.length();
         if self.step > self.what.radius + 1e-9 || length < 4.0 * self.step {
             return None;
         }
-        let path = next.starting_near(end);
+        let path = next.starting_near(last.path.end());
         let shorter = last.path.part(0.0, length - self.step)?;
         if !self.fits(shorter.end(), path.start()) || shorter.end().dist(path.start()) > 2.5 * self.step {
             return None;
