@@ -16,6 +16,7 @@
 //! | `differential` | Jacobian, manipulability, condition |
 //! | `mobility` | degrees of freedom of a mechanism from its structure |
 //! | `identify` | OPW lengths of a chain of joint frames |
+//! | `urdf` | machine files made from URDF |
 //! | `math` | vectors and frames |
 
 mod cartesian;
@@ -37,6 +38,7 @@ mod serial;
 mod tree;
 mod tricept;
 mod ur;
+mod urdf;
 
 pub use cartesian::Cartesian;
 pub use cell::{Cell, Controller, Coupling, External, Rapid, Signal, Spindle, ToolData, Zones};
@@ -54,6 +56,7 @@ pub use schema::{parse, parse_reference};
 pub use serial::{DhRow, Link, Serial};
 pub use tricept::{Tricept, TriceptShape};
 pub use ur::ParallelWrist;
+pub use urdf::{Import, import_urdf};
 
 /// What sort of machine it is.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

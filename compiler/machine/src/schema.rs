@@ -662,6 +662,35 @@ mod tests {
     }
 
     #[test]
+    fn the_example_of_the_documentation() {
+        let page = include_str!("../../../docs/machines.md");
+        let text = page.split("```toml").nth(1).and_then(|t| t.split("```").next()).unwrap();
+        let cell = parse(FileId(0), text).unwrap_or_else(|e| panic!("{e:?}"));
+        insta::assert_snapshot!(cell.describe());
+        let tip = crate::math::Frame::shift([0.0, 0.0, 205.0]);
+        assert_eq!(cell.cell.tool_frame(1), tip);
+        assert_eq!(cell.joints[5].min, Some(-std::f64::consts::PI));
+    }
+
+    #[test]
+    fn faults_of_form_have_hints() {
+        let all = |text: &str| parse(FileId(0), text).expect_err("faulty").iter().map(|d| d.message.clone()).collect::<Vec<_>>().join("; ");
+        let cell = "format = 1\nid = \"shop/cell\"\nextends = \"abb/irb2400\"\n";
+        assert!(all(&format!("{cell}[kinematics]\nkind = \"opv\"\n")).contains("did you mean \"opw\"?"));
+        assert!(all(&format!("{cell}[[joint]]\nname = \"J9\"\n")).contains("`type` is missing"));
+        assert!(all(&format!("{cell}[coupling]\njoint = \"J33\"\n")).contains("did you mean `J3`?"));
+        assert!(all(&format!("{cell}[io.M3x]\nsignal = \"a\"\n")).contains("M3x"));
+        assert!(all(&format!("{cell}[kinematics]\nlengths = [0.1, -0.135, 0, 0.615, 0.705, 0.755, 0.085]\n")).contains("metres"));
+        assert!(all(&format!("{cell}[kinematics]\nlengths = [0, 0, 0, 0, 0, 0, 0]\n")).contains("above zero"));
+        assert!(all(&format!("{cell}[frames.table]\nposition = [nan, 0, 0]\n")).contains("finite"));
+        assert!(all("format = 1\nid = \"shop/x\"\nextends = \"abb/irb240\"\n").contains("did you mean `abb/irb2400`?"));
+        assert!(all("format = 1\nid = \"shop/x\"\nextends = \"comau/tricept806\"\n").contains("platform_radius"));
+        assert!(faults(&format!("{cell}[[joint]]\nname = \"J1\"\nmin = 200\n"))[0].0 == "machine/bad-value");
+        let two = crate::source("usp/2ups-prp").unwrap();
+        assert_eq!(faults(&two.replace("2UPS+PRP\"\n\n", "3UPS+PRP\"\n\n").replace("structure = \"3UPS+PRP\"", "structure = \"2UPS+PR\""))[0].0, "machine/mobility");
+    }
+
+    #[test]
     fn faults_point_at_their_place() {
         let text = source("generic/mill3").unwrap();
         assert_eq!(faults(&text.replace("max = 400", "max = -500"))[0], ("machine/bad-value", "-500".to_string()));

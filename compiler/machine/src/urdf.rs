@@ -1,0 +1,155 @@
+use crate::math::{Frame, V3, norm, scale};
+use crate::{JointKind, Link, Pose, Serial, identify};
+use std::fmt::Write as _;
+use urdf_rs::JointType;
+
+/// A machine file made from a URDF.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Import {
+    /// The machine file.
+    pub toml: String,
+    /// The chain of joints it was made from.
+    pub chain: Serial,
+    /// Why it has no closed form, or what else the user should know.
+    pub notes: Vec<String>,
+}
+
+/// Makes a machine file of a URDF: the longest chain of moving joints, base to tool. An arm with an ortho-parallel base
+/// and a spherical wrist gets OPW lengths, every other one its joint frames and the numerical inverse.
+pub fn import_urdf(id: &str, text: &str) -> Result<Import, String> {
+    let robot = urdf_rs::read_from_string(text).map_err(|e| format!("the file is no URDF: {e}"))?;
+    let path = longest(&robot)?;
+    let (links, names, speeds, tip) = chain(&path)?;
+    let chain = Serial::new(links, tip);
+    let mut notes = Vec::new();
+    if path.iter().any(|j| j.mimic.is_some()) {
+        notes.push("joints that imitate others are taken as joints of their own".to_string());
+    }
+    let mut toml = format!("# Made from the URDF `{}`. Lengths in mm, angles in degrees, time in seconds.\n", robot.name);
+    let title = robot.name.replace(['"', '\\', '\n'], " ");
+    let _ = write!(toml, "format = 1\nid = \"{id}\"\ntitle = \"{title}\"\nkind = \"robot\"\nsource = \"URDF {title}\"\norientation = \"abc-euler-xyz\"\n\n[kinematics]\n");
+    match identify(&chain) {
+        Ok(fit) if fit.flange == Frame::IDENTITY => {
+            let list = |v: &[f64]| v.iter().map(|x| tidy(*x)).collect::<Vec<_>>().join(", ");
+            let _ = writeln!(toml, "kind = \"opw\"\n# a1 a2 b c1 c2 c3 c4\nlengths = [{}]", list(&fit.arm.lengths()));
+            let _ = writeln!(toml, "offsets = [{}]\nsigns = [{}]", list(&fit.arm.offsets().map(f64::to_degrees)), list(&fit.arm.signs()));
+            joints(&mut toml, &chain, &names, &speeds, false);
+        }
+        other => {
+            notes.push(match other {
+                Ok(_) => "its flange is turned against the one of the closed form; its joint frames are kept".to_string(),
+                Err(why) => format!("no closed form: {why}; inverse kinematics will search"),
+            });
+            let _ = writeln!(toml, "kind = \"origins\"\ntip = [{}]", place(chain.tip()));
+            joints(&mut toml, &chain, &names, &speeds, true);
+        }
+    }
+    Ok(Import { toml, chain, notes })
+}
+
+fn joints(toml: &mut String, chain: &Serial, names: &[String], speeds: &[f64], origins: bool) {
+    for ((link, name), speed) in chain.links().iter().zip(names).zip(speeds) {
+        let turns = link.kind == JointKind::Revolute;
+        let unit = |v: f64| tidy(if turns { v.to_degrees() } else { v });
+        let kind = if turns { "revolute" } else { "prismatic" };
+        let _ = write!(toml, "\n[[joint]]\nname = \"{name}\"\ntype = \"{kind}\"\n");
+        if link.limits.0.is_finite() && link.limits.1.is_finite() {
+            let _ = write!(toml, "min = {}\nmax = {}\n", unit(link.limits.0), unit(link.limits.1));
+        }
+        if *speed > 0.0 {
+            let _ = writeln!(toml, "speed = {}", unit(*speed));
+        }
+        if origins {
+            let axis = link.axis.map(tidy).join(", ");
+            let _ = writeln!(toml, "origin = [{}]\naxis = [{axis}]", place(&link.origin));
+        }
+    }
+}
+
+fn place(f: &Frame) -> String {
+    let p = Pose::from_frame(f);
+    let all = [p.position, p.rotation.map(f64::to_degrees)].concat();
+    all.into_iter().map(tidy).collect::<Vec<_>>().join(", ")
+}
+
+/// A number with what rounding left over taken away.
+fn tidy(v: f64) -> String {
+    let near = libm::round(v * 1e9) / 1e9;
+    if near == 0.0 { "0".into() } else { format!("{near}") }
+}
+
+/// The joints from the root to the leaf with the most moving ones; among equals the leaf called `tool0` or `flange`.
+fn longest(robot: &urdf_rs::Robot) -> Result<Vec<&urdf_rs::Joint>, String> {
+    let mut best: Vec<&urdf_rs::Joint> = Vec::new();
+    let score = |path: &[&urdf_rs::Joint]| {
+        let leaf = path.last().map_or("", |j| j.child.link.as_str());
+        let named = if leaf.ends_with("tool0") { 2 } else { usize::from(leaf.contains("flange")) };
+        (path.iter().filter(|j| moves(j)).count(), named, path.len())
+    };
+    for link in &robot.links {
+        let mut path = Vec::new();
+        let mut at = link.name.as_str();
+        while let Some(joint) = robot.joints.iter().find(|j| j.child.link == at) {
+            path.push(joint);
+            at = joint.parent.link.as_str();
+            if path.len() > robot.joints.len() {
+                return Err(format!("the joints around `{at}` go in a circle"));
+            }
+        }
+        path.reverse();
+        if score(&path) > score(&best) {
+            best = path;
+        }
+    }
+    if best.iter().any(|j| moves(j)) { Ok(best) } else { Err("it has no moving joint".into()) }
+}
+
+fn moves(joint: &urdf_rs::Joint) -> bool {
+    matches!(joint.joint_type, JointType::Revolute | JointType::Continuous | JointType::Prismatic)
+}
+
+type Parts = (Vec<Link>, Vec<String>, Vec<f64>, Frame);
+
+fn chain(path: &[&urdf_rs::Joint]) -> Result<Parts, String> {
+    let (mut links, mut names, mut speeds) = (Vec::new(), Vec::new(), Vec::new());
+    let mut here = Frame::IDENTITY;
+    for joint in path {
+        let (xyz, rpy): (V3, V3) = (*joint.origin.xyz, *joint.origin.rpy);
+        here = here.then(&Frame { turn: square(rpy), position: scale(xyz, 1000.0) });
+        if joint.joint_type == JointType::Fixed {
+            continue;
+        }
+        if !moves(joint) {
+            return Err(format!("joint `{}` is of a type that no machine has", joint.name));
+        }
+        let turns = joint.joint_type != JointType::Prismatic;
+        let size = if turns { 1.0 } else { 1000.0 };
+        let axis: V3 = *joint.axis.xyz;
+        if norm(axis) < 1e-9 || !here.is_finite() {
+            return Err(format!("joint `{}` has no axis or no place", joint.name));
+        }
+        let free = joint.joint_type == JointType::Continuous || joint.limit.lower >= joint.limit.upper;
+        let limits = if free { (f64::NEG_INFINITY, f64::INFINITY) } else { (joint.limit.lower * size, joint.limit.upper * size) };
+        let kind = if turns { JointKind::Revolute } else { JointKind::Prismatic };
+        links.push(Link { origin: here, axis: scale(axis, 1.0 / norm(axis)), kind, limits });
+        names.push(joint.name.replace(['"', '\\', '\n'], "_"));
+        speeds.push(joint.limit.velocity * size);
+        here = Frame::IDENTITY;
+    }
+    Ok((links, names, speeds, here))
+}
+
+/// A turn; URDF files write quarter turns with few digits (1.5708), which are made whole.
+fn square(rpy: V3) -> crate::math::M3 {
+    const QUARTER: f64 = std::f64::consts::FRAC_PI_2;
+    let whole = |v: f64| {
+        let n = libm::round(v / QUARTER);
+        if (v - n * QUARTER).abs() < 1e-5 { n * QUARTER } else { v }
+    };
+    let rpy = rpy.map(whole);
+    let mut turn = crate::math::euler(rpy);
+    if rpy.iter().all(|v| v % QUARTER == 0.0) {
+        turn.iter_mut().flatten().for_each(|v| *v = libm::round(*v));
+    }
+    turn
+}

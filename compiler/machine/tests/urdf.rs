@@ -1,0 +1,112 @@
+//! Library robots against the joint frames of their public URDF files; import of URDF.
+
+use gr_machine::math::{Frame, norm};
+use gr_machine::{Chain, JointKind, Kinematics, Link, Serial, builtin, identify, import_urdf, parse};
+use gr_text::FileId;
+
+/// Id, chain and whether the flange's turn is known.
+fn rows() -> Vec<(&'static str, Serial, bool)> {
+    let numbers = |cell: &str| -> Vec<f64> { cell.split(' ').filter_map(|v| v.parse().ok()).collect() };
+    include_str!("data/urdf-origins.tsv")
+        .lines()
+        .filter(|l| !l.starts_with('#'))
+        .map(|line| {
+            let cells: Vec<&'static str> = line.split('\t').collect();
+            let link = |cell: &&str| {
+                let v = numbers(cell);
+                let origin = Frame::shift([v[0] * 1000.0, v[1] * 1000.0, v[2] * 1000.0]);
+                Link { origin, axis: [v[3], v[4], v[5]], kind: JointKind::Revolute, limits: (-9.0, 9.0) }
+            };
+            let v = numbers(cells[7]);
+            let turn: [f64; 3] = std::array::from_fn(|i| v.get(3 + i).copied().unwrap_or(0.0).to_radians());
+            let tip = Frame::new([v[0] * 1000.0, v[1] * 1000.0, v[2] * 1000.0], turn);
+            (cells[0], Serial::new(cells[1..7].iter().map(link).collect(), tip), v.len() == 6)
+        })
+        .collect()
+}
+
+fn poses() -> impl Iterator<Item = [f64; 6]> {
+    (0..100).map(|n| std::array::from_fn(|i| libm::sin((n * 11 + i * 5 + 1) as f64) * 2.5))
+}
+
+#[test]
+fn library_robots_equal_their_urdf() {
+    for (id, chain, whole) in rows() {
+        let k = builtin(id).unwrap().kinematics();
+        for q in poses() {
+            let (p, r) = k.forward_frame(&q).unwrap().error_to(&chain.forward_frame(&q).unwrap());
+            assert!(norm(p) < 1e-9, "{id}: {p:?} at {q:?}");
+            assert!(!whole || norm(r) < 1e-12, "{id}: {r:?} at {q:?}");
+        }
+    }
+}
+
+#[test]
+fn lengths_are_found_in_the_urdf() {
+    for (id, chain, whole) in rows() {
+        let Chain::Opw(arm) = builtin(id).unwrap().chain else { panic!("{id}") };
+        let fit = identify(&chain).unwrap_or_else(|e| panic!("{id}: {e}"));
+        for (a, b) in fit.arm.lengths().iter().zip(arm.lengths()) {
+            assert!((a.abs() - b.abs()).abs() < 1e-6, "{id}: {:?}", fit.arm.lengths());
+        }
+        assert!(!whole || fit.flange == Frame::IDENTITY, "{id}");
+    }
+}
+
+/// A URDF text of a chain.
+fn urdf(chain: &Serial, tip: [f64; 3]) -> String {
+    let mut out = String::from("<?xml version=\"1.0\"?>\n<robot name=\"made\">\n<link name=\"base_link\"/>\n");
+    for (i, l) in chain.links().iter().enumerate() {
+        let p = l.origin.position.map(|v| v / 1000.0);
+        let parent = if i == 0 { "base_link".to_string() } else { format!("link_{i}") };
+        let n = i + 1;
+        out += &format!(
+            "<link name=\"link_{n}\"/>\n<joint name=\"joint_{n}\" type=\"revolute\"><origin xyz=\"{} {} {}\" rpy=\"0 0 0\"/><parent link=\"{parent}\"/><child link=\"link_{n}\"/><axis xyz=\"{} {} {}\"/><limit lower=\"-3\" upper=\"3\" effort=\"0\" velocity=\"2\"/></joint>\n",
+            p[0], p[1], p[2], l.axis[0], l.axis[1], l.axis[2]
+        );
+    }
+    let p = chain.tip().position.map(|v| v / 1000.0);
+    let last = chain.links().len();
+    out += &format!(
+        "<link name=\"tool0\"/>\n<joint name=\"flange\" type=\"fixed\"><origin xyz=\"{} {} {}\" rpy=\"{} {} {}\"/><parent link=\"link_{last}\"/><child link=\"tool0\"/></joint>\n</robot>\n",
+        p[0], p[1], p[2], tip[0], tip[1], tip[2]
+    );
+    out
+}
+
+#[test]
+fn imported_arms_equal_their_urdf() {
+    for (id, chain, _) in rows().into_iter().filter(|r| r.2) {
+        let turns = [[0.0, 1.5708, 0.0], [3.1415926, -1.570796, 0.0], [0.0; 3]];
+        let turn = turns[["kuka/kr16-2", "yaskawa/gp25", "staubli/rx160"].iter().position(|i| *i == id).unwrap()];
+        let import = import_urdf("test/arm", &urdf(&chain, turn)).unwrap();
+        let machine = parse(FileId(0), &import.toml).unwrap_or_else(|e| panic!("{e:?}\n{}", import.toml));
+        assert!(matches!(machine.chain, Chain::Opw(_)), "{id}: {:?}\n{}", import.notes, import.toml);
+        for q in poses() {
+            let (p, r) = machine.kinematics().forward_frame(&q).unwrap().error_to(&chain.forward_frame(&q).unwrap());
+            assert!(norm(p) < 1e-6 && norm(r) < 1e-9, "{id}: {p:?} {r:?}");
+        }
+    }
+}
+
+#[test]
+fn arms_without_closed_form_keep_their_frames() {
+    let (_, chain, _) = rows().into_iter().next().unwrap();
+    let mut links = chain.links().to_vec();
+    links[4].origin.position[1] = 80.0;
+    links[5].origin.position[2] = 40.0;
+    let odd = Serial::new(links, *chain.tip());
+    let import = import_urdf("test/odd", &urdf(&odd, [0.0; 3])).unwrap();
+    assert!(import.notes.iter().any(|n| n.contains("no closed form")), "{:?}", import.notes);
+    let machine = parse(FileId(0), &import.toml).unwrap_or_else(|e| panic!("{e:?}\n{}", import.toml));
+    let q = [0.3, -0.2, 0.4, 0.5, -0.6, 0.7];
+    let (p, r) = machine.kinematics().forward_frame(&q).unwrap().error_to(&odd.forward_frame(&q).unwrap());
+    assert!(norm(p) < 1e-6 && norm(r) < 1e-9);
+}
+
+#[test]
+fn bad_files_are_said_to_be_so() {
+    for text in ["", "<robot", "<robot name=\"x\"><link name=\"a\"/></robot>", "{}", "<a/>"] {
+        assert!(import_urdf("test/x", text).is_err(), "{text}");
+    }
+}
