@@ -27,6 +27,13 @@ pub struct Checked {
     pub unreadable: bool,
 }
 
+impl Checked {
+    /// Nothing was found.
+    pub fn nothing() -> Checked {
+        Checked { sources: Sources::default(), found: Vec::new(), more: 0, unreadable: false }
+    }
+}
+
 pub fn run(global: &Global, args: &CheckArgs) -> Exit {
     let mut renderer = global.renderer(false);
     let mut sources = Sources::default();
@@ -166,6 +173,9 @@ pub fn unreadable(name: &str, code: Code, args: &[String]) -> Checked {
 }
 
 fn checked(name: &str, path: &Path, text: &str, station: &Station) -> Checked {
+    if super::exchange::is_exchange(path, text) {
+        return super::exchange::check(name, text, &station.lints);
+    }
     let mut session = Session::new();
     let mut options = Options::new(station.setup_for(path, text));
     station.lints.put_into(&mut options.rules);

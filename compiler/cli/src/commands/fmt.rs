@@ -7,6 +7,7 @@ use gr_gcode::{Case, Form, FormatOptions, Keyword, LeadingZeros, LineKind, Node,
 use gr_spec::{Dialect, Family};
 use gr_text::{Decoded, Encoding, Span, code};
 
+use super::exchange::is_exchange;
 use crate::exit::Exit;
 use crate::options::{CaseArg, FmtArgs, Global, LintArgs, RenumberArgs, SetupArgs, StyleArgs, ZerosArg};
 use crate::output::{to_stdout, write_all};
@@ -43,6 +44,7 @@ pub fn renumber(global: &Global, args: &RenumberArgs) -> Exit {
         Err(exit) => return exit,
     };
     let exit = match read(&args.file) {
+        Ok(decoded) if is_exchange(&args.file, &decoded.text) => work.exchange(args, &decoded),
         Ok(decoded) => {
             let dialect = work.station.dialect_of(&args.file, &decoded.text);
             let scan = gr_gcode::scan(&decoded.text, dialect);
@@ -146,6 +148,9 @@ fn style(args: &StyleArgs) -> FormatOptions {
 }
 
 fn formatted(path: &Path, text: &str, station: &Station, options: &FormatOptions) -> String {
+    if is_exchange(path, text) {
+        return String::from_utf8_lossy(&gr_p21::format(text.as_bytes())).into_owned();
+    }
     let dialect: &'static Dialect = station.dialect_of(path, text);
     gr_gcode::format(text, &gr_gcode::scan(text, dialect), dialect, options)
 }
@@ -192,6 +197,24 @@ impl Work {
             return Exit::Ok;
         }
         self.write(path, &text, decoded.encoding)
+    }
+
+    /// Instances of an exchange file in order; with faults in it no number is changed.
+    fn exchange(&mut self, args: &RenumberArgs, decoded: &Decoded) -> Exit {
+        match gr_p21::renumber(decoded.text.as_bytes()) {
+            Ok(new) => {
+                let text = String::from_utf8_lossy(&new).into_owned();
+                self.write(args.output.as_deref().unwrap_or(Path::new("-")), &text, decoded.encoding)
+            }
+            Err(faults) => {
+                let file = self.sources.add(args.file.display().to_string(), decoded.text.as_str());
+                for f in faults {
+                    let d = gr_text::Diagnostic::new(f.code, file, f.span, &f.args);
+                    self.renderer.show(&self.sources, &d);
+                }
+                Exit::Findings
+            }
+        }
     }
 
     /// Writes text in the spelling that the source had.
