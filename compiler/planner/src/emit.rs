@@ -192,8 +192,14 @@ impl<'a> Emit<'a> {
     }
     pub fn technology(&mut self, t: &Technology, functions: Functions) {
         if let Some(speed) = t.speed {
-            self.speed(speed);
-            let way = if t.clockwise { Turn::Cw } else { Turn::Ccw };
+            if speed > 0.0 {
+                self.speed(speed);
+            }
+            let way = match t.clockwise {
+                _ if speed == 0.0 => Turn::Stop,
+                true => Turn::Cw,
+                false => Turn::Ccw,
+            };
             if self.turn != Turn::Stop && self.turn != way {
                 self.turn(Turn::Stop);
             }

@@ -29,8 +29,9 @@ pub(crate) fn follow(e: &mut Emit<'_>, paths: &[Toolpath], frame: &Frame, techno
                     None => vec![frame.z; curve.pieces.len() + 1],
                 };
                 let start = frame.point(curve.start);
-                let gap = e.at.is_none_or(|at| norm(sub(at, start)) > TINY);
-                if !joined || by_plane && gap {
+                let here = e.at.unwrap_or_else(|| e.b.pose().xyz());
+                let gap = norm(sub(here, start)) > TINY;
+                if gap && (!joined || by_plane) {
                     // What says it approaches begins above the material; anything else is reached at feed.
                     let above = p.rapid || matches!(p.role.as_str(), "APPROACH" | "NON_CONTACT" | "NONCONTACT" | "CONNECT" | "LIFT");
                     let over = if above { start } else { [start[0], start[1], security.max(start[2])] };
@@ -46,6 +47,7 @@ pub(crate) fn follow(e: &mut Emit<'_>, paths: &[Toolpath], frame: &Frame, techno
                 let rapid = p.rapid || technology.is_none();
                 let go = |e: &mut Emit<'_>, to| if rapid { e.rapid(to) } else { e.line(to) };
                 e.set_axis(axes[0]);
+                e.at.get_or_insert(here);
                 go(e, start);
                 for (piece, axis) in curve.pieces.iter().zip(&axes[1..]) {
                     e.set_axis(*axis);

@@ -11,6 +11,7 @@ mod plan;
 pub mod process;
 mod read;
 pub mod reference;
+pub mod stepnc;
 pub mod table;
 
 use gr_text::{Diagnostic, FileId};

@@ -146,7 +146,10 @@ impl Planner<'_> {
             self.e.say(code::PLAN_TILTED_TOOL, s.origin, &[&axis, "the program states the tool's axis"]);
         }
         self.cut(s);
-        self.e.lift(security);
+        // An explicit path ends where it says; whatever comes next goes by the security plane from there.
+        if s.operation.toolpaths.is_empty() {
+            self.e.lift(security);
+        }
         self.e.push(Op::Close(Marker::Feature));
         self.e.push(Op::Close(Marker::Workingstep));
     }
@@ -171,7 +174,13 @@ impl Planner<'_> {
     fn cut(&mut self, s: &Workingstep) {
         let o = &s.operation;
         let security = self.security;
-        if o.technology.speed.is_none() {
+        let moving = |t: &Toolpath| !t.rapid && matches!(t.path, PathKind::Location { .. });
+        let fed = |t: &Toolpath| t.technology.unwrap_or(o.technology).feed.is_some();
+        if o.technology.feed.is_none() && (o.toolpaths.is_empty() || o.toolpaths.iter().any(|t| moving(t) && !fed(t))) {
+            let why = "the feed follows from a feed, or from a feed per tooth with a spindle speed";
+            self.e.say(code::PLAN_MISSING_VALUE, o.technology.origin, &["MILLING_TECHNOLOGY", "feedrate", why]);
+        }
+        if o.technology.speed.is_none_or(|s| s == 0.0 && o.toolpaths.is_empty()) {
             self.e.say(code::PLAN_MISSING_VALUE, o.technology.origin, &["MILLING_TECHNOLOGY", "spindle", "nothing is cut with a spindle that stands"]);
         }
         if o.technology.contact_feed && o.toolpaths.is_empty() {

@@ -211,9 +211,6 @@ impl<'m> Reader<'m> {
             let other = format!("S{:.1}, F{:.1}", spindle.unwrap_or(0.0).abs() * 60.0, feed.unwrap_or(0.0) * 60_000.0);
             self.units_were_read(node, &read, &other);
         }
-        if feed_mm.is_none() {
-            self.missing(node, "feedrate", "the feed follows from a feed, or from a feed per tooth with a spindle speed");
-        }
         for (a, v) in [("feedrate", feed), ("feedrate_per_tooth", tooth)] {
             if let Some(v) = v {
                 self.in_range(node, a, v, f64::MIN_POSITIVE, "above zero");
@@ -237,7 +234,7 @@ impl<'m> Reader<'m> {
             origin: origin(node),
             feed: feed_mm.filter(|f| *f > 0.0),
             contact_feed: reference.as_deref() == Some("CCP"),
-            speed: speed.filter(|s| *s > 0.0),
+            speed: speed.filter(|s| *s > 0.0 || spindle == Some(0.0)),
             clockwise,
             synchronised: flag("synchronize_spindle_with_feed"),
             lock_feed: flag("inhibit_feedrate_override"),
