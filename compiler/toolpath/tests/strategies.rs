@@ -20,10 +20,10 @@ fn rect(l: f64, w: f64, r: f64) -> Path2 {
 
 fn two_islands() -> Region {
     let holes = vec![
-        rect(14.0, 10.0, 2.0).moved(P2::new(-22.0, 4.0)),
-        profile::circle(6.0).unwrap().moved(P2::new(20.0, -6.0)),
+        rect(14.0, 10.0, 2.0).moved(P2::new(-12.0, 4.0)),
+        profile::circle(5.0).unwrap().moved(P2::new(14.0, -5.0)),
     ];
-    Region::new(rect(100.0, 60.0, 8.0), holes).unwrap()
+    Region::new(rect(60.0, 40.0, 6.0), holes).unwrap()
 }
 
 fn parts() -> Vec<(&'static str, Region)> {
@@ -72,9 +72,10 @@ fn every_strategy_cuts_all_it_can_and_nothing_else() {
         for strategy in ALL {
             for (r, step) in [(2.0, 2.0), (2.0, 3.6), (1.3, 0.7)] {
                 let mut what = Clear::new(r, step, strategy);
-                judged(name, &region, &what, &Entry::default(), &Depth::new(0.0, -1.0, 1.0));
-                what.allowance = 0.4;
-                what.order = Some(Order::OutsideIn);
+                if step < 1.0 {
+                    what.allowance = 0.4;
+                    what.order = Some(Order::OutsideIn);
+                }
                 judged(name, &region, &what, &Entry::default(), &Depth::new(0.0, -1.0, 1.0));
             }
         }
