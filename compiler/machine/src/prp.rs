@@ -315,10 +315,9 @@ impl Kinematics for TwoLegs {
         Ok(self.forward(joints)?.frame())
     }
     fn violations(&self, joints: &[f64]) -> Vec<Violation> {
-        match self.forward(joints) {
-            Ok(p) => self.broken([libm::hypot(p.position[0], p.position[1]), p.rotation[2], p.position[2]]),
-            Err(_) => Vec::new(),
-        }
+        let Ok(&[h1, h2, h3]) = checked(joints, 3) else { return Vec::new() };
+        // Of several assemblies the one that breaks least is meant.
+        let all = self.assemblies([h1, h2, h3]);
+        all.into_iter().map(|at| self.broken(at)).min_by_key(Vec::len).unwrap_or_default()
     }
 }
-

@@ -274,6 +274,25 @@ fn conditions_have_names() {
 }
 
 #[test]
+fn leg_lengths_as_published() {
+    // Table 9.2, simplified machine: ls = 200, lu = 400.
+    let Chain::TwoLegs(m) = builtin("usp/2ups-prp").unwrap().chain else { panic!("two legs") };
+    let mut plain = (*m).clone();
+    plain.shape.base = [[0.0, 400.0, 0.0], [0.0, -400.0, 0.0]];
+    plain.shape.platform = [[0.0, 200.0, 0.0], [0.0, -200.0, 0.0]];
+    let h = plain.lengths([605.0, 0.0, 0.0]);
+    assert!((h[0] - 637.201).abs() < 5e-4 && (h[1] - 637.201).abs() < 5e-4);
+    let h = plain.lengths([libm::hypot(505.0, 205.0), libm::atan2(205.0, 505.0), 0.0]);
+    assert!((h[0] - 429.883).abs() < 5e-4 && (h[1] - 716.100).abs() < 5e-4);
+    // A plunge of 100 mm lengthens both legs.
+    let h = m.lengths([800.0, 0.0, 100.0]);
+    assert!((h[0] - 1049.1067629178644).abs() < 1e-9 && (h[1] - 1049.1067629178644).abs() < 1e-9);
+    // Too far out: the arm is named, whatever the legs say.
+    let h = m.lengths([1100.0, 0.0, 0.0]);
+    assert!(m.violations(&h).iter().any(|v| v.name == "arm-long"));
+}
+
+#[test]
 fn tricept_is_a_template() {
     let template = builtin("comau/tricept806").unwrap();
     let k = template.kinematics();
