@@ -5,12 +5,14 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueEnum};
 use gr_backends::rs274ngc;
 use gr_backends::{Texts, joint};
-use gr_canon::{Printer, Units, Version};
+use gr_canon::{Printer, Units};
 use gr_ir::{Program, Source};
 use gr_machine::Machine;
 use gr_text::{Diagnostic, FileId, Span};
 
 use crate::options::UnitArg;
+use crate::commands::check::Checked;
+use crate::output::Pending;
 use crate::pipeline::{Motion, Unit, motion, run};
 use crate::sources::Sources;
 
@@ -108,6 +110,8 @@ pub struct Artifact {
 pub struct Built {
     /// Files; none when there were errors.
     pub artifacts: Vec<Artifact>,
+    /// The main file, when it was written beside its goal already.
+    pub written: Option<Pending>,
     /// Findings of lowering and emitting.
     pub found: Vec<Diagnostic>,
     /// Files that the findings point into.
@@ -126,17 +130,24 @@ pub struct Goal<'a> {
     pub machine: Option<&'a Machine>,
     /// Begin at this line (from 1), with this height of approach.
     pub from_line: Option<(u32, Option<f64>)>,
+    /// Where long results may be written beside, to be put in place when they are complete.
+    pub file: Option<&'a Path>,
 }
 
-/// Makes a target of a checked program. Usage errors come back as text.
-pub fn build(unit: &Unit, goal: &Goal<'_>) -> Result<Built, String> {
+/// Makes a target of a program, and checks it. `Err` holds the findings when it has errors. Usage errors come back
+/// as text.
+pub fn build(unit: &Unit, goal: &Goal<'_>) -> Result<Result<(Built, Checked), String>, Checked> {
     if goal.target == "canon" {
         if goal.from_line.is_some() {
-            return Err("--from-line goes with targets that are made of motion, not with canon".into());
+            return Ok(Err("--from-line goes with targets that are made of motion, not with canon".into()));
         }
-        return Ok(canon(unit));
+        return canon(unit, goal.file);
     }
-    let mut motion = motion(unit, goal.machine);
+    let (motion, checked) = motion(unit, goal.machine)?;
+    Ok(of_motion(motion, unit, goal).map(|built| (built, checked)))
+}
+
+fn of_motion(mut motion: Motion, unit: &Unit, goal: &Goal<'_>) -> Result<Built, String> {
     if let Some((line, safe_z)) = goal.from_line {
         restart(&mut motion, line, safe_z);
     }
@@ -163,7 +174,7 @@ pub fn build(unit: &Unit, goal: &Goal<'_>) -> Result<Built, String> {
 fn built(motion: Motion, artifacts: Vec<Artifact>, more: Vec<Diagnostic>) -> Built {
     let mut found = motion.found;
     found.extend(more);
-    Built { artifacts, found, sources: motion.sources, subs: motion.subs }
+    Built { artifacts, written: None, found, sources: motion.sources, subs: motion.subs }
 }
 
 /// Lets the program begin later.
@@ -238,12 +249,26 @@ pub fn stem(path: &Path) -> String {
     path.file_stem().map_or("program".into(), |s| s.to_string_lossy().into_owned())
 }
 
-fn canon(unit: &Unit) -> Built {
-    let version = if unit.setup.dialect.id == "linuxcnc-2.10" { Version::V2_10 } else { Version::V2_9 };
-    let printer = Printer::new(Vec::new(), version).latin1(unit.encoding == gr_text::Encoding::Latin1);
-    let (printer, disk) = run(unit, printer);
-    let artifacts = one(printer.into_inner());
-    Built { artifacts, found: Vec::new(), sources: disk.sources(), subs: disk.subs().cloned().collect() }
+fn canon(unit: &Unit, file: Option<&Path>) -> Result<Result<(Built, Checked), String>, Checked> {
+    let version = crate::setup::version_of(unit.setup.dialect);
+    let latin1 = unit.encoding == gr_text::Encoding::Latin1;
+    let built = |artifacts, written, files: &gr_driver::Loaded| Built {
+        artifacts,
+        written,
+        found: Vec::new(),
+        sources: Sources::default(),
+        subs: files.subs().cloned().collect(),
+    };
+    // Beside the goal while it is being made; in memory when that can't be, which then says why when it is written.
+    if let Some(pending) = file.and_then(|f| Pending::new(f).ok()) {
+        let (printer, files, checked) = run(unit, Printer::new(pending, version).latin1(latin1))?;
+        return Ok(match printer.finish() {
+            Ok(pending) => Ok((built(Vec::new(), Some(pending), &files), checked)),
+            Err(e) => Err(format!("{}: {e}", file.unwrap_or(Path::new("-")).display())),
+        });
+    }
+    let (printer, files, checked) = run(unit, Printer::new(Vec::new(), version).latin1(latin1))?;
+    Ok(Ok((built(one(printer.into_inner()), None, &files), checked)))
 }
 
 type Made = Result<(Vec<Artifact>, Vec<Diagnostic>), Vec<Diagnostic>>;
@@ -285,7 +310,7 @@ fn stored(o: &mut rs274ngc::Options, unit: &Unit) {
         }
         o.stored_rotations[n] = param(base + 9).to_radians();
     }
-    for tool in unit.setup.tools.rows.iter().skip(1).filter(|t| &*t.comment != crate::setup::ASSUMED) {
+    for tool in unit.setup.tools.rows.iter().skip(1).filter(|t| &*t.comment != gr_interp::ASSUMED) {
         let mut offset = tool.offset;
         offset.iter_mut().enumerate().for_each(|(i, v)| *v = axis(i, *v));
         o.tools.push((tool.number, offset));

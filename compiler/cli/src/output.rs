@@ -24,10 +24,19 @@ impl Pending {
         let file = std::fs::File::create(&beside)?;
         Ok(Pending { goal: goal.to_path_buf(), beside, file: Some(file) })
     }
+    /// Copies what was written to standard output. A reader that went away (`| head`) is no error.
+    pub fn to_stdout(self) -> std::io::Result<()> {
+        let mut file = std::fs::File::open(&self.beside)?;
+        match std::io::copy(&mut file, &mut std::io::stdout().lock()) {
+            Err(e) if e.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
+            other => other.map(|_| ()),
+        }
+    }
     /// The result is complete: puts it in its place.
     pub fn commit(mut self) -> std::io::Result<()> {
+        std::fs::rename(&self.beside, &self.goal)?;
         self.file.take();
-        std::fs::rename(&self.beside, &self.goal)
+        Ok(())
     }
 }
 
@@ -51,7 +60,12 @@ impl Drop for Pending {
 
 /// Writes several files so that all of them appear or none: all beside their goals first, then renamed.
 pub fn write_all(files: &[(PathBuf, Vec<u8>)]) -> Result<(), (PathBuf, std::io::Error)> {
-    let mut pending = Vec::new();
+    write_with(files, Vec::new())
+}
+
+/// The same with files that are written beside their goals already.
+pub fn write_with(files: &[(PathBuf, Vec<u8>)], written: Vec<Pending>) -> Result<(), (PathBuf, std::io::Error)> {
+    let mut pending: Vec<(PathBuf, Pending)> = written.into_iter().map(|p| (p.goal.clone(), p)).collect();
     for (path, bytes) in files {
         let write = || {
             let mut p = Pending::new(path)?;
@@ -59,10 +73,10 @@ pub fn write_all(files: &[(PathBuf, Vec<u8>)]) -> Result<(), (PathBuf, std::io::
             p.flush()?;
             Ok(p)
         };
-        pending.push((path, write().map_err(|e| (path.clone(), e))?));
+        pending.push((path.clone(), write().map_err(|e| (path.clone(), e))?));
     }
     for (path, p) in pending {
-        p.commit().map_err(|e| (path.clone(), e))?;
+        p.commit().map_err(|e| (path, e))?;
     }
     Ok(())
 }

@@ -4,7 +4,6 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use gr_gcode::{Form, Keyword, LineKind, Node, OLabel, Scan};
-use gr_spec::Dialect;
 
 /// Which query ran: for the tests and benchmarks that count re-executed queries.
 #[derive(Clone, Copy, Debug)]
@@ -173,7 +172,7 @@ pub(crate) enum LabelKind {
 #[salsa::tracked(returns(ref))]
 pub(crate) fn shape(db: &dyn Db, chunk: ChunkText, run: RunOptions) -> Shape {
     let scan = scanned(db, chunk, run);
-    shape_of(&scan, chunk.text(db), run.options(db).setup.dialect)
+    shape_of(&scan, chunk.text(db), &run.options(db).setup)
 }
 
 /// G-codes (times ten) that touch neither parameters nor the tool table.
@@ -204,7 +203,8 @@ fn comment_acts(text: &str) -> bool {
     ["print", "debug", "log", "abort", "py", "probe"].iter().any(|w| word.starts_with(w))
 }
 
-pub(crate) fn shape_of(scan: &Scan, text: &str, dialect: &'static Dialect) -> Shape {
+pub(crate) fn shape_of(scan: &Scan, text: &str, setup: &gr_interp::Setup) -> Shape {
+    let dialect = setup.dialect;
     let mut shape = Shape { lines: scan.lines.len() as u32, bytes: text.len() as u32, damaged: !scan.faults.is_empty(), ..Shape::default() };
     let mut labels = Vec::new();
     let mut outline = Vec::new();

@@ -21,7 +21,7 @@ struct Known {
 }
 
 /// Lines in a chunk of a subroutine file.
-const CHUNK: usize = 1024;
+pub(crate) const CHUNK: usize = 1024;
 
 impl Disk {
     fn lock(&self) -> std::sync::MutexGuard<'_, Vec<Known>> {

@@ -228,6 +228,29 @@ fn ends_program(scan: &gr_gcode::Scan, line: u32) -> bool {
     scan.words(line).iter().any(|w| w.letter == b'm' && w.form == Form::Literal && (w.value == 2.0 || w.value == 30.0))
 }
 
+/// State around a line of a chunk without control flow.
+pub(crate) fn around(chunk: &Chunk, line: u32, entry: &Boundary, env: &Environment, options: &Options) -> Option<crate::StateAt> {
+    let first = if entry.opening { opened(chunk).0 } else { 0 };
+    let run = |lines, state: &State, params: &Params| run_lines(chunk, lines, state, params, &options.setup, Discard);
+    let before = run(first..line.max(first), &entry.state, &env.params);
+    if before.end != gr_interp::End::Chunk {
+        return None;
+    }
+    if line < first {
+        return Some(crate::StateAt { before: before.state.modal, after: before.state.modal });
+    }
+    let after = run(line..line + 1, &before.state, &before.params);
+    Some(crate::StateAt { before: before.state.modal, after: after.state.modal })
+}
+
+/// What a run of the whole file goes on with at a chunk: state, parameters, first line.
+pub(crate) fn entry_of(entry: &Boundary, env: &Environment, line: u32, shift: u32) -> (State, Params, u32) {
+    let mut state = (*entry.state).clone();
+    // From lines of the chunk to lines of the file.
+    state.queue.count_lines_from(line.wrapping_neg());
+    (state, env.params.clone(), if entry.opening { line.max(shift + 1) } else { line })
+}
+
 fn percent_line(chunk: &Chunk, from: u32) -> u32 {
     let lines = chunk.scan.lines.iter().enumerate().skip(from as usize);
     lines.filter(|(_, l)| l.kind == LineKind::Percent).map(|(i, _)| i as u32).next().unwrap_or(0)

@@ -8,13 +8,13 @@ use std::sync::Arc;
 use gr_gcode::{Chunk, File};
 use gr_spec::Dialect;
 
-/// Lines in a chunk.
-const CHUNK: usize = 4096;
+/// Lines in a chunk; the tables of more would leave the processor's cache and fault in new pages.
+const CHUNK: usize = 1024;
 
 /// A text that is scanned as it is read.
 pub struct Lazy {
     path: Box<str>,
-    text: String,
+    text: Arc<str>,
     dialect: &'static Dialect,
     reading: RefCell<Reading>,
     whole: OnceCell<File>,
@@ -32,12 +32,16 @@ struct Reading {
 
 impl Lazy {
     /// Nothing is scanned yet.
-    pub fn new(path: &str, text: String, dialect: &'static Dialect) -> Lazy {
+    pub fn new(path: &str, text: Arc<str>, dialect: &'static Dialect) -> Lazy {
         Lazy { path: path.into(), text, dialect, reading: RefCell::default(), whole: OnceCell::new() }
     }
     /// The text.
-    pub fn text(&self) -> &str {
+    pub fn text(&self) -> &Arc<str> {
         &self.text
+    }
+    /// Its name.
+    pub fn path(&self) -> &str {
+        &self.path
     }
     /// The whole file, scanned now if it was not.
     pub fn file(&self) -> &File {
@@ -94,7 +98,7 @@ mod tests {
     #[test]
     fn lines_are_those_of_the_whole_file() {
         let text: String = (0..10_000).map(|i| format!("G1 X{i}\r\nY1\rZ2\n")).collect();
-        let lazy = Lazy::new("a", text.clone(), Dialect::linuxcnc());
+        let lazy = Lazy::new("a", text.as_str().into(), Dialect::linuxcnc());
         let whole = crate::disk::file_of("a", &text, 77, Dialect::linuxcnc());
         let span = |(chunk, l, _): (Chunk, u32, u32)| chunk.text[chunk.scan.line_span(&chunk.text, l).range()].to_string();
         for line in (0..whole.line_count()).step_by(997) {

@@ -4,12 +4,14 @@ use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
 
+use gr_gcode::Symbols;
 use gr_interp::Setup;
 use gr_text::{Diagnostic, FileId};
 use salsa::Setter as _;
 
 use crate::check::{self, Check};
 use crate::db::{ChunkText, Database, Db as _, Document, Executed, RunOptions};
+use crate::hover::{self, StateAt};
 use crate::lints::{Limits, Rules};
 use crate::store::{Store, Texts, chunk_lines};
 
@@ -153,6 +155,16 @@ impl Session {
         self.document(file).map_or_else(Vec::new, |d| check::check_range(&self.db, d, lines))
     }
 
+    /// Modes and position around a line, when execution comes there.
+    pub fn state_at(&self, file: FileId, line: u32) -> Option<StateAt> {
+        hover::state_at(&self.db, self.document(file)?, line)
+    }
+
+    /// Labels, parameters and codes of a file, under its own lines and bytes.
+    pub fn symbols(&self, file: FileId) -> Symbols {
+        self.document(file).map_or_else(Symbols::default, |d| hover::symbols(&self.db, d))
+    }
+
     /// A view for another thread. Edits wait until it is dropped, and cancel what it is doing.
     pub fn snapshot(&self) -> Snapshot {
         Snapshot { db: self.db.clone(), documents: self.files.iter().map(|f| f.as_ref().map(|o| o.document)).collect() }
@@ -186,6 +198,14 @@ impl Snapshot {
     /// What is to be said about some lines, as far as the blocks up to their end tell it.
     pub fn check_range(&self, file: FileId, lines: Range<u32>) -> Result<Vec<Diagnostic>, Cancelled> {
         self.guarded(file, |db, d| check::check_range(db, d, lines.clone()))
+    }
+    /// Modes and position around a line, when execution comes there.
+    pub fn state_at(&self, file: FileId, line: u32) -> Result<Option<StateAt>, Cancelled> {
+        self.guarded(file, |db, d| hover::state_at(db, d, line))
+    }
+    /// Labels, parameters and codes of a file, under its own lines and bytes.
+    pub fn symbols(&self, file: FileId) -> Result<Symbols, Cancelled> {
+        self.guarded(file, hover::symbols)
     }
     fn guarded<T: Default>(&self, file: FileId, work: impl Fn(&Database, Document) -> T) -> Result<T, Cancelled> {
         let Some(Some(document)) = self.documents.get(file.0 as usize) else { return Ok(T::default()) };

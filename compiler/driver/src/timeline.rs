@@ -184,14 +184,14 @@ pub(crate) fn timeline_to<'db>(db: &'db dyn Db, document: Document, line: u32) -
 
 /// What is carried along for lints that compare distant parts.
 #[derive(Default)]
-struct Late {
+pub(crate) struct Late {
     cuts: Cuts,
     bare_cut: Option<Where>,
-    found: Vec<Found>,
+    pub(crate) found: Vec<Found>,
 }
 
 impl Late {
-    fn take(&mut self, summary: &Summary, first_line: u32, rules: &crate::Rules) {
+    pub(crate) fn take(&mut self, summary: &Summary, first_line: u32, rules: &crate::Rules) {
         for dive in &summary.dives {
             if let Some(mut found) = dive.judge(&self.cuts, rules) {
                 found.place.line = found.place.line.wrapping_add(first_line);

@@ -13,8 +13,8 @@ use super::complain;
 use crate::emit::{Built, Goal, TargetOptions, build, stem};
 use crate::exit::Exit;
 use crate::options::{BuildArgs, Global};
-use crate::output::{depfile, to_stdout, write_all};
-use crate::pipeline::open;
+use crate::output::{Pending, depfile, to_stdout, write_with};
+use crate::pipeline::load;
 use crate::progress::Progress;
 use crate::project::Project;
 use crate::render::Renderer;
@@ -70,6 +70,8 @@ struct Round<'a> {
     exit: Exit,
     files: Vec<PathBuf>,
     results: Vec<(PathBuf, Vec<u8>)>,
+    /// Results that are written beside their goals already.
+    written: Vec<(PathBuf, Pending)>,
     rules: String,
 }
 
@@ -84,6 +86,7 @@ impl<'a> Round<'a> {
             exit: Exit::Ok,
             files: args.files.clone(),
             results: Vec::new(),
+            written: Vec::new(),
             rules: String::new(),
         }
     }
@@ -178,27 +181,23 @@ impl<'a> Round<'a> {
 
     fn job(&mut self, job: &Job, station: &Station) {
         let progress = Progress::new(self.global.quiet, format!("building {} ({})", job.source.display(), job.target.id));
-        let unit = match open(&job.source, station) {
-            Ok((unit, checked)) => {
-                drop(progress);
-                show(&mut self.renderer, &checked);
-                unit
-            }
-            Err(checked) => {
-                drop(progress);
-                show(&mut self.renderer, &checked);
-                return self.fail(if checked.unreadable { Exit::Io } else { Exit::Findings });
-            }
-        };
-        let progress = Progress::new(self.global.quiet, format!("building {} ({})", job.source.display(), job.target.id));
-        let goal = Goal { target: job.target.id, options: &job.options, machine: station.machine.as_ref(), from_line: self.args.from_line.map(|l| (l, self.args.safe_z)) };
-        let made = build(&unit, &goal);
+        let from_line = self.args.from_line.map(|l| (l, self.args.safe_z));
+        let file = job.goal.clone().unwrap_or_else(|| std::env::temp_dir().join("gcc-robot"));
+        let goal = Goal { target: job.target.id, options: &job.options, machine: station.machine.as_ref(), from_line, file: Some(&file) };
+        let made = load(&job.source, station).and_then(|unit| build(&unit, &goal));
         drop(progress);
         match made {
-            Ok(built) => self.keep(job, station, built),
-            Err(text) => {
+            Ok(Ok((built, checked))) => {
+                show(&mut self.renderer, &checked);
+                self.keep(job, station, built);
+            }
+            Ok(Err(text)) => {
                 eprintln!("{text}");
                 self.fail(Exit::Usage);
+            }
+            Err(checked) => {
+                show(&mut self.renderer, &checked);
+                self.fail(if checked.unreadable { Exit::Io } else { Exit::Findings });
             }
         }
     }
@@ -217,6 +216,7 @@ impl<'a> Round<'a> {
             if let Some(main) = built.artifacts.into_iter().next() {
                 self.results.push((PathBuf::from("-"), main.bytes));
             }
+            self.written.extend(built.written.map(|p| (PathBuf::from("-"), p)));
             return;
         };
         let mut read = vec![job.source.clone()];
@@ -227,6 +227,7 @@ impl<'a> Round<'a> {
             return self.fail(Exit::Findings);
         }
         self.rules.push_str(&depfile(goal, &read));
+        self.written.extend(built.written.map(|p| (goal.clone(), p)));
         for artifact in built.artifacts {
             let path = if artifact.suffix.is_empty() {
                 goal.clone()
@@ -244,16 +245,21 @@ impl<'a> Round<'a> {
         }
         let results = std::mem::take(&mut self.results);
         let (stdout, files): (Vec<_>, Vec<_>) = results.into_iter().partition(|(p, _)| p == Path::new("-"));
+        let written = std::mem::take(&mut self.written);
+        let (spooled, beside): (Vec<_>, Vec<_>) = written.into_iter().partition(|(p, _)| p == Path::new("-"));
+        let names: Vec<PathBuf> = files.iter().map(|(p, _)| p.clone()).chain(beside.iter().map(|(p, _)| p.clone())).collect();
+        let beside = beside.into_iter().map(|(_, p)| p).collect();
         let folders = files.iter().filter_map(|(p, _)| p.parent()).filter(|p| !p.as_os_str().is_empty());
         let written = folders
             .map(|f| std::fs::create_dir_all(f).map_err(|e| (f.to_path_buf(), e)))
             .collect::<Result<Vec<()>, _>>()
-            .and_then(|_| write_all(&files))
-            .and_then(|()| stdout.iter().try_for_each(|(p, b)| to_stdout(b).map_err(|e| (p.clone(), e))));
+            .and_then(|_| write_with(&files, beside))
+            .and_then(|()| stdout.iter().try_for_each(|(p, b)| to_stdout(b).map_err(|e| (p.clone(), e))))
+            .and_then(|()| spooled.into_iter().try_for_each(|(path, p)| p.to_stdout().map_err(|e| (path, e))));
         match written {
             Ok(()) if !self.global.quiet && self.args.files.is_empty() => {
                 let here = std::env::current_dir().unwrap_or_default();
-                files.iter().for_each(|(p, _)| eprintln!("built {}", p.strip_prefix(&here).unwrap_or(p).display()));
+                names.iter().for_each(|p| eprintln!("built {}", p.strip_prefix(&here).unwrap_or(p).display()));
             }
             Ok(()) => {}
             Err((path, e)) => {

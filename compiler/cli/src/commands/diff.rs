@@ -11,7 +11,7 @@ use super::check::show;
 use crate::emit::{Goal, build};
 use crate::exit::Exit;
 use crate::options::{DiffArgs, Global, LintArgs, SetupArgs, UnitArg, VerifyArgs};
-use crate::pipeline::{Motion, Unit, motion, open};
+use crate::pipeline::{Motion, load, motion, motion_of};
 use crate::progress::Progress;
 use crate::render::{MessageFormat, Renderer};
 use crate::setup::{Station, station};
@@ -61,8 +61,7 @@ fn prepare(setup: &SetupArgs, renderer: &mut Renderer) -> Option<Station> {
 }
 
 fn read(path: &Path, station: &Station) -> Result<Motion, super::check::Checked> {
-    let (unit, _) = open(path, station)?;
-    Ok(motion(&unit, None))
+    Ok(motion(&load(path, station)?, None)?.0)
 }
 
 /// Prints what differs.
@@ -127,20 +126,21 @@ fn as_json(result: &Diff, a: &Sources, b: &Sources) -> String {
 pub fn verify(global: &Global, args: &VerifyArgs) -> Exit {
     let mut renderer = global.renderer(true);
     let Some(station) = prepare(&args.setup, &mut renderer) else { return Exit::Findings };
-    let (unit, _) = match open(&args.file, &station) {
-        Ok(unit) => unit,
+    let goal = Goal { target: "rs274ngc", options: &args.options, machine: None, from_line: None, file: None };
+    let made = load(&args.file, &station).and_then(|unit| {
+        let a = motion(&unit, None)?.0;
+        Ok((build(&unit, &goal)?, unit, a))
+    });
+    let (built, unit, a) = match made {
+        Ok((Ok((built, _)), unit, a)) => (built, unit, a),
+        Ok((Err(text), ..)) => {
+            eprintln!("{text}");
+            return Exit::Usage;
+        }
         Err(checked) => {
             show(&mut renderer, &checked);
             renderer.finish(false);
             return if checked.unreadable { Exit::Io } else { Exit::Findings };
-        }
-    };
-    let goal = Goal { target: "rs274ngc", options: &args.options, machine: None, from_line: None };
-    let built = match build(&unit, &goal) {
-        Ok(built) => built,
-        Err(text) => {
-            eprintln!("{text}");
-            return Exit::Usage;
         }
     };
     let Some(main) = built.artifacts.into_iter().next() else {
@@ -151,8 +151,7 @@ pub fn verify(global: &Global, args: &VerifyArgs) -> Exit {
     let text = String::from_utf8_lossy(&main.bytes).into_owned();
     let mut setup = unit.setup.clone();
     setup.dialect = args.options.to.as_deref().and_then(Dialect::find).unwrap_or_else(Dialect::linuxcnc);
-    let again = Unit { path: "<translation>".into(), text, encoding: gr_text::Encoding::Utf8, setup };
-    let (a, b) = (motion(&unit, None), motion(&again, None));
+    let b = motion_of("<translation>", text, &setup);
     let tolerance = Tolerance { length: allowed(args), rate: 1e-3, ..Tolerance::default() };
     let mut result = diff(&a.program, &b.program, &tolerance);
     if args.options.to.as_deref() == Some("grbl") {

@@ -10,7 +10,7 @@ use crate::emit::{picture, stem};
 use crate::exit::Exit;
 use crate::options::{Global, LintArgs, PreviewArgs, ViewArg};
 use crate::output::write_all;
-use crate::pipeline::{motion, open};
+use crate::pipeline::{load, motion};
 use crate::progress::Progress;
 use crate::setup::station;
 use crate::sources::{Sources, reason};
@@ -23,8 +23,8 @@ pub fn run(global: &Global, args: &PreviewArgs) -> Exit {
         return Exit::Findings;
     };
     let progress = Progress::new(global.quiet, format!("drawing {}", args.file.display()));
-    let unit = match open(&args.file, &station) {
-        Ok((unit, _)) => unit,
+    let motion = match load(&args.file, &station).and_then(|unit| motion(&unit, None)) {
+        Ok((motion, _)) => motion,
         Err(checked) => {
             drop(progress);
             show(&mut renderer, &checked);
@@ -32,7 +32,6 @@ pub fn run(global: &Global, args: &PreviewArgs) -> Exit {
             return if checked.unreadable { Exit::Io } else { Exit::Findings };
         }
     };
-    let motion = motion(&unit, None);
     let bad = motion.found.iter().any(|d| d.severity == Severity::Error);
     let kind = args.output.extension().map_or(String::new(), |e| e.to_string_lossy().to_ascii_lowercase());
     let made = picture(&motion.program, &kind, &options(args));

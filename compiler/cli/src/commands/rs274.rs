@@ -8,15 +8,13 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use gr_canon::{At, Call, FrameId, Printer, Sink as _, Units, Version};
-use gr_gcode::{Chunk, File};
-use gr_interp::{End, Files, Finding, Interp, Setup, ToolTable};
+use gr_driver::Loaded;
+use gr_gcode::Chunk;
+use gr_interp::{End, Finding, Interp, Setup, ToolTable};
 use gr_spec::{Dialect, Rs274, fill, rs274};
 use gr_text::{FileId, decode};
 
 use crate::sources::is_latin1;
-
-/// Lines in a chunk.
-const CHUNK: usize = 4096;
 
 /// The tools that the real command reads when no table is named, from LinuxCNC's sample configuration.
 const DEFAULT_TOOLS: &str = "T1 P1 D0.125000 Z+0.511000\nT2 P2 D0.062500 Z+0.100000\nT3 P3 D0.201000 Z+1.273000\nT99999 P123 Z+0.100000\n";
@@ -285,7 +283,7 @@ fn execute(choice: &Choice) -> Result<u8, Quit> {
         Some(tools) => tools.clone(),
         None => gr_interp::read_tools(DEFAULT_TOOLS, FileId(0)).0,
     };
-    let program = program(choice)?;
+    let program = program(choice);
     let mut printer = printer(choice, program.latin1)?;
     let mut setup = setup(choice, tools);
     let stored = match parameters(choice) {
@@ -299,7 +297,7 @@ fn execute(choice: &Choice) -> Result<u8, Quit> {
         }
     };
     setup.params = stored.clone();
-    let mut files = Disk { files: vec![program.file], known: BTreeMap::new(), setup: setup.clone() };
+    let mut files = Loaded::new(&program.name, program.text.into(), &setup);
     let mut run = Interp::new(&mut files, &setup, printer);
     run.init();
     run.sink().flush();
@@ -340,73 +338,44 @@ fn execute(choice: &Choice) -> Result<u8, Quit> {
 
 /// The main program.
 struct Program {
-    file: File,
+    name: String,
+    text: String,
     latin1: bool,
     /// None: lines come from the keyboard. Otherwise whether the file can be opened, or why not.
     open: Option<Result<(), String>>,
 }
 
-fn program(choice: &Choice) -> Result<Program, Quit> {
-    let Some(name) = choice.files.first() else {
-        return Ok(Program { file: File::default(), latin1: false, open: None });
-    };
+fn program(choice: &Choice) -> Program {
+    let none = |open| Program { name: String::new(), text: String::new(), latin1: false, open };
+    let Some(name) = choice.files.first() else { return none(None) };
     let path = Path::new(name);
-    let shown = path.display().to_string();
-    if let Some(file) = by_pieces(path, &shown, dialect(choice.version)) {
-        return Ok(Program { file, latin1: false, open: Some(Ok(())) });
-    }
-    let bytes = match std::fs::read(path) {
-        Ok(bytes) => bytes,
+    let name = path.display().to_string();
+    match std::fs::read(path) {
+        Ok(bytes) => {
+            let decoded = decode(bytes);
+            let latin1 = is_latin1(&decoded);
+            Program { name, text: without_lone_returns(decoded.text), latin1, open: Some(Ok(())) }
+        }
         Err(_) => {
             let text = if path.is_dir() { rs274::CLI_EMPTY_FILE } else { rs274::CLI_OPEN_FAILED };
-            let why = fill(text.text(), &[shown]);
-            return Ok(Program { file: File::default(), latin1: false, open: Some(Err(why)) });
-        }
-    };
-    let decoded = decode(bytes);
-    let latin1 = is_latin1(&decoded);
-    Ok(Program { file: file_of(&shown, &decoded.text, dialect(choice.version)), latin1, open: Some(Ok(())) })
-}
-
-/// Bytes read at a time.
-const PIECE: usize = 1 << 18;
-
-/// Reads a plain UTF-8 file piece by piece, so that its text is in memory once only. None: it is something else.
-fn by_pieces(path: &Path, name: &str, dialect: &'static Dialect) -> Option<File> {
-    use std::io::Read as _;
-    let input = std::fs::File::open(path).ok().filter(|f| f.metadata().is_ok_and(|m| m.is_file()))?;
-    let mut chunks = Vec::new();
-    let mut held: Vec<u8> = Vec::with_capacity(2 * PIECE);
-    loop {
-        let before = held.len();
-        let read = (&input).take(PIECE as u64).read_to_end(&mut held).ok()?;
-        if chunks.is_empty() && before == 0 && held.first().is_some_and(|b| matches!(b, 0xEF | 0xFE | 0xFF)) {
-            return None;
-        }
-        // Chunks end behind a line feed, so that no CRLF is cut.
-        let end = if read == 0 { held.len() } else { held.iter().rposition(|b| *b == b'\n').map_or(0, |n| n + 1) };
-        let text = std::str::from_utf8(&held[..end]).ok()?;
-        if !text.is_empty() {
-            chunks.push(Chunk { text: text.into(), scan: std::sync::Arc::new(gr_gcode::scan(text, dialect)) });
-        }
-        held.drain(..end);
-        if read == 0 {
-            return Some(File::new(name, chunks));
+            none(Some(Err(fill(text.text(), &[name]))))
         }
     }
+}
+
+/// A carriage return within a line is a blank to `rs274`, which drops it even in comments; to the other commands it
+/// ends a line, as in files of old.
+fn without_lone_returns(text: String) -> String {
+    let lone = |at: usize| !matches!(text.as_bytes().get(at + 1), Some(b'\n'));
+    if !text.bytes().enumerate().any(|(i, b)| b == b'\r' && lone(i)) {
+        return text;
+    }
+    text.char_indices().filter(|(i, c)| *c != '\r' || !lone(*i)).map(|(_, c)| c).collect()
 }
 
 fn dialect(version: Version) -> &'static Dialect {
     let name = if version == Version::V2_10 { "linuxcnc-2.10" } else { "linuxcnc-2.9" };
     Dialect::find(name).unwrap_or_else(Dialect::linuxcnc)
-}
-
-fn file_of(name: &str, text: &str, dialect: &'static Dialect) -> File {
-    let chunks = gr_gcode::split_chunks(text, CHUNK)
-        .into_iter()
-        .map(|part| Chunk { text: part.into(), scan: std::sync::Arc::new(gr_gcode::scan(part, dialect)) })
-        .collect();
-    File::new(name, chunks)
 }
 
 fn printer(choice: &Choice, latin1: bool) -> Result<Out, Quit> {
@@ -470,33 +439,6 @@ fn save(choice: &Choice, run: &Interp<'_, Out>) {
     let written = gr_interp::save_parameters(path, &old, &|n| run.params().get(n));
     if missing && written.is_ok() {
         say(rs274::CLI_LINK_FAILED, &[]);
-    }
-}
-
-/// Files of the run: the program is number 0.
-struct Disk {
-    files: Vec<File>,
-    known: BTreeMap<PathBuf, FileId>,
-    setup: Setup,
-}
-
-impl Files for Disk {
-    fn file(&self, id: FileId) -> &File {
-        &self.files[id.0 as usize]
-    }
-    fn find_sub(&mut self, name: &str) -> Option<FileId> {
-        for path in gr_interp::subroutine_paths(&self.setup, name) {
-            if let Some(id) = self.known.get(&path) {
-                return Some(*id);
-            }
-            let Ok(bytes) = std::fs::read(&path) else { continue };
-            let file = file_of(&path.to_string_lossy(), &decode(bytes).text, self.setup.dialect);
-            self.files.push(file);
-            let id = FileId(self.files.len() as u32 - 1);
-            self.known.insert(path, id);
-            return Some(id);
-        }
-        None
     }
 }
 

@@ -32,7 +32,7 @@ pub(crate) struct Dive {
 }
 
 /// A program that dives more often than this in one chunk is not telling anything by it.
-const MOST_PER_CHUNK: usize = 16;
+pub(super) const MOST_PER_CHUNK: usize = 16;
 
 impl Cuts {
     #[inline]

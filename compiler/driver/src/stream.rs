@@ -1,0 +1,219 @@
+//! One run of a program from top to bottom, into a sink: what a build is made from.
+//!
+//! The program is scanned as it is read, so that a big file needs little more memory than its text. On request
+//! the lints watch the same run; when neither they nor the interpreter have anything to say the program is
+//! *clean*, and need not be checked again. Otherwise [`crate::Session::check`] says what there is to say: there is
+//! one wording of findings, and it is there.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use gr_canon::{At, Call, CallFrame, FileId, FrameId, Mark, Sink};
+use gr_gcode::{Chunk, File};
+use gr_interp::{End, Files, Interp, Outcome, Setup};
+use gr_ir::{Lowering, Program};
+
+use crate::db::{Shape, shape_of};
+use crate::lazy::Lazy;
+use crate::lints::{Flags, Lints};
+use crate::timeline::Late;
+use crate::{Options, Rules};
+
+/// The files of one run: the program, number 0, and the subroutine files it pulls in.
+pub struct Loaded {
+    main: Lazy,
+    subs: Vec<File>,
+    known: BTreeMap<PathBuf, FileId>,
+    setup: Setup,
+}
+
+impl Loaded {
+    /// The program and what it will be run with. Nothing is scanned yet.
+    pub fn new(path: &str, text: Arc<str>, setup: &Setup) -> Loaded {
+        Loaded { main: Lazy::new(path, text, setup.dialect), subs: Vec::new(), known: BTreeMap::new(), setup: setup.clone() }
+    }
+    /// Subroutine files that were pulled in, in the order of their names.
+    pub fn subs(&self) -> impl Iterator<Item = &PathBuf> {
+        self.known.keys()
+    }
+    /// Names and texts of all files, under the numbers that the stream uses.
+    pub fn texts(&self) -> Vec<(Box<str>, Arc<str>)> {
+        let text = |f: &File| f.chunks.iter().map(|c| &*c.text).collect::<String>().into();
+        let main = (self.main.path().into(), self.main.text().clone());
+        std::iter::once(main).chain(self.subs.iter().map(|f| (f.path.clone(), text(f)))).collect()
+    }
+}
+
+impl Files for Loaded {
+    fn file(&self, id: FileId) -> &File {
+        match (id.0 as usize).checked_sub(1) {
+            Some(sub) => &self.subs[sub],
+            None => self.main.file(),
+        }
+    }
+    fn find_sub(&mut self, name: &str) -> Option<FileId> {
+        for path in gr_interp::subroutine_paths(&self.setup, name) {
+            if let Some(id) = self.known.get(&path) {
+                return Some(*id);
+            }
+            let Ok(bytes) = std::fs::read(&path) else { continue };
+            let text = gr_text::decode(bytes).text;
+            self.subs.push(crate::disk::file_of(&path.to_string_lossy(), &text, crate::disk::CHUNK, self.setup.dialect));
+            let id = FileId(self.subs.len() as u32);
+            self.known.insert(path, id);
+            return Some(id);
+        }
+        None
+    }
+    fn chunk(&self, id: FileId, line: u32) -> Option<(Chunk, u32, u32)> {
+        if id.0 == 0 {
+            return self.main.chunk(line);
+        }
+        let file = self.file(id);
+        let (c, l) = file.locate(line)?;
+        Some((file.chunks[c].clone(), l, file.first_lines[c]))
+    }
+    fn is_plain(&self, id: FileId) -> bool {
+        id.0 == 0 && self.main.is_plain()
+    }
+}
+
+/// What came of a run.
+pub struct Streamed<S> {
+    /// The sink that was given.
+    pub sink: S,
+    /// The files that were used.
+    pub files: Loaded,
+    /// How the interpreter ended, and what it found.
+    pub outcome: Outcome,
+    /// Lints were asked for, and a check of this program would say nothing at all.
+    pub clean: bool,
+}
+
+/// Runs a program into a sink. With `rules`, the lints watch.
+pub fn stream<S: Sink>(path: &str, text: Arc<str>, setup: &Setup, rules: Option<&Rules>, sink: S) -> Streamed<S> {
+    let mut files = Loaded::new(path, text, setup);
+    let tee = Tee { sink, lints: None, doubt: false };
+    let mut run = Interp::new(&mut files, setup, tee);
+    run.init();
+    let opened = run.open(FileId(0));
+    let mut end = End::Fault;
+    let mut left = None;
+    if opened.is_ok() {
+        let start = *run.modal();
+        run.sink().lints = rules.map(|rules| Lints::new(rules, &start, Flags::default()));
+        end = run.run_open();
+        let tee = run.sink();
+        left = tee.lints.take().map(|lints| (lints, tee.doubt));
+        if let (Some((lints, _)), Some(rules)) = (&mut left, rules)
+            && end != End::Program
+        {
+            // The state before the controller is reset.
+            lints.found.extend(crate::lints::left_on(run.modal(), crate::lints::Where::default(), rules));
+        }
+        // Closing the file and leaving both reset the controller.
+        run.reset();
+        run.reset();
+    }
+    let outcome = run.finish(end);
+    let sink = run.into_sink().sink;
+    let quiet = outcome.findings.is_empty() && outcome.damaged.is_empty() && matches!(end, End::Program | End::Percent);
+    let clean = match (left, rules) {
+        (Some((lints, false)), Some(rules)) if quiet => says_nothing(lints, &files, setup, rules),
+        _ => false,
+    };
+    Streamed { sink, files, outcome, clean }
+}
+
+/// Whether the lints have nothing to say, in the program and about it as a whole.
+fn says_nothing(lints: Lints<'_>, files: &Loaded, setup: &Setup, rules: &Rules) -> bool {
+    let mut late = Late::default();
+    late.take(&lints.summary, 0, rules);
+    if !lints.found.is_empty() || !late.found.is_empty() {
+        return false;
+    }
+    if files.main.is_plain() && setup.dialect.family != gr_spec::Family::Fanuc {
+        return true;
+    }
+    // Labels tell about each other.
+    let file = files.main.file();
+    let options = Options { setup: setup.clone(), rules: rules.clone(), chunk_lines: None };
+    let shapes: Vec<Shape> = file.chunks.iter().map(|c| shape_of(&c.scan, &c.text, &options.setup)).collect();
+    let starts: Vec<(u32, u32)> = file.first_lines.iter().copied().zip(file.starts.iter().copied()).collect();
+    let mut found = Vec::new();
+    crate::lints::labels(&shapes.iter().collect::<Vec<_>>(), &starts, &options, &mut found);
+    found.is_empty()
+}
+
+/// Lets the lints hear what the sink hears.
+struct Tee<'a, S> {
+    sink: S,
+    lints: Option<Lints<'a>>,
+    /// There is more than a lint keeps: it can't be told here whether it matters.
+    doubt: bool,
+}
+
+impl<S: Sink> Sink for Tee<'_, S> {
+    #[inline]
+    fn call(&mut self, at: &At<'_>, call: &Call) {
+        if let Some(lints) = &mut self.lints {
+            lints.call(at, call);
+            self.doubt |= lints.summary.is_full();
+        }
+        self.sink.call(at, call);
+    }
+    fn frame(&mut self, id: FrameId, frame: &CallFrame) {
+        self.sink.frame(id, frame);
+    }
+    fn mark(&mut self, at: &At<'_>, mark: &Mark) {
+        self.sink.mark(at, mark);
+    }
+    fn print(&mut self, text: &str) {
+        self.sink.print(text);
+    }
+}
+
+/// A text with all its tables.
+pub fn scan_file(path: &str, text: &str, dialect: &'static gr_spec::Dialect) -> File {
+    crate::disk::file_of(path, text, crate::disk::CHUNK, dialect)
+}
+
+/// Motion of a program, and where it comes from.
+pub struct Motion {
+    /// The motion.
+    pub program: Program,
+    /// Names and texts of files under the numbers that the motion uses.
+    pub texts: Vec<(Box<str>, Arc<str>)>,
+    /// Subroutine files that were pulled in.
+    pub subs: Vec<PathBuf>,
+    /// Lints were asked for, and a check of this program would say nothing at all.
+    pub clean: bool,
+}
+
+/// Runs a program and lowers it to motion.
+pub fn lower(path: &str, text: Arc<str>, setup: &Setup, rules: Option<&Rules>) -> Motion {
+    let Streamed { sink, files, clean, .. } = stream(path, text, setup, rules, Mute(Lowering::new()));
+    let mut lowering = sink.0;
+    let texts = files.texts();
+    for (i, (name, _)) in texts.iter().enumerate() {
+        lowering.builder_mut().file(FileId(i as u32), name);
+    }
+    Motion { program: lowering.finish(), texts, subs: files.subs().cloned().collect(), clean }
+}
+
+/// Drops texts for standard output.
+struct Mute<S>(S);
+
+impl<S: Sink> Sink for Mute<S> {
+    #[inline]
+    fn call(&mut self, at: &At<'_>, call: &Call) {
+        self.0.call(at, call);
+    }
+    fn frame(&mut self, id: FrameId, frame: &CallFrame) {
+        self.0.frame(id, frame);
+    }
+    fn mark(&mut self, at: &At<'_>, mark: &Mark) {
+        self.0.mark(at, mark);
+    }
+}
