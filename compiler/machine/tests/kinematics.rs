@@ -206,6 +206,23 @@ fn first_point_of_the_scara_run() {
 }
 
 #[test]
+fn first_point_of_the_six_axis_run() {
+    // Part 1, point 1: (0,0,30) in the part, table at 400 −200 500, part at 0 10 0, tool down.
+    let machine = builtin("abb/irb140").unwrap();
+    let k = machine.kinematics();
+    let aim = Frame::new([400.0, -190.0, 530.0], [std::f64::consts::PI, 0.0, 0.0]);
+    let want = [(0, -25.41), (1, 1.79), (2, 16.12), (3, 0.0), (4, 72.10)];
+    let near = |s: &gr_machine::Solution| want.iter().all(|(i, v)| (s.joints[*i].to_degrees() - v).abs() < 0.01);
+    let all = k.inverse_frame(&aim).unwrap();
+    assert!(all.iter().any(near), "{all:?}");
+    // The publication's own rows put the flange at the same place for the first three joints.
+    let rows = gr_machine::reference("abb/irb140").unwrap();
+    let q = [0.4, -0.3, 0.2, 0.0, 0.0, 0.0];
+    let (p, _) = k.forward_frame(&q).unwrap().error_to(&rows.kinematics().forward_frame(&q).unwrap());
+    assert!(norm(p) < 1e-9, "{p:?}");
+}
+
+#[test]
 fn parallel_machine_as_published() {
     use gr_machine::{SphericalAxis, TwoLegs, TwoLegsShape};
     // Chapter 5's example, in mm: R = 1 m, 30°, ls = 0.5, lu = 1.
