@@ -24,3 +24,13 @@ pub fn process(text: &[u8], file: FileId, units: Option<Units>) -> (Option<Proce
     let model = gr_step::Model::new(text, &exchange);
     read::read(&model, file, units)
 }
+
+/// The tools as LinuxCNC's tool table, in mm: number, pocket, length, diameter, and what the tool is.
+pub fn tool_table(tools: &[Tool]) -> String {
+    let line = |t: &Tool| {
+        let length = t.length.unwrap_or(0.0);
+        let name: String = t.name.chars().map(|c| if c < ' ' { ' ' } else { c }).collect();
+        format!("T{0} P{0} Z{length:+.4} D{1:+.4} ;{2} {name}\n", t.number, t.diameter, t.kind)
+    };
+    tools.iter().map(line).collect()
+}

@@ -1,0 +1,154 @@
+//! Structures of a plan, patterns, and what is told about plans that cannot be carried out.
+
+use gr_ir::{Op, Stop};
+use gr_planner::process::Element;
+use gr_planner::{Options, Process, plan, process};
+use gr_text::{Diagnostic, FileId, Severity, code};
+
+const HOLE: &str = include_str!("../../../tests/golden/unb2013/example-a_conical-hole.p21");
+
+/// The hole's file with another main workplan and further instances.
+fn with(elements: &str, more: &str) -> String {
+    HOLE.replace("#60=WORKPLAN('Main workplan',(#59),$,$,$);", &format!("#60=WORKPLAN('Main workplan',({elements}),$,#10,$);\n{more}"))
+}
+
+fn read(text: &str) -> (Process, Vec<Diagnostic>) {
+    let (process, _, out) = process(text.as_bytes(), FileId(0), None);
+    (process.expect("a process"), out)
+}
+
+fn ids(process: &Process) -> Vec<u64> {
+    process.steps().iter().map(|s| s.origin.id).collect()
+}
+
+fn codes(out: &[Diagnostic]) -> Vec<gr_text::Code> {
+    out.iter().filter(|d| d.severity == Severity::Error).map(|d| d.code).collect()
+}
+
+#[test]
+fn conditions_are_decided() {
+    let more = "#70=NC_VARIABLE('count',2.);\n#71=NC_CONSTANT('two',2.);\n#72=COMPARISON_EQUAL(#70,#71);\n#73=IF_STATEMENT('if',#72,#58,#47);\n";
+    let (p, out) = read(&with("#73", more));
+    assert_eq!((ids(&p), codes(&out)), (vec![58], vec![]));
+    let (p, _) = read(&with("#73", &more.replace("'count',2.", "'count',3.")));
+    assert_eq!(ids(&p), [47]);
+    let unknown = more.replace("'count',2.", "'count',$");
+    let (_, out) = read(&with("#73", &unknown));
+    assert_eq!(codes(&out), [code::PLAN_RUN_TIME_DECISION]);
+    assert!(out.iter().any(|d| d.message.contains("variable 'count'")));
+}
+
+#[test]
+fn loops_run_and_end() {
+    let more = "#70=NC_VARIABLE('i',0.);\n#71=NC_CONSTANT('one',1.);\n#72=COMPARISON_LESS(#70,#71);\n#74=ASSIGNMENT('a',#70,#71);\n#75=WORKPLAN('body',(#47,#74),$,$,$);\n#73=WHILE_STATEMENT('while',#72,#75);\n";
+    let (p, out) = read(&with("#73", more));
+    assert_eq!((ids(&p), codes(&out)), (vec![47], vec![]));
+    let endless = more.replace("(#47,#74)", "(#47)");
+    let (_, out) = read(&with("#73", &endless));
+    assert_eq!(codes(&out), [code::PLAN_TOO_MUCH]);
+}
+
+#[test]
+fn structures_with_a_rule() {
+    let (p, out) = read(&with("#73", "#73=SELECTIVE('one of',(#58,#47));\n"));
+    assert_eq!(ids(&p), [58]);
+    assert!(p.orphans.is_empty() && out.iter().any(|d| d.code == code::PLAN_TAKES_TURNS));
+    let (p, out) = read(&with("#73", "#73=PARALLEL('both',(#58,#47));\n"));
+    assert_eq!(ids(&p), [58, 47]);
+    assert!(out.iter().any(|d| d.code == code::PLAN_TAKES_TURNS));
+    let (p, out) = read(&with("#73", "#73=NON_SEQUENTIAL('any order',(#58,#47));\n"));
+    assert_eq!(ids(&p), [58, 47]);
+    assert!(!out.iter().any(|d| d.code == code::PLAN_TAKES_TURNS));
+}
+
+#[test]
+fn a_plan_that_contains_itself() {
+    let (_, out) = read(&with("#47,#73", "#73=WORKPLAN('round',(#58,#60),$,$,$);\n"));
+    assert_eq!(codes(&out), [code::PLAN_GOES_ROUND]);
+}
+
+#[test]
+fn functions_of_the_control() {
+    let more = "#70=DISPLAY_MESSAGE('m','turn the part');\n#71=PROGRAM_STOP('s');\n#72=OPTIONAL_STOP('o');\n";
+    let text = with("#47,#70,#71,#72,#58", more);
+    let (planned, out) = plan(text.as_bytes(), FileId(0), &Options::default());
+    assert_eq!(codes(&out), []);
+    let planned = planned.expect("a program");
+    let stops: Vec<Stop> = planned.program.steps().filter_map(|s| if let Op::Stop(k) = s.op { Some(k) } else { None }).collect();
+    assert_eq!(stops, [Stop::Program, Stop::Optional]);
+    assert!(planned.program.steps().any(|s| matches!(s.op, Op::Note(gr_ir::Note::Message, "turn the part"))));
+    let kinds = planned.process.elements.iter().map(|e| matches!(e, Element::Plan(_))).collect::<Vec<_>>();
+    assert_eq!(kinds, [true]);
+}
+
+#[test]
+fn patterns_repeat_their_feature() {
+    // The hole's own placement is in the frame of each place of the pattern.
+    let base = with("#73", "#73=MACHINING_WORKINGSTEP('many',#15,#90,#48,$);\n#91=CARTESIAN_POINT('',(0.,0.,0.));\n#92=AXIS2_PLACEMENT_3D('',#91,$,$);\n#93=DIRECTION('',(0.,1.,0.));\n")
+        .replace("'',(100.0,75.0,30.0)", "'',(10.0,0.0,30.0)");
+    let row = format!("#90=RECTANGULAR_PATTERN('p',#2,(#48),#92,#34,#94,#93,2,3,#95,$,(),(#96));\n#94=TOLERANCED_LENGTH_MEASURE(20.,#45);\n#95=TOLERANCED_LENGTH_MEASURE(30.,#45);\n#96=RECTANGULAR_OMIT(2,2);\n");
+    let (p, out) = read(&base.replace("#91=", &format!("{row}#91=")));
+    assert_eq!(codes(&out), []);
+    let places: Vec<[f64; 3]> = p.steps()[0].feature.copies.iter().map(|f| f.origin).collect();
+    let flat: Vec<(f64, f64)> = places.iter().map(|p| (p[0], p[1])).collect();
+    assert_eq!(flat, [(10.0, 0.0), (10.0, 20.0), (10.0, 40.0), (-20.0, 0.0), (-20.0, 40.0)]);
+    let circle = "#90=CIRCULAR_PATTERN('c',#2,(#48),#92,#34,1.5707963267948966,4,(),(),$,0.);\n";
+    let (p, out) = read(&base.replace("#91=", &format!("{circle}#91=")));
+    assert_eq!(codes(&out), []);
+    let copies = &p.steps()[0].feature.copies;
+    assert_eq!(copies.len(), 4);
+    assert!((copies[1].origin[0]).abs() < 1e-9 && (copies[1].origin[1] - 10.0).abs() < 1e-9);
+    let (planned, _) = plan(base.replace("#91=", &format!("{circle}#91=")).as_bytes(), FileId(0), &Options::default());
+    let bottoms = planned.expect("a program").program.steps().filter(|s| s.op == Op::Linear && s.end.axes[2] < 20.0).count();
+    assert_eq!(bottoms, 4);
+}
+
+#[test]
+fn files_without_a_plan() {
+    for text in ["", "ISO-10303-21;\nHEADER;\nFILE_SCHEMA(('AUTOMOTIVE_DESIGN'));\nENDSEC;\nDATA;\n#1=CARTESIAN_POINT('',(0.,0.,0.));\nENDSEC;\nEND-ISO-10303-21;\n", "\u{0}\u{1}#1="] {
+        let (planned, out) = plan(text.as_bytes(), FileId(0), &Options::default());
+        assert!(planned.is_none());
+        assert_eq!(codes(&out), [code::PLAN_NO_PROJECT]);
+    }
+}
+
+#[test]
+fn bad_numbers_are_told() {
+    for (old, new) in [("MILLING_TOOL_DIMENSION(10.0,", "MILLING_TOOL_DIMENSION(0.0,"), ("11.819851171331011", "-1.0"), ("(0.0,0.0,-10.0)", "(0.0,0.0,10.0)")] {
+        let text = HOLE.replace(old, new);
+        let (planned, out) = plan(text.as_bytes(), FileId(0), &Options::default());
+        assert!(planned.is_none(), "{new}");
+        assert!(codes(&out).contains(&code::PLAN_BAD_SIZE), "{new}: {out:#?}");
+    }
+}
+
+#[test]
+fn a_drill_wider_than_its_hole() {
+    let text = HOLE.replace("#44=TOLERANCED_LENGTH_MEASURE(10.0,#45)", "#44=TOLERANCED_LENGTH_MEASURE(8.0,#45)");
+    let (_, out) = plan(text.as_bytes(), FileId(0), &Options::default());
+    assert_eq!(codes(&out), [code::PLAN_TOOL_WIDER_THAN_FEATURE]);
+}
+
+#[test]
+fn a_security_plane_inside_the_part_is_not_used() {
+    let text = HOLE.replace("'',(0.0,0.0,55.0)", "'',(0.0,0.0,25.0)");
+    let (planned, out) = plan(text.as_bytes(), FileId(0), &Options::default());
+    assert!(out.iter().any(|d| d.code == code::PLAN_APPROACH_CHANGED));
+    let high = planned.expect("a program").program.steps().filter(|s| s.op == Op::Rapid).map(|s| s.end.axes[2]).fold(0.0, f64::max);
+    assert_eq!(high, 35.0);
+}
+
+#[test]
+fn multistep_drilling_pecks() {
+    let text = HOLE.replace("DRILLING($,$,'Drilling',5.0,#56,#49,#54,#55,$,11.819851171331011,$,$,$,#57)", "MULTISTEP_DRILLING($,$,'Drilling',5.0,#56,#49,#54,#55,$,10.,$,0.5,$,#57,20.,4.,3.,$)")
+        .replace("CENTER_MULTISTEP", "CENTER");
+    let (planned, out) = plan(text.as_bytes(), FileId(0), &Options::default());
+    assert_eq!(codes(&out), []);
+    let program = planned.expect("a program").program;
+    let depths: Vec<f64> = program.steps().filter(|s| s.op == Op::Linear).map(|s| 30.0 - s.end.axes[2]).collect();
+    assert_eq!(depths, [10.0, 4.0, 7.0, 10.0]);
+    // Out to the retract plane between pecks, back to 1 mm above the bottom.
+    let rapids: Vec<f64> = program.steps().filter(|s| s.op == Op::Rapid).map(|s| 30.0 - s.end.axes[2]).collect();
+    assert!(rapids.ends_with(&[-5.0, 3.0, -5.0, 6.0, -5.0, -25.0]), "{rapids:?}");
+    assert!(program.steps().any(|s| s.op == Op::Dwell(0.5)));
+}
