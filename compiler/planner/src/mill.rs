@@ -41,7 +41,7 @@ pub(crate) fn mill(e: &mut Emit<'_>, step: &Workingstep, m: &Milling, feature: &
         Shape::Face { .. } => job.face(),
         Shape::Pocket { .. } | Shape::OpenPocket { .. } | Shape::Hole { .. } => job.area(e),
         Shape::Slot { path, section, ends } => job.slot(path, section, ends, tolerance),
-        Shape::Step { length, direction, wall, .. } => job.step_feature(*length, *direction, *wall),
+        Shape::Step { start, length, direction, wall, .. } => job.step_feature(*start, *length, *direction, *wall),
         Shape::Outside { boundary } => job.outside(boundary),
         Shape::Toolpath => Err("a tool path feature needs an explicit tool path".into()),
         _ => Err(String::new()),
@@ -453,14 +453,34 @@ impl Job<'_> {
         Ok(moves)
     }
 
-    /// From the edge outwards to the nearer side of the raw part: that is not in the feature, so a step is as wide
-    /// as its tool has to cover.
-    fn step_feature(&self, length: f64, direction: [f64; 2], wall: f64) -> Done<Moves> {
+    /// From the edge to the nearer side of the raw part: how wide a step is does not stand in the feature.
+    fn step_feature(&self, start: [f64; 2], length: f64, direction: [f64; 2], wall: f64) -> Done<Moves> {
         if wall != 0.0 {
             return Err("a step with a wall that leans".into());
         }
-        let _ = (length, direction);
-        Err(String::new())
+        let [low, high] = self.step.stock.ok_or("its width follows from a raw block, and the workpiece has none")?;
+        let (u, v) = (P2::new(direction[0], direction[1]), P2::new(-direction[1], direction[0]));
+        let a = P2::new(start[0], start[1]);
+        let (mut left, mut right) = (0.0f64, 0.0f64);
+        for corner in 0..8 {
+            let p = std::array::from_fn(|i| if corner >> i & 1 == 1 { high[i] } else { low[i] });
+            let q = self.feature.frame.inverse_point(p);
+            let s = (P2::new(q[0], q[1]) - a).dot(v);
+            (left, right) = (left.max(s), right.max(-s));
+        }
+        let out = 2.0 * self.radius + RUN_OUT;
+        let (side, width) = match (left > 1e-6, right > 1e-6) {
+            (true, true) if left <= right => (v, left),
+            (true, false) => (v, left),
+            (_, true) => (v * -1.0, right),
+            (false, false) => return Err("its edge does not lie on the raw part".into()),
+        };
+        let (p, q) = (a - u * out, a + u * (length + out));
+        let far = side * (width + out);
+        let outline = Path2::polyline(&[p, q, q + far, p + far], true).map_err(words)?;
+        let region = Region::new(outline, Vec::new()).map_err(words)?;
+        let passes = tp::clear(&region, &self.clearing()?).map_err(words)?.passes;
+        tp::motion(&passes, &self.heights(0.0, self.bottom), &self.entry(true)?, Some(&region), self.radius).map_err(words)
     }
 
     fn outside(&self, boundary: &Contour) -> Done<Moves> {

@@ -123,6 +123,8 @@ pub struct Workingstep {
     pub operation: Operation,
     /// Top of the raw part in the setup, if known.
     pub stock_top: Option<f64>,
+    /// Lowest and highest corner of the raw part in the setup, if known.
+    pub stock: Option<[[f64; 3]; 2]>,
 }
 
 /// A rapid movement.
@@ -269,6 +271,8 @@ pub enum Shape {
     },
     /// A step.
     Step {
+        /// Where its edge begins, in the feature frame.
+        start: [f64; 2],
         /// Length along its edge.
         length: f64,
         /// Direction of the edge in the feature frame.

@@ -315,13 +315,15 @@ impl<'m> Reader<'m> {
         let op = self.operation(operation);
         let feature = self.feature(feature, setup, operation.id());
         let (operation, feature) = (op?, feature?);
-        let stock_top = self.stock_top(setup);
+        let stock = self.stock(setup);
+        let stock_top = stock.map(|s| s[1][2]);
         let name = node.string("its_id").into_owned();
-        Some(Workingstep { origin: origin(node), name, security, feature, operation, stock_top })
+        Some(Workingstep { origin: origin(node), name, security, feature, operation, stock_top, stock })
     }
 
-    fn stock_top(&mut self, setup: Option<&Setup>) -> Option<f64> {
-        let mut top = None;
+    /// The box around all raw parts of the setup.
+    fn stock(&mut self, setup: Option<&Setup>) -> Option<[[f64; 3]; 2]> {
+        let mut bounds: Option<[[f64; 3]; 2]> = None;
         for w in self.model.all("workpiece") {
             let piece = self.workpiece(w);
             let Some((frame, size)) = piece.block else { continue };
@@ -329,11 +331,12 @@ impl<'m> Reader<'m> {
             let frame = place.place(&frame);
             for corner in 0..8 {
                 let at = |i: usize| if corner >> i & 1 == 1 { size[i] } else { 0.0 };
-                let z = frame.point([at(0), at(1), at(2)])[2];
-                top = Some(top.map_or(z, |t: f64| t.max(z)));
+                let p = frame.point([at(0), at(1), at(2)]);
+                let [low, high] = bounds.unwrap_or([p, p]);
+                bounds = Some([std::array::from_fn(|i| low[i].min(p[i])), std::array::from_fn(|i| high[i].max(p[i]))]);
             }
         }
-        top
+        bounds
     }
 
     fn rapid(&mut self, node: Node<'m>) -> Option<Rapid> {

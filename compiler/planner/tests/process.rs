@@ -152,3 +152,37 @@ fn multistep_drilling_pecks() {
     assert!(rapids.ends_with(&[-5.0, 3.0, -5.0, 6.0, -5.0, -25.0]), "{rapids:?}");
     assert!(program.steps().any(|s| s.op == Op::Dwell(0.5)));
 }
+
+#[test]
+fn a_step_is_cut_to_the_side_of_the_block() {
+    let slot = include_str!("../../../tests/golden/unb2013/fig4-45_slot-square-u.p21");
+    let text = slot
+        .replace("#39=SLOT('ranhura com perfil U',#2,(#25,#71),#40,#48,#53,#57,(#68,#69));", "#39=STEP('step',#2,(#25),#40,#48,#53,$,());")
+        .replace("'',(0.0,50.0,20.0)", "'',(0.0,80.0,20.0)")
+        .replace("#86=WORKPLAN('workplan setup plano: XY',(#70,#85),$,#10,$)", "#86=WORKPLAN('workplan setup plano: XY',(#70),$,#10,$)");
+    let (planned, out) = plan(text.as_bytes(), FileId(0), &Options::default());
+    assert_eq!(codes(&out), [], "{out:#?}");
+    let program = planned.expect("a program").program;
+    let y: Vec<f64> = program.steps().filter(|s| s.op.feeds() && s.end.axes[2] < 20.0).map(|s| s.end.axes[1]).collect();
+    let (low, high) = y.iter().fold((f64::MAX, f64::MIN), |(l, h), v| (l.min(*v), h.max(*v)));
+    // Tool 3 mm: its edge stays on the line Y80 and passes the side at Y100.
+    assert!((low - 81.5).abs() < 1e-6 && high > 100.0, "{low} {high}");
+}
+
+proptest::proptest! {
+    /// A damaged file gives messages, never a panic, and no program with an error.
+    #[test]
+    fn damaged_files(at in 0usize..3000, len in 0usize..12, with in "[#$*()',.;0-9A-Z-]{0,6}", which in 0usize..3) {
+        let files = [
+            HOLE,
+            include_str!("../../../tests/golden/unb2013/fig4-45_slot-square-u.p21"),
+            include_str!("../../../tests/golden/ufsc2016/example1.p21"),
+        ];
+        let mut text = files[which].as_bytes().to_vec();
+        let at = at % text.len();
+        let end = (at + len).min(text.len());
+        text.splice(at..end, with.bytes());
+        let (planned, out) = plan(&text, FileId(0), &Options::default());
+        proptest::prop_assert!(planned.is_none() == (!codes(&out).is_empty()));
+    }
+}

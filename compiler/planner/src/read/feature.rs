@@ -194,14 +194,14 @@ impl<'m> Reader<'m> {
             }
             "STEP" => {
                 let path = self.need(node, "open_boundary")?;
-                let Travel::Line { direction, length, .. } = self.travel(path)? else {
+                let Travel::Line { start, direction, length } = self.travel(path)? else {
                     self.not_lowered(path, " as the edge of a step");
                     return None;
                 };
                 let wall = node.node("wall_boundary");
                 let radius = wall.and_then(|w| w.length("profile_radius")).unwrap_or(0.0);
                 let angle = wall.and_then(|w| w.real("tilt_angle")).map_or(0.0, |a| self.angle(a));
-                Shape::Step { length, direction, wall: angle, radius }
+                Shape::Step { start, length, direction, wall: angle, radius }
             }
             "ROUND_HOLE" => self.hole(node)?,
             "GENERAL_OUTSIDE_PROFILE" => {
