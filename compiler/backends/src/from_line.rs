@@ -2,7 +2,7 @@
 //! height, and the rest follows. The result is motion IR like any other, so every back end can write it.
 
 use crate::sources::{Sources, Words};
-use gr_ir::{Builder, FrameId, Marker, Note, Op, Override, PathMode, Pose, Program, Source, State, Turn};
+use gr_ir::{Builder, FrameId, Marker, Note, Op, Override, PathMode, Pose, Program, Source, State, Turn, Units};
 use gr_text::{Diagnostic, FileId, Span, code};
 
 /// Line number of operations that no source line asked for.
@@ -183,6 +183,12 @@ fn build(program: &Program, index: usize, state: &State, pose: &Pose, safe: f64,
     restore.push(Op::Note(Note::Comment, &format!("restart at line {line}")));
     restore.frame(state);
     restore.tool(state);
+    if units_under_offset(program, index) {
+        // The same change again, which shows in no motion: G28 depends on it.
+        let other = if state.units == Units::Mm { Units::Inch } else { Units::Mm };
+        restore.push(Op::Units(other));
+        restore.push(Op::Units(state.units));
+    }
     restore.modes(state);
     restore.spindles(state);
     restore.approach(program, state, pose, safe);
@@ -192,6 +198,21 @@ fn build(program: &Program, index: usize, state: &State, pose: &Pose, safe: f64,
         out.push_to(view.op, view.end, view.source);
     }
     out.finish()
+}
+
+/// Whether the length unit changed while a tool offset was active.
+fn units_under_offset(program: &Program, index: usize) -> bool {
+    let mut cursor = program.cursor();
+    let mut units = program.start_state().units;
+    while let Some(view) = cursor.next().filter(|v| v.index < index) {
+        if let Op::Units(new) = view.op {
+            if new != units && view.state.tool_offset != [0.0; 9] {
+                return true;
+            }
+            units = new;
+        }
+    }
+    false
 }
 
 struct Restore {

@@ -425,6 +425,20 @@ fn after_a_probe_only_named_axes_are_written() {
     assert!(written.contains("G38.2 Z-10 F100\nG0 X5\nZ20\n"), "{written}");
 }
 
+#[test]
+fn home_after_a_change_of_units_under_a_tool_offset() {
+    let text = "G21\nG43.1 Z12\nG0 Z100\nG20\nG0 X1\nG28\nM2\n";
+    let o = options(Language::Linuxcnc);
+    same(text, &o, unit(&o));
+    let written = write(text, &o);
+    assert!(written.contains("G53 G0 X0 Y0 Z") && !written.contains("G28"), "{written}");
+    for end in ["G28 Z4", "G30 X1 Z2", "G49\nG28 Z1", "G28 X1\nG28 Z2", "G21\nG28"] {
+        same(&text.replace("G28", end), &o, unit(&o));
+    }
+    // The control's own reference stays its own where nothing is in doubt.
+    assert!(write("G21\nG0 Z100\nG20\nG43.1 Z1\nG28 Z4\nM2\n", &o).contains("G28 Z"));
+}
+
 mod oracle {
     use super::*;
     use std::process::{Command, Stdio};
@@ -549,8 +563,15 @@ mod property {
                 format!("G18 G91 G2 X{r} Z{r} I{r} K0\nG17 G90")
             }),
             1 => Just("G54".to_string()),
-            1 => n().prop_map(|z| format!("G43.1 Z{z}")),
-            1 => Just("G49".to_string()),
+            // With a changed unit these leave the control in error about its place until the next absolute move:
+            // an arc from there is no arc.
+            1 => n().prop_map(|z| format!("G43.1 Z{z}\nG0 X1 Y2 Z3")),
+            1 => Just("G49\nG0 X1 Y2 Z3".to_string()),
+            1 => Just("G20\nG0 X1 Y2 Z3".to_string()),
+            1 => Just("G21\nG0 X1 Y2 Z3".to_string()),
+            1 => Just("G28".to_string()),
+            1 => n().prop_map(|z| format!("G28 Z{z}")),
+            1 => (n(), n()).prop_map(|(x, y)| format!("G30 X{x} Y{y}")),
         ]
     }
 

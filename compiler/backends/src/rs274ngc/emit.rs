@@ -49,6 +49,11 @@ pub(super) struct Emitter<'a> {
     pub tools: Vec<(i32, Axes)>,
     /// G28.1 or G30.1 somewhere: the stored reference is the program's own.
     pub own_reference: bool,
+    /// The length unit changed while a tool offset was active. The control keeps such an offset's number in the
+    /// old unit, so its G28 and G30 end beside the reference from here on, and those of the written program,
+    /// which has one unit only, would not.
+    pub adrift: bool,
+    units: Units,
     words_of: Option<(Source, Words)>,
     last_fault: Option<(Source, Code)>,
     /// Operations before this one were written already, together with an earlier one.
@@ -76,6 +81,8 @@ impl<'a> Emitter<'a> {
             rotations: options.stored_rotations,
             tools: options.tools.clone(),
             own_reference: own_reference(program, sources),
+            adrift: false,
+            units: state.units,
             words_of: None,
             last_fault: None,
             done_until: 0,
@@ -126,6 +133,10 @@ impl<'a> Emitter<'a> {
         let mut cursor = program.cursor();
         while let Some(view) = cursor.next() {
             let index = view.index;
+            if let Op::Units(units) = view.op {
+                self.adrift |= units != self.units && self.frame.tool_offset != [0.0; 9];
+                self.units = units;
+            }
             if index < skip || index < self.done_until || (epilogue.start..epilogue.end).contains(&index) {
                 self.follow_silently(&view);
             } else if let Op::End = view.op {
@@ -340,13 +351,13 @@ fn done_by_end(op: &Op<'_>) -> bool {
     )
 }
 
-/// Whether the program stores a reference point of its own.
+/// Whether the program, or a file it calls, stores a reference point of its own.
 fn own_reference(program: &Program, sources: &dyn Sources) -> bool {
-    let Some(first) = program.steps().map(|s| s.source).find(|s| sources.line(s.file, s.line).is_some()) else {
-        return false;
-    };
-    (0u32..).map_while(|l| sources.line(first.file, l)).any(|text| {
-        let near = text.contains("28") || text.contains("30");
-        near && (Words::of(text).g(281) || Words::of(text).g(301))
+    let files: std::collections::BTreeSet<_> = program.steps().map(|s| s.source.file).collect();
+    files.into_iter().any(|file| {
+        (0u32..).map_while(|l| sources.line(file, l)).any(|text| {
+            let near = text.contains("28") || text.contains("30");
+            near && (Words::of(text).g(281) || Words::of(text).g(301))
+        })
     })
 }

@@ -2,7 +2,8 @@
 //! words that moves the machine exactly as the source does, for LinuxCNC, a Fanuc machining centre or grbl.
 //!
 //! What the program says about the machine's own data stays symbolic: work offsets are selected, not replaced
-//! by numbers; tool lengths are G43 H; G28 and G53 remain what they are. What the language can't say is an error
+//! by numbers; tool lengths are G43 H; G28 and G53 remain what they are, except where the program stores the
+//! reference itself or changes the length unit under an active tool offset: there G28 is the moves it is. What the language can't say is an error
 //! at the source line.
 //!
 //! | module | job |

@@ -98,7 +98,7 @@ impl Emitter<'_> {
         }
         if let Some(words) = self.words(view.source) {
             if words.g(530) {
-                return self.machine_move(view, "G0");
+                return self.machine_move(view, "G0", &[]);
             }
             let home = [(280, "G28"), (300, "G30")].into_iter().find(|(g, _)| words.g(*g));
             if let Some((_, code)) = home {
@@ -110,7 +110,7 @@ impl Emitter<'_> {
     }
 
     /// G53: the numbers are the machine's, whatever the offsets are.
-    fn machine_move(&mut self, view: &View<'_, '_>, code: &str) {
+    fn machine_move(&mut self, view: &View<'_, '_>, code: &str, forced: &[usize]) {
         let goal = view.state.machine(&view.end.axes);
         let from = view.state.machine(&view.start.axes);
         let mut reached = self.frame.machine(&self.at);
@@ -119,7 +119,7 @@ impl Emitter<'_> {
         for i in 0..9 {
             // Rotation leaves rounding dust in an axis that stands still.
             let moves = (goal[i] - from[i]).abs() > 1e-9;
-            if moves || (self.words(view.source).is_some() && self.given(i, view.source)) {
+            if moves || forced.contains(&i) || (self.words(view.source).is_some() && self.given(i, view.source)) {
                 let (text, said) = self.w.axis(i, goal[i]);
                 reached[i] = said;
                 words.push(format!("{}{text}", AXES[i]));
@@ -141,9 +141,11 @@ impl Emitter<'_> {
     fn home(&mut self, view: &View<'_, '_>, code: &str) {
         let next = self.program.get(view.index + 1);
         let second = next.filter(|s| s.op == Op::Rapid && s.source == view.source);
-        if self.own_reference {
+        if self.own_reference || self.adrift {
             if second.is_none() {
-                return self.machine_move(view, "G0");
+                // Without words all axes go there, wherever they are.
+                let all = !(0..9).any(|i| self.given(i, view.source));
+                return self.machine_move(view, "G0", if all { &[0, 1, 2] } else { &[] });
             }
             let words = self.axis_words(view.start, view.end, view.source, &[]);
             return self.motion_block(0, &words, &[]);
@@ -153,12 +155,17 @@ impl Emitter<'_> {
         let axes = if all { vec![0, 1, 2] } else { named };
         let through = if second.is_some() { view.end } else { view.start };
         let mut words = vec![code.to_string()];
-        for i in axes {
+        let all = axes.is_empty();
+        for &i in &axes {
             words.push(format!("{}{}", AXES[i], self.w.axis(i, through.axes[i]).0));
         }
         self.w.block(&words.join(" "));
         self.motion = None;
-        self.at = second.map_or(view.end.axes, |s| s.end.axes);
+        let end = second.map_or(view.end.axes, |s| s.end.axes);
+        // An axis that is not named stands where its rounded number took it.
+        for i in (0..9).filter(|i| all || axes.contains(i)) {
+            self.at[i] = end[i];
+        }
         self.anchored = [false; 9];
         if second.is_some() {
             self.done_until = view.index + 2;
@@ -173,7 +180,7 @@ impl Emitter<'_> {
             return self.thread(view, sync.per_rev, sync.spindle);
         }
         if self.words(view.source).is_some_and(|w| w.g(530)) {
-            return self.machine_move(view, "G1");
+            return self.machine_move(view, "G1", &[]);
         }
         self.straight(view.start, view.end, view.state, view.source);
     }
