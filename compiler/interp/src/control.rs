@@ -375,11 +375,9 @@ impl<S: Sink> Interp<'_, S> {
                 if self.skipping_past(label) {
                     return Ok(());
                 }
-                (self.return_value, self.value_returned) = (0.0, false);
-                if c.arg_count > 0 {
-                    self.return_value = self.arg(scan, c, 0)?;
-                    self.value_returned = true;
-                }
+                // The expression may still read the value that the last call gave.
+                let value = if c.arg_count > 0 { Some(self.arg(scan, c, 0)?) } else { None };
+                (self.return_value, self.value_returned) = (value.unwrap_or(0.0), value.is_some());
             }
             _ if self.defining_sub => return Ok(()),
             Keyword::Call => {

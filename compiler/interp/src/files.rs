@@ -245,7 +245,8 @@ pub type Loader<'a> = &'a mut dyn FnMut(&Path) -> Option<String>;
 pub fn read_ini(text: &str, file: FileId, folder: Option<&Path>, load: Option<Loader<'_>>) -> (Ini, Vec<Diagnostic>) {
     let mut reader = IniReader {
         ini: Ini { values: BTreeMap::new(), folder: folder.map(Path::to_path_buf) },
-        section: String::new(),
+        section: Some(String::new()),
+        seen: Default::default(),
         found: Vec::new(),
         file,
         load,
@@ -256,7 +257,9 @@ pub fn read_ini(text: &str, file: FileId, folder: Option<&Path>, load: Option<Lo
 
 struct IniReader<'a> {
     ini: Ini,
-    section: String,
+    /// The present section; none while its lines can't be found.
+    section: Option<String>,
+    seen: std::collections::BTreeSet<String>,
     found: Vec<Diagnostic>,
     file: FileId,
     load: Option<Loader<'a>>,
@@ -287,12 +290,16 @@ impl IniReader<'_> {
         } else if let Some(rest) = line.strip_prefix('[')
             && let Some((name, _)) = rest.split_once(']')
         {
-            self.section = name.trim().to_ascii_lowercase();
+            // The controller looks names up in capitals, exactly, and stops at the end of the first such section.
+            let first = self.seen.insert(name.to_string());
+            self.section = (first && in_capitals(name)).then(|| name.to_ascii_lowercase());
         } else if let Some((key, value)) = line.split_once('=')
-            && !key.trim().is_empty()
+            && let Some(key) = key.split_ascii_whitespace().next()
         {
-            let key = (self.section.clone(), key.trim().to_ascii_lowercase());
-            self.ini.values.entry(key).or_default().push(value.trim().to_string());
+            if let Some(section) = self.section.clone().filter(|_| in_capitals(key)) {
+                let key = (section, key.to_ascii_lowercase());
+                self.ini.values.entry(key).or_default().push(value.trim().to_string());
+            }
         } else {
             self.found.push(Diagnostic::new(code::INI_BAD_LINE, self.file, blame.unwrap_or(span), &[]));
         }
@@ -309,6 +316,10 @@ impl IniReader<'_> {
     }
 }
 
+fn in_capitals(name: &str) -> bool {
+    !name.contains(|c: char| c.is_ascii_lowercase())
+}
+
 /// `#INCLUDE name`
 fn included(line: &str) -> Option<&str> {
     let rest = line.strip_prefix('#')?.trim_start();
@@ -318,7 +329,7 @@ fn included(line: &str) -> Option<&str> {
 }
 
 impl Ini {
-    /// First value of a key, whatever the case of section and key.
+    /// First value of a key that the file spells in capitals; `section` and `key` in any case.
     pub fn get(&self, section: &str, key: &str) -> Option<&str> {
         self.all(section, key).first().map(String::as_str)
     }
@@ -429,7 +440,7 @@ mod tests {
 
     #[test]
     fn ini_files() {
-        let text = "# remark\n[RS274NGC]\nREMAP = M400 modalgroup=10 ngc=a\nremap= G88.1 modalgroup=1 ngc=b\n\
+        let text = "# remark\n[RS274NGC]\nREMAP = M400 modalgroup=10 ngc=a\nREMAP= G88.1 modalgroup=1 ngc=b\n\
                     SUBROUTINE_PATH = a:\\\n  b\n; x\n[TRAJ]\nLINEAR_UNITS = mm\nnonsense\n";
         let (ini, found) = read_ini(text, FILE, None, None);
         assert_eq!(ini.all("rs274ngc", "Remap"), ["M400 modalgroup=10 ngc=a", "G88.1 modalgroup=1 ngc=b"]);
@@ -440,9 +451,19 @@ mod tests {
     }
 
     #[test]
+    fn ini_names_are_exact_and_in_capitals() {
+        let text = "[my]\nVALUE=1\n[MY]\nvalue=2\nVALUE=3\nVALUE2=4\nA X=5\n[MY]\nLATE=6\n[TWO ]\nA=7\n [FOUR] rest\nA=8\n";
+        let (ini, found) = read_ini(text, FILE, None, None);
+        assert!(found.is_empty());
+        let number = |section: &str, key: &str| ini.number(section, key);
+        assert_eq!((number("my", "value"), number("MY", "value2"), number("MY", "A")), (Some(3.0), Some(4.0), Some(5.0)));
+        assert_eq!((number("MY", "LATE"), number("TWO", "A"), number("four", "a")), (None, None, Some(8.0)));
+    }
+
+    #[test]
     fn ini_includes() {
-        let mut load = |path: &Path| (path == Path::new("d/x.inc")).then(|| "[A]\nB=2\n#INCLUDE x.inc\n".to_string());
-        let (ini, found) = read_ini("#INCLUDE x.inc\nC=3\n", FILE, Some(Path::new("d")), Some(&mut load));
+        let mut load = |path: &Path| (path == Path::new("d/x.inc")).then(|| "B=2\n#INCLUDE x.inc\n".to_string());
+        let (ini, found) = read_ini("[A]\n#INCLUDE x.inc\nC=3\n", FILE, Some(Path::new("d")), Some(&mut load));
         assert_eq!((ini.all("a", "b").len(), ini.get("a", "c")), (16, Some("3")));
         assert_eq!((found.len(), found[0].code), (1, code::INI_INCLUDE), "a file that includes itself ends");
         let (ini, found) = read_ini("#INCLUDE x.inc\nC=3\n", FILE, None, None);

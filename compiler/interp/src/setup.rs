@@ -67,7 +67,7 @@ pub struct Budgets {
 
 impl Default for Budgets {
     fn default() -> Self {
-        Budgets { blocks: 100_000_000, passes: 2_000_000, calls: 200_000_000 }
+        Budgets { blocks: 20_000_000, passes: 2_000_000, calls: 200_000_000 }
     }
 }
 
@@ -92,7 +92,8 @@ pub struct Tool {
     pub comment: Box<str>,
 }
 
-/// An INI file: section and key, lower-cased for look-up, to values in file order.
+/// An INI file: section and key, lower-cased for look-up, to values in file order. Only names that the file
+/// spells in capitals, and only the first section of a name, are there: the controller sees no others.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Ini {
     /// `(section, key)` → values.

@@ -114,6 +114,14 @@ fn arithmetic_of_the_controller() {
 }
 
 #[test]
+fn a_returned_value_can_be_passed_on() {
+    let c = calls("o<g> sub\no<g> endsub [#1+2]\no<f> sub\no<g> call [3]\no<f> endsub [#<_value>+#<_value_returned>]\n\
+                   o<h> sub\no<g> call [1]\no<h> return [#<_value>*2]\no<h> endsub\n\
+                   o<f> call\n(debug,%d#<_value>)\no<h> call\n(debug,%d#<_value> #<_value_returned>)\nM2\n");
+    assert_eq!(c[..2], ["MESSAGE(\"6\")", "MESSAGE(\"6 1\")"]);
+}
+
+#[test]
 fn subroutines_loops_and_branches() {
     let text = "\
 o<square> sub
