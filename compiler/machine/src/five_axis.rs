@@ -85,7 +85,7 @@ fn two_turns(outer: V3, inner: V3, z: V3, aim: V3) -> Vec<([f64; 2], bool)> {
         vec![(0.0, true)]
     } else {
         let cos = rest / size;
-        if !(cos.abs() <= 1.0 + 1e-9) {
+        if !(cos.abs() <= 1.0 + 1e-12) {
             return Vec::new();
         }
         let cos = cos.clamp(-1.0, 1.0);

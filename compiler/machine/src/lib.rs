@@ -19,6 +19,9 @@
 //! | `urdf` | machine files made from URDF |
 //! | `math` | vectors and frames |
 
+// `!(x <= limit)` is meant: a value that is not a number must fail the test. Matrices are walked by index.
+#![allow(clippy::neg_cmp_op_on_partial_ord, clippy::needless_range_loop)]
+
 mod cartesian;
 mod cell;
 pub mod differential;
