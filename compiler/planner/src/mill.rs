@@ -331,7 +331,8 @@ impl Job<'_> {
 
     /// What the tool cannot reach is said, with its place.
     fn rest(&self, e: &mut Emit<'_>, region: &Region) {
-        let Ok(all) = tp::residuals(region, self.radius) else { return };
+        // A tool of exactly the size of a corner or a hole reaches all of it.
+        let Ok(all) = tp::residuals(region, self.radius - 1e-6) else { return };
         let total: f64 = all.iter().map(|r| r.area).sum();
         let Some(worst) = all.first().filter(|_| self.m.allowance_side == 0.0) else { return };
         let tool = format!("T{}", self.step.operation.tool.number);

@@ -47,6 +47,7 @@ pub fn plan(text: &[u8], file: FileId, options: &Options) -> (Option<Planned>, V
         security: 0.0,
         setup: None,
         setups: Vec::new(),
+        axes: Vec::new(),
         tolerance: tolerance(&process, options),
     };
     p.e.b.file(file, &options.name);
@@ -77,6 +78,8 @@ struct Planner<'a> {
     security: f64,
     setup: Option<Setup>,
     setups: Vec<u64>,
+    /// Tilted axes that were told.
+    axes: Vec<String>,
     tolerance: f64,
 }
 
@@ -143,7 +146,10 @@ impl Planner<'_> {
         if s.feature.copies.iter().any(|f| !f.upright()) {
             let z = s.feature.frame.z;
             let axis = format!("{:.4},{:.4},{:.4}", z[0] + 0.0, z[1] + 0.0, z[2] + 0.0);
-            self.e.say(code::PLAN_TILTED_TOOL, s.origin, &[&axis, "the program states the tool's axis"]);
+            if !self.axes.contains(&axis) {
+                self.e.say(code::PLAN_TILTED_TOOL, s.origin, &[&axis, "the program states the tool's axis"]);
+                self.axes.push(axis);
+            }
         }
         self.cut(s);
         // An explicit path ends where it says; whatever comes next goes by the security plane from there.

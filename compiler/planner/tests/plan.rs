@@ -215,3 +215,17 @@ fn the_v_slot_keeps_to_its_section() {
     // Depth by face mill to where the wall ends, by ball to the floor.
     assert!((lowest[1] - 6.1625).abs() < 1e-3 && (lowest[2] - 7.0).abs() < 1e-9, "{lowest:?}");
 }
+
+/// Programs for machines with three axes refuse tilted tools, and take everything else.
+#[test]
+fn written_as_g_code() {
+    use gr_backends::{NoSources, rs274ngc};
+    for (text, upright) in [(SLOT, true), (HOLE, true), (PART1, true), (PART2, false)] {
+        let (p, _) = planned(text);
+        let written = rs274ngc::emit(&p.program, &rs274ngc::Options::default(), &NoSources);
+        assert_eq!(written.is_ok(), upright);
+        if let Ok(e) = written {
+            assert!(e.text.contains("M8") && e.text.contains("M3") && e.text.trim_end().ends_with("M2"), "{}", e.text);
+        }
+    }
+}

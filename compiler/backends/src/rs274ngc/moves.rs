@@ -38,6 +38,10 @@ impl Emitter<'_> {
     /// The axis words of a move. An axis that stands still has no word, so that where an unknown offset or an
     /// unknown position hides behind a number, the number is not written.
     pub fn axis_words(&mut self, start: &Pose, end: &Pose, source: Source, forced: &[usize]) -> Vec<String> {
+        // XYZ words would put an upright tool where the program has a tilted one.
+        if end.tool_axis.is_some_and(|a| !(a[2] > 1.0 - 1e-9)) {
+            self.cannot("a tool that does not stand along Z", source);
+        }
         let mut out = Vec::new();
         for i in 0..9 {
             let (from, to) = (start.axes[i], end.axes[i]);
