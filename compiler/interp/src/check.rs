@@ -71,7 +71,21 @@ impl<S: Sink> Interp<'_, S> {
         Ok(())
     }
 
+    /// G4 of a Fanuc control: P in milliseconds, X (or U on a lathe) in seconds.
+    fn fanuc_dwell(&mut self) {
+        let b = &mut self.block;
+        let seconds = b.get(b'p').map(|p| p / 1000.0).or(b.get(b'x')).or(b.get(b'u'));
+        b.unset(b'x');
+        b.unset(b'u');
+        if let Some(seconds) = seconds {
+            b.set(b'p', seconds);
+        }
+    }
+
     fn enhance_slow(&mut self) -> Res {
+        if self.block.g(Group::NonModal) == 40 && self.is_fanuc() {
+            self.fanuc_dwell();
+        }
         let b = &self.block;
         let is_polar = b.has_any_of(POLAR);
         if is_polar {
@@ -276,11 +290,12 @@ impl<S: Sink> Interp<'_, S> {
         if b.has(b'j') && !(matches!(motion, 20 | 30 | 50 | 51 | 760 | 870) || special == 100) {
             return unused(rs274::RT_J_UNUSED, b'j');
         }
-        if b.has(b'k') && !matches!(motion, 20 | 30 | 330 | 331 | 760 | 870) {
+        let repeats = cycle && self.is_fanuc();
+        if b.has(b'k') && !matches!(motion, 20 | 30 | 330 | 331 | 760 | 870) && !repeats {
             return unused(rs274::RT_K_UNUSED, b'k');
         }
         if b.has(b'l')
-            && !(eighties || matches!(motion, 760 | 52 | 730) || special == 100 || comp_on || m5 == 66 || self.m98)
+            && !(eighties || repeats || matches!(motion, 760 | 52 | 730) || special == 100 || comp_on || m5 == 66 || self.m98)
         {
             return unused(rs274::RT_L_UNUSED, b'l');
         }

@@ -64,9 +64,12 @@ impl<S: Sink> Interp<'_, S> {
             None if again => self.m.cycle_r,
             None => return Err(word_missing("R", rs274::CYCLE_NO_R)),
         };
-        let repeats = self.block.get(b'l').map_or(1, |l| l as i32);
-        if repeats == 0 {
-            return Err(word_missing("L of at least 1", rs274::CYCLE_NO_REPEATS).at(b'l'));
+        // Fanuc controls repeat K times; older ones L times.
+        let letter = if self.is_fanuc() && self.block.has(b'k') { b'k' } else { b'l' };
+        let repeats = self.block.get(letter).map_or(1, |l| l as i32);
+        if repeats <= 0 {
+            let needed = format!("{} of at least 1", letter.to_ascii_uppercase() as char);
+            return Err(word_missing(&needed, rs274::CYCLE_NO_REPEATS).at(letter));
         }
         self.check_cycle_axes(plane)?;
         self.cycle_in_plane(g, plane, again, r, repeats)?;
@@ -229,7 +232,9 @@ impl<S: Sink> Interp<'_, S> {
             }
             _ => {}
         }
-        hole.dwell = p.unwrap_or(self.m.cycle_p);
+        // Milliseconds on Fanuc controls.
+        let unit = if self.is_fanuc() { 0.001 } else { 1.0 };
+        hole.dwell = p.map_or(self.m.cycle_p, |p| p * unit);
         hole.peck = q.unwrap_or(self.m.cycle_q);
         self.cycle_spindle(hole)?;
         if hole.g == 870 {

@@ -204,6 +204,9 @@ impl<S: Sink> Interp<'_, S> {
             Node::Param(index) => {
                 let index = self.eval_node(scan, index, depth + 1)?;
                 let index = self.param_index(index).map_err(|f| blame(f, scan, id))?;
+                if self.m.stand_ins != 0 {
+                    self.doubt_stand_in(scan, id, index);
+                }
                 self.read_param(index).map_err(|f| blame(f, scan, id))
             }
             Node::Named(name) => {
@@ -235,6 +238,25 @@ impl<S: Sink> Interp<'_, S> {
                 binary(op, a, b, tolerance).map_err(|f| blame(f, scan, id))
             }
             Node::Bad => Err(self.parse_fault(scan)),
+        }
+    }
+
+    /// Warns, once per place, of a value that only the running machine knows.
+    #[cold]
+    fn doubt_stand_in(&mut self, scan: &Scan, id: ExprId, index: i32) {
+        let source = match index {
+            5399 if self.m.stand_ins & 1 != 0 => "an input (M66)",
+            5061..=5070 if self.m.stand_ins & 2 != 0 => "a probe (G38)",
+            _ => return,
+        };
+        let shown = [format!("#{index}"), source.to_string()];
+        let place = self.place;
+        let same = |f: &crate::Finding| {
+            f.fault.code == code::RUN_VALUE_UNKNOWN && (f.file, f.line) == (place.file, place.line) && f.fault.args == shown
+        };
+        if !self.findings.iter().any(same) {
+            let fault = Fault::own(code::RUN_VALUE_UNKNOWN).arg(&shown[0]).arg(&shown[1]);
+            self.warn(blame(fault, scan, id));
         }
     }
 

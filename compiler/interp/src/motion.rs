@@ -268,6 +268,7 @@ impl<S: Sink> Interp<'_, S> {
     pub(crate) fn read_inputs(&mut self) {
         if self.m.probed != 0 {
             self.mark_runtime("probe");
+            self.m.stand_ins |= 2;
             self.refresh_position();
             for i in 0..9 {
                 let v = if i < 6 { self.world.probed[i] } else { 0.0 };
@@ -284,6 +285,7 @@ impl<S: Sink> Interp<'_, S> {
         }
         if self.m.input_wanted != 0 {
             self.mark_runtime("input");
+            self.m.stand_ins |= 1;
             let old = self.params.get(5399);
             if self.m.input_wanted == 1 {
                 self.write_param(5399, if old != 0.0 { 1.0 } else { 0.0 });

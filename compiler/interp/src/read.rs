@@ -2,7 +2,7 @@
 
 use gr_canon::Sink;
 use gr_gcode::{Form, Scan, Target, Word};
-use gr_spec::{code, rs274};
+use gr_spec::{Family, code, rs274};
 
 use crate::block::slot;
 use crate::eval::{not_whole, to_int, whole};
@@ -16,6 +16,9 @@ pub(crate) enum Slot {
     /// Index into the names of the chunk.
     Named(u32),
 }
+
+/// The dialect whose G90, G92, G94, G98 and G99 are those of G-code system A.
+const TURN: &str = "fanuc-turn";
 
 /// Modal group of each G-code times ten; −1 = not a code.
 static G_GROUPS: [i8; 1000] = g_groups();
@@ -270,19 +273,32 @@ impl<S: Sink> Interp<'_, S> {
         if rest > 0.999 {
             n = to_int(libm::ceil(ten));
         } else if rest > 0.001 {
-            return Err(unknown_g(rs274::RT_G_OUT_OF_RANGE, value));
+            return Err(self.unknown_g(rs274::RT_G_OUT_OF_RANGE, value));
         }
         if n > 999 {
-            return Err(unknown_g(rs274::RT_G_OUT_OF_RANGE, value));
+            return Err(self.unknown_g(rs274::RT_G_OUT_OF_RANGE, value));
         }
         if n < 0 {
             return Err(Fault::new(code::WORD_NEGATIVE, rs274::RT_NEGATIVE_G).arg("G").at(b'g'));
+        }
+        if self.is_fanuc() && self.setup.dialect.id == TURN {
+            // G-code system A: feed per minute and per revolution.
+            n = match n {
+                980 => 940,
+                990 => 950,
+                940 => return Err(self.not_carried_out(rs274::RT_UNKNOWN_G, "G94".into()).at(b'g')),
+                _ => n,
+            };
         }
         let remapped = self.config.g_remap(n).map(|r| r.group);
         let group = match remapped {
             Some(group) => group as usize,
             None => match G_GROUPS[n as usize] {
-                -1 => return Err(unknown_g(rs274::RT_UNKNOWN_G, value)),
+                -1 => return Err(self.unknown_g(rs274::RT_UNKNOWN_G, value)),
+                _ if self.is_fanuc() && self.means_otherwise(n) => {
+                    let name = crate::check::code_name(n as i16);
+                    return Err(self.not_carried_out(rs274::RT_UNKNOWN_G, name).at(b'g'));
+                }
                 group => group as usize,
             },
         };
@@ -310,6 +326,9 @@ impl<S: Sink> Interp<'_, S> {
             }
             None => m_group(n),
         };
+        if group < 0 && self.is_fanuc() && self.setup.dialect.code(&format!("M{n}")).is_some() {
+            return Err(self.not_carried_out(rs274::RT_UNKNOWN_M, format!("M{n}")).at(b'm'));
+        }
         if group < 0 {
             return Err(Fault::new(code::CODE_UNKNOWN, rs274::RT_UNKNOWN_M).arg(n).at(b'm').named(format!("M{n}")));
         }
@@ -324,6 +343,34 @@ impl<S: Sink> Interp<'_, S> {
         }
         Ok(())
     }
+
+    #[inline]
+    pub(crate) fn is_fanuc(&self) -> bool {
+        self.setup.dialect.family == Family::Fanuc
+    }
+
+    /// Codes that a Fanuc control knows with another meaning than ours: better refused than done wrongly.
+    fn means_otherwise(&self, n: i32) -> bool {
+        if self.setup.dialect.id == TURN {
+            matches!(n, 100 | 700 | 710 | 720 | 730 | 740 | 750 | 760 | 830..=890 | 900 | 920)
+        } else {
+            matches!(n, 760 | 870)
+        }
+    }
+
+    fn not_carried_out(&self, rs: gr_spec::Rs274, name: String) -> Box<Fault> {
+        let what = self.setup.dialect.code(&name).map_or("", |c| c.title);
+        Fault::new(code::CODE_NOT_CARRIED_OUT, rs).arg(&name).arg(what)
+    }
+
+    #[cold]
+    fn unknown_g(&self, rs: gr_spec::Rs274, value: f64) -> Box<Fault> {
+        let name = format!("G{value}");
+        if self.is_fanuc() && self.setup.dialect.code(&name).is_some() {
+            return self.not_carried_out(rs, name).at(b'g');
+        }
+        Fault::new(code::CODE_UNKNOWN, rs).arg(name).at(b'g')
+    }
 }
 
 fn repeated(letter: u8) -> Box<Fault> {
@@ -333,8 +380,4 @@ fn repeated(letter: u8) -> Box<Fault> {
         _ => char::from(letter),
     };
     Fault::new(code::WORD_REPEATED, rs274::MULTIPLE_WORDS).arg(shown).at(letter)
-}
-
-fn unknown_g(rs: gr_spec::Rs274, value: f64) -> Box<Fault> {
-    Fault::new(code::CODE_UNKNOWN, rs).arg(format!("G{value}")).at(b'g')
 }

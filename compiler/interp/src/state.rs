@@ -3,6 +3,7 @@ use std::sync::Arc;
 
 use bytemuck::{Pod, Zeroable};
 use gr_canon::{Axes, Plane, Units};
+use gr_spec::Family;
 
 use crate::queue::Queue;
 use crate::world::World;
@@ -137,8 +138,10 @@ pub struct Modal {
     pub tool_changed: u8,
     /// M66 ran and its result is not read yet: 1 = digital, 2 = analog.
     pub input_wanted: u8,
+    /// Parameters that hold a stand-in for what only the machine knows: bit 0 an input, bit 1 a probe.
+    pub stand_ins: u8,
     /// Always 0; keeps the size a multiple of eight.
-    pub pad: [u8; 6],
+    pub pad: [u8; 5],
 }
 
 impl Modal {
@@ -192,7 +195,8 @@ impl State {
     /// Before the first block.
     pub fn start(setup: &Setup) -> State {
         let mut modal = Modal::zeroed();
-        modal.motion = 800;
+        // A Fanuc control wakes up in G0 (or G1, as its parameters say); LinuxCNC in no motion at all.
+        modal.motion = if setup.dialect.family == Family::Fanuc { 0 } else { 800 };
         modal.plane = Plane::Xy as u8;
         modal.units = Units::Mm as u8;
         modal.retract_r = 1;
@@ -204,7 +208,6 @@ impl State {
         modal.pocket = 1;
         modal.origin_index = 1;
         modal.n_number = -1;
-        let _ = setup;
         State { modal, queue: Queue::default(), world: World::new(), saved: None, tools: None, world_tools: None }
     }
     /// The bytes that make two states the same state (`-0.0` counts as `0.0`).

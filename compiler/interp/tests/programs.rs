@@ -214,6 +214,71 @@ fn file_subroutines_and_remaps() {
     assert_eq!(moves, ["3.0000, 0.0000, 0.0000", "3.0000, 7.0000, 0.0000", "3.0000, 7.0000, 4.0000"]);
 }
 
+fn run_fanuc(id: &str, text: &str) -> (Vec<String>, Outcome) {
+    let dialect = Dialect::find(id).expect("a dialect of the tables");
+    let setup = Setup { dialect, uvw: true, ..setup() };
+    let (out, outcome) = run_with(&setup, text, 100);
+    let calls = out.lines().skip(6).map(|l| l.split_once("N..... ").map_or(l, |(_, call)| call).to_string()).collect();
+    (calls, outcome)
+}
+
+#[test]
+fn every_code_of_the_fanuc_lists_is_known() {
+    for id in ["fanuc-mill", "fanuc-turn"] {
+        let mut refused = Vec::new();
+        for row in Dialect::find(id).expect("a dialect").codes {
+            for words in ["", " P1", " X1. Y2. R1. Z-1. P1 Q1. K2 F100."] {
+                let (_, outcome) = run_fanuc(id, &format!("G21 F100. S100\nG1 X0.\n{}{words}\nM30\n", row.code));
+                for finding in &outcome.findings {
+                    assert_ne!(finding.fault.code, code::CODE_UNKNOWN, "{id}: {}{words}", row.code);
+                    if finding.fault.code == code::CODE_NOT_CARRIED_OUT && words.is_empty() {
+                        assert_eq!(finding.fault.args[0], row.code, "{id}");
+                        refused.push(row.code);
+                    }
+                }
+            }
+        }
+        for code in ["G27", "G65", "G68"] {
+            assert_eq!(refused.contains(&code), Dialect::find(id).unwrap().code(code).is_some(), "{id}: {code}");
+        }
+        for code in ["G0", "G1", "G2", "G4", "G28", "G54", "M3", "M30", "M98"] {
+            assert!(!refused.contains(&code), "{id}: {code}");
+        }
+    }
+    let (_, outcome) = run_fanuc("fanuc-mill", "G21\nG7\nM30\nM777\n");
+    assert!(outcome.ok() || outcome.findings[0].fault.code == code::CODE_UNKNOWN);
+}
+
+#[test]
+fn a_fanuc_mill_wakes_up_in_g0_and_repeats_with_k() {
+    let text = "G21 G90\nG43 H1 Z50.\nG91 F100.\nG81 X10. Z-5. R-2. K3\nG80\nM30\n";
+    let (calls, outcome) = run_fanuc("fanuc-mill", text);
+    assert!(outcome.ok(), "{:?}", outcome.findings);
+    assert!(calls.iter().any(|c| c.starts_with("STRAIGHT_TRAVERSE(0.0000, 0.0000, 50.0000")), "{calls:?}");
+    assert_eq!(calls.iter().filter(|c| c.starts_with("STRAIGHT_FEED")).count(), 3);
+    let (old, _) = run_fanuc("fanuc-mill", &text.replace("K3", "L3"));
+    assert_eq!(calls, old);
+}
+
+#[test]
+fn fanuc_dwells_are_milliseconds_or_seconds() {
+    let text = "G21 G90\nG4 P500\nG04 X1.5\nF100.\nG82 X1. Z-5. R2. P250\nG80\nM30\n";
+    let (calls, outcome) = run_fanuc("fanuc-mill", text);
+    assert!(outcome.ok(), "{:?}", outcome.findings);
+    let dwells: Vec<_> = calls.iter().filter(|c| c.starts_with("DWELL")).collect();
+    assert_eq!(dwells, ["DWELL(0.5000)", "DWELL(1.5000)", "DWELL(0.2500)"]);
+}
+
+#[test]
+fn a_value_of_the_running_machine_is_pointed_out_once() {
+    let text = "G21 F50\n#3=[#5061+#5399]\nG38.3 X10\n#1=[#5061+1]\no1 repeat [5]\n#2=#5070\no1 endrepeat\nM66 P0 L0\n(debug,#5399)\n#4=[1+#5399]\nM2\n";
+    let (_, outcome) = run(text);
+    assert!(outcome.ok(), "{:?}", outcome.findings);
+    let doubts = outcome.findings.iter().filter(|f| f.fault.code == code::RUN_VALUE_UNKNOWN);
+    let places: Vec<_> = doubts.map(|f| (f.line, f.fault.args[0].as_str(), f.span.map(|s| s.start))).collect();
+    assert_eq!(places, [(3, "#5061", Some(4)), (5, "#5070", Some(3)), (9, "#5399", Some(6))]);
+}
+
 #[test]
 fn macro_statements() {
     let Some(dialect) = Dialect::find("fanuc-mill") else { return };
