@@ -148,11 +148,19 @@ fn subs(args: &SetupArgs, project: Option<&Project>, setup: &mut Setup) {
 impl Station {
     /// The dialect of a file: option, modeline, project, extension, default. Faults are shown once by the caller.
     pub fn dialect_of(&self, path: &Path, text: &str) -> &'static Dialect {
+        self.declared(path, text).unwrap_or_else(Dialect::linuxcnc)
+    }
+    /// The same without the default.
+    fn declared(&self, path: &Path, text: &str) -> Option<&'static Dialect> {
         self.dialect
             .or_else(|| modeline(text))
             .or_else(|| self.project.as_ref().and_then(|p| p.dialect_of(path)).and_then(Dialect::find))
             .or_else(|| by_extension(path))
-            .unwrap_or_else(Dialect::linuxcnc)
+    }
+    /// A `.gcode` file of which nobody says what control it is for: mostly a printer's.
+    pub fn undeclared(&self, path: &Path, text: &str) -> bool {
+        let printer = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gcode"));
+        printer && self.declared(path, text).is_none()
     }
     /// The setup for a file.
     pub fn setup_for(&self, path: &Path, text: &str) -> Setup {

@@ -238,3 +238,41 @@ fn every_diagnostic() {
     }
     insta::assert_snapshot!(shown);
 }
+
+#[test]
+fn files_of_an_unknown_control() {
+    let folder = tempfile::tempdir().unwrap();
+    let program = folder.path().join("a.gcode");
+    std::fs::write(&program, "M104 S200\nG0 X1\nG1 X1 Y2 E0.2\n").unwrap();
+    let o = in_folder(folder.path(), &["check", "a.gcode"]);
+    assert_eq!(code(&o), 0, "{}", whole(&o));
+    assert_eq!(whole(&o).matches("E0840").count(), 1, "{}", whole(&o));
+    let o = in_folder(folder.path(), &["check", "--dialect", "linuxcnc", "a.gcode"]);
+    assert!(code(&o) == 1 && !whole(&o).contains("E0840"), "{}", whole(&o));
+    std::fs::write(&program, "; gcc-robot: dialect=linuxcnc\nG0 X1\nM2\n").unwrap();
+    assert!(!whole(&in_folder(folder.path(), &["check", "a.gcode"])).contains("E0840"));
+}
+
+#[test]
+fn byte_order_mark() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("a.ngc"), "\u{FEFF}G21 G90\nG0 X1\nM2\n").unwrap();
+    let o = in_folder(folder.path(), &["check", "a.ngc"]);
+    assert_eq!(code(&o), 0, "{}", whole(&o));
+    assert!(whole(&o).contains("E0105"), "{}", whole(&o));
+    let o = in_folder(folder.path(), &["check", "--allow", "text/byte-order-mark", "a.ngc"]);
+    assert!(!whole(&o).contains("E0105"), "{}", whole(&o));
+    let o = in_folder(folder.path(), &["rs274", "-g", "a.ngc"]);
+    assert_eq!(code(&o), 1);
+    assert!(text(&o.stderr).contains("Bad character '\\357' used\n\u{FEFF}G21 G90"), "{}", whole(&o));
+}
+
+#[test]
+fn folders_without_programs() {
+    let folder = tempfile::tempdir().unwrap();
+    for command in ["check", "fmt"] {
+        let o = in_folder(folder.path(), &[command, "."]);
+        assert_eq!(code(&o), 1, "{}", whole(&o));
+        assert!(whole(&o).contains("E0836"), "{}", whole(&o));
+    }
+}

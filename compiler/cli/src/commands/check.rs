@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc;
 
 use gr_driver::{Options, Session};
-use gr_text::{Code, Diagnostic, FileId, code};
+use gr_text::{Code, Diagnostic, FileId, Severity, Span, code};
 
 use crate::exit::Exit;
 use crate::options::{CheckArgs, Global};
@@ -159,9 +159,47 @@ fn each(files: &[PathBuf], station: &Station, jobs: usize, mut done: impl FnMut(
 pub fn check(path: &Path, station: &Station) -> Checked {
     let name = if path == Path::new("-") { "<stdin>".to_string() } else { path.display().to_string() };
     match read(path) {
-        Ok(decoded) => checked(&name, path, &decoded.text, station),
+        Ok(decoded) => {
+            let mut checked = checked(&name, path, &decoded.text, station);
+            if decoded.encoding == gr_text::Encoding::Utf8Bom {
+                byte_order_mark(&mut checked, &name, decoded.text, station);
+            }
+            checked
+        }
         Err((code, args)) => unreadable(&name, code, &args),
     }
+}
+
+/// The mark is not part of the text, but the control reads it.
+fn byte_order_mark(checked: &mut Checked, name: &str, text: String, station: &Station) {
+    if station.lints.allow.contains(&code::TEXT_BYTE_ORDER_MARK) {
+        return;
+    }
+    if checked.sources.get(FileId(0)).is_none() {
+        checked.sources.add(name, text);
+    }
+    let mut d = Diagnostic::new(code::TEXT_BYTE_ORDER_MARK, FileId(0), Span::default(), &[]);
+    station.lints.harden(&mut d);
+    checked.found.insert(0, d);
+}
+
+/// What can be said of a program for an unknown control: nothing is an error there.
+fn syntax_only(name: &str, text: &str, station: &Station) -> Checked {
+    let mut sources = Sources::default();
+    let id = sources.add(name, text);
+    let file = gr_driver::scan_file(name, text, gr_spec::Dialect::linuxcnc());
+    let mut found = vec![crate::sources::about_file(code::FILE_UNDECLARED_DIALECT, id, &[])];
+    for (chunk, start) in file.chunks.iter().zip(&file.starts) {
+        found.extend(chunk.scan.faults.iter().map(|fault| {
+            let mut d = Diagnostic::new(fault.code, id, fault.span.shifted(*start), &fault.args);
+            d.severity = Severity::Hint;
+            d
+        }));
+    }
+    let more = found.len().saturating_sub(gr_driver::MOST_OF_A_KIND);
+    found.truncate(gr_driver::MOST_OF_A_KIND);
+    found.iter_mut().for_each(|d| station.lints.harden(d));
+    Checked { sources, found, more, unreadable: false }
 }
 
 /// A file that could not be read.
@@ -175,6 +213,9 @@ pub fn unreadable(name: &str, code: Code, args: &[String]) -> Checked {
 fn checked(name: &str, path: &Path, text: &str, station: &Station) -> Checked {
     if super::exchange::is_exchange(path, text) {
         return super::exchange::check(name, text, &station.lints);
+    }
+    if station.undeclared(path, text) {
+        return syntax_only(name, text, station);
     }
     let mut session = Session::new();
     let mut options = Options::new(station.setup_for(path, text));

@@ -26,7 +26,12 @@ pub fn run(global: &Global, args: &FmtArgs) -> Exit {
         let mut files = vec![path.clone()];
         if path.is_dir() {
             files.clear();
-            for (at, e) in walk(path, &extensions(work.station.dialect), &mut files) {
+            let closed = walk(path, &extensions(work.station.dialect), &mut files);
+            if closed.is_empty() && files.is_empty() {
+                work.complain(path, code::PROJECT_NOTHING_TO_DO, &[path.display().to_string()]);
+                exit = exit.max(Exit::Findings);
+            }
+            for (at, e) in closed {
                 exit = exit.max(work.complain(&at, code::FILE_UNREADABLE, &[at.display().to_string(), reason(&e)]));
             }
         }

@@ -352,8 +352,13 @@ fn program(choice: &Choice) -> Program {
     let name = path.display().to_string();
     match std::fs::read(path) {
         Ok(bytes) => {
-            let decoded = decode(bytes);
+            // The real command takes a byte order mark for characters of the program.
+            let mark = bytes.starts_with("\u{FEFF}".as_bytes());
+            let mut decoded = decode(bytes);
             let latin1 = is_latin1(&decoded);
+            if mark {
+                decoded.text.insert_str(0, if latin1 { "\u{EF}\u{BB}\u{BF}" } else { "\u{FEFF}" });
+            }
             Program { name, text: without_lone_returns(decoded.text), latin1, open: Some(Ok(())) }
         }
         Err(_) => {

@@ -96,7 +96,26 @@ impl Dive {
             return None;
         }
         let severity = rules.severity(code::RAPID_INTO_STOCK)?;
-        let args = vec![self.end[2].to_string(), cuts.lowest.to_string()];
+        let args = vec![millimetres(self.end[2]), millimetres(cuts.lowest)];
         Some(Found { code: code::RAPID_INTO_STOCK, severity, place: self.place, letter: Some(b'z'), span: None, args, from: super::From::Lint })
+    }
+}
+
+/// A length for people.
+fn millimetres(length: f64) -> String {
+    let rounded = libm::round(length * 1e4) / 1e4;
+    // Never `-0`.
+    (rounded + 0.0).to_string()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::millimetres;
+
+    #[test]
+    fn lengths_are_rounded() {
+        assert_eq!(millimetres(-25.400000000000002), "-25.4");
+        assert_eq!(millimetres(-0.00001), "0");
+        assert_eq!(millimetres(-3.0), "-3");
     }
 }
