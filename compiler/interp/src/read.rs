@@ -295,10 +295,7 @@ impl<S: Sink> Interp<'_, S> {
             Some(group) => group as usize,
             None => match G_GROUPS[n as usize] {
                 -1 => return Err(self.unknown_g(rs274::RT_UNKNOWN_G, value)),
-                _ if self.is_fanuc() && self.means_otherwise(n) => {
-                    let name = crate::check::code_name(n as i16);
-                    return Err(self.not_carried_out(rs274::RT_UNKNOWN_G, name).at(b'g'));
-                }
+                _ if self.is_fanuc() && self.means_otherwise(n) => return Err(self.unknown_g(rs274::RT_UNKNOWN_G, value)),
                 group => group as usize,
             },
         };

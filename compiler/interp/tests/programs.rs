@@ -245,8 +245,23 @@ fn every_code_of_the_fanuc_lists_is_known() {
             assert!(!refused.contains(&code), "{id}: {code}");
         }
     }
-    let (_, outcome) = run_fanuc("fanuc-mill", "G21\nG7\nM30\nM777\n");
-    assert!(outcome.ok() || outcome.findings[0].fault.code == code::CODE_UNKNOWN);
+    // What the control does not have either stays unknown.
+    for (id, text) in [("fanuc-turn", "G86 X1.\nM30\n"), ("fanuc-mill", "G21 M777\nM30\n"), ("fanuc-mill", "G77\nM30\n")] {
+        let (_, outcome) = run_fanuc(id, text);
+        assert_eq!(outcome.findings[0].fault.code, code::CODE_UNKNOWN, "{text}");
+    }
+}
+
+#[test]
+fn the_examples_of_codes_not_carried_out_and_values_unknown() {
+    for code in [code::CODE_NOT_CARRIED_OUT, code::RUN_VALUE_UNKNOWN] {
+        let def = code.def();
+        for (text, expected) in [(def.bad, vec![code]), (def.good, vec![])] {
+            let (_, outcome) = run_fanuc(def.dialect.unwrap_or("linuxcnc"), text.expect("an example"));
+            let found: Vec<_> = outcome.findings.iter().map(|f| f.fault.code).collect();
+            assert_eq!(found, expected, "{text:?}");
+        }
+    }
 }
 
 #[test]
