@@ -125,6 +125,8 @@ pub(crate) struct StepOutcome {
     pub(crate) found: Vec<Found>,
     pub(crate) summary: Summary,
     pub(crate) end: Option<End>,
+    /// An M2 or M30 that did not end the program because its block has a mistake.
+    pub(crate) tried: Option<End>,
     /// Parameters were touched although none were given: the step has to be done again with them.
     pub(crate) impure: bool,
 }
@@ -215,10 +217,11 @@ pub(crate) fn step(chunk: &Chunk, entry: &Boundary, env: Option<&Environment>, o
         environment: env.filter(|_| touched).map(|_| Environment { params: exit.params }),
         found,
         summary: lints.inner.summary,
-        end: End::of(exit.end, line).or_else(|| {
+        end: End::of(exit.end, line),
+        tried: {
             let at = exit.findings.iter().filter(|f| f.fault.rs.is_some()).map(|f| f.line);
             at.filter(|l| ends_program(&chunk.scan, *l)).map(|line| End { line, stopped: true, program: true }).next()
-        }),
+        },
         impure: env.is_none() && touched,
     }
 }
@@ -392,9 +395,11 @@ pub(crate) fn flow(stretch: &Stretch<'_>) -> FlowOutcome {
     if let Some(line) = unreached {
         // The end is there: what keeps the controller from it is the mistake.
         end = Some(End { line, stopped: true, program: true });
-        for f in found.iter_mut().filter(|f| f.code == code::FLOW_UNCLOSED && f.place.file == *main) {
-            f.severity = Severity::Error;
-        }
+    }
+    if early {
+        let last = ends(file).last();
+        let before_end = |f: &&mut Found| f.code == code::FLOW_UNCLOSED && f.place.file == *main && last.is_some_and(|l| f.place.line < l);
+        found.iter_mut().filter(before_end).for_each(|f| f.severity = Severity::Error);
     }
     found.extend(lints.found);
     FlowOutcome { boundary: Boundary::new(state, lints.flags, false), found, frames, summary: lints.summary, end }
@@ -421,14 +426,18 @@ fn drop_consequences(findings: &mut Vec<Finding>, file: &File, from: u32, main: 
 /// Line of an M2 or M30 that could not end the program: something before it is not closed, or that block itself
 /// has a mistake.
 fn unreached_end(file: &File, findings: &[Finding], main: FileId) -> Option<u32> {
-    let mut all = file.chunks.iter().zip(&file.first_lines).flat_map(|(chunk, first)| {
-        let scan = &chunk.scan;
-        (0..scan.lines.len() as u32).filter(move |l| ends_program(scan, *l)).map(move |l| first + l)
-    });
     let explains = |f: &Finding, line: u32| {
         f.file == main && if f.fault.code == code::FLOW_UNCLOSED { f.line < line } else { f.fault.rs.is_some() && f.line == line }
     };
-    all.find(|line| findings.iter().any(|f| explains(f, *line)))
+    ends(file).find(|line| findings.iter().any(|f| explains(f, *line)))
+}
+
+/// Lines with M2 or M30.
+fn ends(file: &File) -> impl Iterator<Item = u32> {
+    file.chunks.iter().zip(&file.first_lines).flat_map(|(chunk, first)| {
+        let scan = &chunk.scan;
+        (0..scan.lines.len() as u32).filter(move |l| ends_program(scan, *l)).map(move |l| first + l)
+    })
 }
 
 /// Line of the closing `%`.

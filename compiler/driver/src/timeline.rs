@@ -41,6 +41,9 @@ pub(crate) struct Step<'db> {
     pub(crate) summary: Summary,
     #[salsa_value(unsafe(prove(Option<End>: 'static)))]
     pub(crate) end: Option<End>,
+    /// An M2 or M30 that did not end the program because its block has a mistake.
+    #[salsa_value(unsafe(prove(Option<End>: 'static)))]
+    pub(crate) tried: Option<End>,
     /// Parameters were touched although none were given.
     pub(crate) impure: bool,
 }
@@ -63,6 +66,7 @@ pub(crate) fn step<'db>(
         found: outcome.found.into(),
         summary: outcome.summary,
         end: outcome.end,
+        tried: outcome.tried,
         impure: outcome.impure,
     }
 }
@@ -251,7 +255,7 @@ fn fold<'db>(db: &'db dyn Db, document: Document, last_line: u32) -> Timeline<'d
     }
     starts.push((line, byte));
     let mut entries = vec![None; chunks.len()];
-    let (mut groups, mut late, mut end) = (Vec::new(), Late::default(), None);
+    let (mut groups, mut late, mut end, mut tried) = (Vec::new(), Late::default(), None, None);
     let percent = shapes.iter().find_map(|s| s.first_text).unwrap_or(false);
     let (mut entry, mut env) = start(db, run, percent);
     let mut at = 0;
@@ -279,6 +283,7 @@ fn fold<'db>(db: &'db dyn Db, document: Document, last_line: u32) -> Timeline<'d
                 groups.push(Group { first_line, found: step.found.clone(), frames: None });
             }
             end = step.end.map(|e| e.shifted(first_line));
+            tried = tried.or(step.tried.map(|e| e.shifted(first_line)));
             entry = step.exit;
             env = step.env.unwrap_or(env);
             at += 1;
@@ -288,6 +293,12 @@ fn fold<'db>(db: &'db dyn Db, document: Document, last_line: u32) -> Timeline<'d
         end = Some(End { line, stopped: true, program: false });
     }
     let complete = at >= chunks.len() || end.is_some();
+    // The program has its end, even if a mistake keeps the controller from it.
+    let end = match end {
+        None => tried.filter(|_| complete),
+        Some(e) if e.stopped && e.program => tried.or(end),
+        _ => end,
+    };
     if complete {
         let context = engine::Finish { shapes: &shapes, starts: &starts, options, modal: entry.boundary(db).modal(), end };
         late.found.extend(engine::finish(&context));
