@@ -19,7 +19,7 @@ fn part() -> Program {
         Call::SetFeedMode(0, 0),
         Call::SetG5xOffset(1, at(100.0, 50.0, -200.0)),
         Call::SelectPlane(Plane::Xy),
-        Call::Comment(" end mill 10 ".into()),
+        Call::Comment(" T1 end mill 10 ".into()),
         Call::SelectTool(1),
         Call::ChangeTool(1),
         Call::UseToolLengthOffset(at(0.0, 0.0, 60.0)),
@@ -110,7 +110,7 @@ fn sheet_as_text() {
     insta::assert_snapshot!(sheet.text());
     let value: serde_json::Value = serde_json::from_str(&sheet.json()).expect("valid JSON");
     assert_eq!(value["tools"][1]["tool"], 2);
-    assert_eq!(value["tools"][0]["note"], "end mill 10");
+    assert_eq!(value["tools"][0]["note"], "T1 end mill 10");
     assert!(sheet.html().contains("<td>T2</td>"));
 }
 

@@ -556,7 +556,8 @@ mod property {
             1 => (1i32..5000, any::<bool>(), 1..4).prop_map(|(r, cw, p)| {
                 format!("G{} I{} J{} P{p}", if cw { 2 } else { 3 }, f64::from(r) / 83.0, f64::from(r) / 31.0)
             }),
-            1 => (n(), n()).prop_map(|(x, y)| format!("G10 L2 P2 X{x} Y{y}\nG55")),
+            // Offsets as tables have them: to three decimals.
+            1 => (-4000i32..4000, -4000i32..4000).prop_map(|(x, y)| format!("G10 L2 P2 X{} Y{}\nG55", f64::from(x) / 8.0, f64::from(y) / 8.0)),
             1 => (n(), n()).prop_map(|(x, y)| format!("G92 X{x} Y{y}")),
             1 => (1i32..3000).prop_map(|r| {
                 let r = f64::from(r) / 83.0;

@@ -216,7 +216,7 @@ fn tool_rows(unit: &Unit) -> Vec<gr_backends::sheet::ToolRow> {
         diameter: t.diameter * unit_mm,
         comment: t.comment.to_string(),
     };
-    unit.setup.tools.rows.iter().map(row).collect()
+    unit.setup.tools.rows.iter().filter(|t| &*t.comment != gr_interp::ASSUMED).map(row).collect()
 }
 
 fn sheet(program: &Program, unit: &Unit, kind: &str, name: &str) -> Vec<u8> {

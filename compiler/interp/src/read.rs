@@ -97,6 +97,7 @@ impl<S: Sink> Interp<'_, S> {
             let end = scan.word_span(text, line, w).end;
             let beyond = w.start >= bad || end > bad;
             if cut && beyond {
+                self.say_cut(scan);
                 return Ok(());
             }
             if w.form == Form::Bad || beyond {
@@ -105,9 +106,17 @@ impl<S: Sink> Interp<'_, S> {
             self.read_word(scan, text, w)?;
         }
         if cut {
+            self.say_cut(scan);
             return Ok(());
         }
         Err(self.parse_fault(scan))
+    }
+
+    /// The controller reads on in silence; we say that the rest of the line is lost.
+    fn say_cut(&mut self, scan: &Scan) {
+        let mut fault = self.parse_fault(scan);
+        fault.rs = None;
+        self.warn(fault);
     }
 
     /// Reads one word into the block.

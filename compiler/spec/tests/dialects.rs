@@ -61,7 +61,7 @@ fn a_later_version_has_the_elders_rows_and_its_own() {
     for c in old.codes {
         assert!(new.code(c.code).is_some(), "{} got lost", c.code);
     }
-    assert_eq!(old.facts.len(), new.facts.len());
+    assert!(new.facts.len() >= old.facts.len(), "the later version may have facts of its own");
     for f in old.facts {
         assert_ne!(Some(f.value), new.fact(f.key).map(|g| g.value), "{} does not differ", f.key);
     }
