@@ -143,11 +143,6 @@ impl Renderer {
         };
         self.held.clear();
     }
-    /// The text gathered so far, for tests.
-    #[cfg(test)]
-    pub fn take(&mut self) -> String {
-        String::from_utf8(std::mem::take(&mut self.held)).expect("all formats are UTF-8")
-    }
 }
 
 /// `error`, `warning`, `hint`.
