@@ -79,7 +79,8 @@ fn accepted_programs_with_block_delete() {
 #[test]
 fn one_fault_programs_going_on() {
     let mut jobs = jobs("errors");
-    jobs.retain(|(name, _)| name != "endless");
+    // Told to go on, the real one goes round for ever in these; ours ends.
+    jobs.retain(|(name, _)| name != "endless" && name != "name-readonly");
     for (_, job) in &mut jobs {
         job.options = vec!["-n".into(), "0".into()];
     }

@@ -67,7 +67,7 @@ pub struct Budgets {
 
 impl Default for Budgets {
     fn default() -> Self {
-        Budgets { blocks: 20_000_000, passes: 2_000_000, calls: 200_000_000 }
+        Budgets { blocks: 20_000_000, passes: 1_000_000, calls: 30_000_000 }
     }
 }
 

@@ -476,6 +476,11 @@ fn report(run: &mut Interp<'_, Out>, findings: &[Finding], stack: bool) -> bool 
     bad
 }
 
+/// Whether a finding says that the file ended while a label was looked for.
+fn seeking(finding: &Finding) -> bool {
+    finding.fault.rs.is_some_and(|rs| rs.text().starts_with("EOF in file"))
+}
+
 /// Runs the open program; the exit status.
 fn from_file(run: &mut Interp<'_, Out>, choice: &Choice) -> u8 {
     if choice.on_error == OnError::Stop {
@@ -496,6 +501,9 @@ fn from_file(run: &mut Interp<'_, Out>, choice: &Choice) -> u8 {
             }
         }
         match end {
+            // Looking for a label up to the end of the file is, for the real command, a way of ending that is told to
+            // go on.
+            Some(End::Fault) if choice.on_error == OnError::Continue && findings.last().is_some_and(seeking) => return 0,
             Some(End::Fault) => return 1,
             Some(_) => return 0,
             None => {}
