@@ -1,5 +1,7 @@
 //! Everything that knows the shapes of the protocol: positions, diagnostics, edits.
 
+pub mod custom;
+
 use gr_text::{Diagnostic, Severity, Span};
 use tower_lsp::ls_types as lsp;
 
