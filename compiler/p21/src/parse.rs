@@ -29,7 +29,30 @@ pub fn check_syntax(text: &[u8]) -> Vec<Fault> {
         return parse(text).faults;
     }
     p.out.faults.sort_by_key(|f| f.span.start);
+    p.foreign();
     p.out.faults
+}
+
+/// The first line of a text that is no exchange file, and what the text seems to be.
+#[cold]
+fn looks_like(text: &[u8]) -> (Span, &'static str) {
+    let start = text.iter().position(|b| *b > b' ').unwrap_or(text.len());
+    let line = &text[start..text[start..].iter().take(80).position(|b| *b < b' ').map_or(text.len().min(start + 80), |n| start + n)];
+    let span = Span::new(start as u32, (start + line.len()) as u32);
+    let what = match line {
+        [] => "it is empty",
+        [b'<', ..] => "it looks like XML, and the XML form of STEP (Part 28) is not read",
+        _ if text[start..].split(|b| *b < b' ').filter(|l| !l.is_empty()).take(20).any(is_block) => "it looks like G-code",
+        _ => "it has no `ISO-10303-21;`, no section and no instance",
+    };
+    (span, what)
+}
+
+/// Whether a line is a G or M word with whatever follows.
+fn is_block(line: &[u8]) -> bool {
+    let words = line.split(|b| *b == b' ').filter(|w| !w.is_empty());
+    let code = |w: &[u8]| matches!(w, [b'G' | b'g' | b'M' | b'm', b'0'..=b'9', ..]);
+    words.take(2).any(code)
 }
 
 /// `KEEP`: fills the tables; without it only faults are collected.
@@ -46,6 +69,8 @@ struct Parser<'t, const KEEP: bool> {
     /// The current statement has had its message.
     spoiled: bool,
     section: Option<usize>,
+    /// Something was met that only exchange files have.
+    exchange: bool,
 }
 
 /// The statement can't be read on.
@@ -64,6 +89,7 @@ impl<'t, const KEEP: bool> Parser<'t, KEEP> {
         sorted: true,
         spoiled: false,
         section: None,
+        exchange: false,
         }
     }
 
@@ -73,9 +99,20 @@ impl<'t, const KEEP: bool> Parser<'t, KEEP> {
             self.map_ids();
         }
         self.out.faults.sort_by_key(|f| f.span.start);
+        self.foreign();
         self.out.instances.shrink_to_fit();
         self.out.values.shrink_to_fit();
         self.out
+    }
+
+    /// A file that has nothing of an exchange file gets one message, not one per line.
+    fn foreign(&mut self) {
+        if self.exchange {
+            return;
+        }
+        let (span, what) = looks_like(self.text);
+        self.out = Exchange::default();
+        self.out.faults.push(Fault { code: code::P21_NOT_AN_EXCHANGE_FILE, span, args: vec![what.into()], related: None });
     }
 
     fn map_ids(&mut self) {
@@ -308,6 +345,7 @@ impl<'t, const KEEP: bool> Parser<'t, KEEP> {
             self.sorted = false;
         }
         self.last_id = id;
+        self.exchange |= is(self.byte(), UPPER | LOWER) || matches!(self.byte(), b'(' | b'!');
         let n = self.begin(id, start);
         let body = self.body(n);
         self.end(n, body.is_err());
@@ -744,6 +782,7 @@ impl<'t, const KEEP: bool> Parser<'t, KEEP> {
                 let end = memchr::memchr(b';', &self.text[start..]).map_or(self.text.len(), |n| start + n).min(start + 64);
                 let line: Vec<u8> = self.text[start..end].iter().copied().filter(|b| *b > 0x20).collect();
                 if line.starts_with(b"ISO-10303-21") || line.starts_with(b"END-ISO-10303-21") {
+                    self.exchange = true;
                     self.at = start + self.text[start..end].iter().rposition(|b| *b == b'1').map_or(0, |n| n + 1);
                     return self.semicolon();
                 }
@@ -771,6 +810,7 @@ impl<'t, const KEEP: bool> Parser<'t, KEEP> {
             self.close_section(start);
             self.spoiled = false;
         }
+        self.exchange = true;
         self.section = Some(self.out.sections.len());
         let count = self.out.instances.len() as u32;
         self.out.sections.push(Section { name, span: Span::new(start as u32, start as u32), instances: count..count });
@@ -800,6 +840,7 @@ impl<'t, const KEEP: bool> Parser<'t, KEEP> {
     fn header_entity(&mut self) -> Result<(), Lost> {
         let start = self.at;
         let word = run(self.text, start + usize::from(self.byte() == b'!'), UPPER | LOWER | DIGIT);
+        self.exchange |= self.text[start..].starts_with(b"FILE_");
         if peek(self.text, skip_blank(self.text, word)).0 != b'(' {
             return Err(self.unexpected("an instance (#n=…;) or a section keyword"));
         }

@@ -22,6 +22,9 @@ pub fn diagnostics_of(text: &[u8], exchange: &Exchange, file: FileId) -> Vec<Dia
     for f in &exchange.faults {
         out.fault(f);
     }
+    if exchange.faults.iter().any(|f| f.code == code::P21_NOT_AN_EXCHANGE_FILE) {
+        return out.list;
+    }
     let kind = dialect(&model);
     out.schema(&model, kind);
     if understood(&model, kind) {

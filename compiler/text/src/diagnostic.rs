@@ -1,3 +1,5 @@
+use std::borrow::Cow;
+
 use crate::{Code, FileId, Severity, Span};
 
 /// One finding, ready to be shown: positions are byte offsets into whole files.
@@ -56,6 +58,13 @@ impl Diagnostic {
     /// A finding at `span`, its message and help filled from the registry with `args`.
     pub fn new(code: Code, file: FileId, span: Span, args: &[String]) -> Diagnostic {
         let def = code.def();
+        let escaped: Vec<String>;
+        let args = if args.iter().any(|a| a.contains(char::is_control)) {
+            escaped = args.iter().map(|a| visible(a).into_owned()).collect();
+            &escaped
+        } else {
+            args
+        };
         Diagnostic {
             code,
             severity: def.severity,
@@ -69,16 +78,43 @@ impl Diagnostic {
     }
     /// Adds a secondary label.
     pub fn label(mut self, file: FileId, span: Span, text: impl Into<String>) -> Diagnostic {
-        self.labels.push(Label { file, span, text: text.into() });
+        self.labels.push(Label { file, span, text: visible(&text.into()).into_owned() });
         self
     }
     /// Adds a note.
     pub fn note(mut self, text: impl Into<String>) -> Diagnostic {
-        self.notes.push(text.into());
+        self.notes.push(visible(&text.into()).into_owned());
         self
     }
     /// The primary place.
     pub fn primary(&self) -> (FileId, Span) {
         self.labels.first().map_or((FileId(0), Span::default()), |l| (l.file, l.span))
+    }
+}
+
+/// Text of a program in a message: control characters, which a terminal would obey, as escapes.
+fn visible(text: &str) -> Cow<'_, str> {
+    if !text.chars().any(char::is_control) {
+        return Cow::Borrowed(text);
+    }
+    let escaped = |c: char| match c {
+        '\n' => "\\n".to_string(),
+        '\r' => "\\r".to_string(),
+        '\t' => "\\t".to_string(),
+        c if c.is_control() => format!("\\x{:02X}", c as u32),
+        c => c.to_string(),
+    };
+    Cow::Owned(text.chars().map(escaped).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn control_characters_are_escaped() {
+        let d = Diagnostic::new(gr_spec::code::P21_BARE_WORD, FileId(0), Span::default(), &["a\u{1b}[31m\n\u{85}".into()]);
+        assert!(d.message.contains("a\\x1B[31m\\n\\x85"), "{}", d.message);
+        assert_eq!(visible("plain ü"), "plain ü");
     }
 }

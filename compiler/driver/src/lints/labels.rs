@@ -52,8 +52,14 @@ fn unused_subs<'a>(
     let mut unused: Vec<_> = subs.into_iter().filter(|(name, _)| !calls.contains(name)).collect();
     unused.sort_by_key(|(_, line)| *line);
     for (name, line) in unused {
-        report(code::SUB_UNUSED, line, b'o', &format!("o{name}"));
+        report(code::SUB_UNUSED, line, b'o', &spelled(name));
     }
+}
+
+/// The label as the program writes it.
+fn spelled(name: &str) -> String {
+    let number = !name.is_empty() && name.bytes().all(|b| b.is_ascii_digit() || b == b'.');
+    if number { format!("o{name}") } else { format!("o<{name}>") }
 }
 
 /// Whether there are blocks outside of subroutine definitions.
