@@ -71,8 +71,8 @@ impl<'a, S: Sink> Interp<'a, S> {
         }
     }
 
-    /// Outside of calls, loops and skipping, with nothing held back: what comes next depends on the state, the
-    /// parameters and [`Interp::carry`] alone.
+    /// Outside of calls, loops and skipping: what comes next depends on the state, the parameters and
+    /// [`Interp::carry`] alone.
     pub fn at_rest(&self) -> bool {
         self.levels.len() == 1
             && self.levels[0].m98_left == -1
@@ -83,7 +83,7 @@ impl<'a, S: Sink> Interp<'a, S> {
             && !self.defining_sub
             && self.sub_name.is_none()
             && self.place.frame == FrameId::MAIN
-            && self.queue.is_empty()
+            && self.queue.is_of(self.place.file)
     }
 
     /// Runs until the run is [at rest](Interp::at_rest) before a line that `stop` knows, or to the end.
@@ -107,11 +107,13 @@ impl<'a, S: Sink> Interp<'a, S> {
         self.next
     }
 
+    /// The line of the main program that is being executed, or that the present call comes from.
+    pub fn main_line(&self) -> u32 {
+        self.levels.first().and_then(|l| l.ret.as_ref()).map_or(self.place.line, |ret| ret.place.line)
+    }
     /// Branches and loops of a file that were opened and never closed.
     pub fn unclosed_of(&mut self, file: FileId) -> Vec<crate::Finding> {
-        let before = std::mem::take(&mut self.findings);
-        self.unclosed_in(file);
-        std::mem::replace(&mut self.findings, before)
+        self.unclosed_in(file)
     }
     /// Files that were opened, in order.
     pub fn opened_files(&self) -> &[FileId] {

@@ -187,6 +187,52 @@ pub fn is_stop(scan: &Scan, line: u32) -> bool {
     control || at.kind == LineKind::Percent || at.faulty
 }
 
+/// A line that may begin or end a subroutine, a loop or a branch.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Statement {
+    keyword: Keyword,
+    /// As written, in lower case.
+    label: Box<str>,
+    /// Line.
+    pub line: u32,
+    /// Relative to the start of the line.
+    span: Span,
+}
+
+/// The statement on a line of a chunk.
+pub fn statement(scan: &Scan, text: &str, line: u32) -> Option<Statement> {
+    let word = first_real(scan.words(line)).filter(|w| w.form == Form::Control && w.letter == b'o')?;
+    let control = scan.controls.get(word.index())?;
+    let start = scan.lines.get(line as usize)?.start;
+    let span = Span::new(control.span.start.saturating_sub(start), control.span.end.saturating_sub(start));
+    let label = text.get(control.label_span.range()).unwrap_or("").to_ascii_lowercase().into();
+    Some(Statement { keyword: control.keyword, label, line, span })
+}
+
+/// What the statements of a file open and never close.
+pub fn unclosed(statements: impl IntoIterator<Item = Statement>, file: FileId, main: bool) -> Vec<crate::Finding> {
+    let mut open: Vec<Statement> = Vec::new();
+    for s in statements {
+        match s.keyword {
+            Keyword::If | Keyword::Repeat => open.push(s),
+            // A file that is called may leave its `endsub` away and end with M2.
+            Keyword::Sub if main => open.push(s),
+            Keyword::While if closes(&mut open, Keyword::Do, &s.label) => {}
+            Keyword::While | Keyword::Do => open.push(s),
+            Keyword::Endsub => _ = closes(&mut open, Keyword::Sub, &s.label),
+            Keyword::Endif => _ = closes(&mut open, Keyword::If, &s.label),
+            Keyword::Endwhile => _ = closes(&mut open, Keyword::While, &s.label),
+            Keyword::Endrepeat => _ = closes(&mut open, Keyword::Repeat, &s.label),
+            _ => {}
+        }
+    }
+    let finding = |s: Statement| {
+        let fault = Fault::own(code::FLOW_UNCLOSED).arg(format!("{} {}", s.label, op_name(s.keyword)));
+        crate::Finding { file, line: s.line, frame: FrameId::MAIN, fault, span: Some(s.span), text: "".into() }
+    };
+    open.into_iter().map(finding).collect()
+}
+
 fn base_name(name: &str) -> &str {
     name.rsplit('/').next().unwrap_or(name)
 }
@@ -855,42 +901,20 @@ impl<S: Sink> Interp<'_, S> {
         // the controller, so the file is searched for them.
         for id in self.opened.order.clone() {
             if !self.files.is_plain(id) {
-                self.unclosed_in(id);
+                let found = self.unclosed_in(id);
+                self.findings.extend(found);
             }
         }
     }
 
-    pub(crate) fn unclosed_in(&mut self, id: FileId) {
+    pub(crate) fn unclosed_in(&mut self, id: FileId) -> Vec<crate::Finding> {
         let index = self.index(id);
-        let mut open: Vec<(Keyword, String, u32, Span)> = Vec::new();
-        let main = self.opened.order.first() == Some(&id);
-        for line in index.lines.clone() {
-            let file = self.files.file(id);
-            let Some((c, l)) = file.locate(line) else { continue };
-            let scan = &file.chunks[c].scan;
-            let Some(w) = first_real(scan.words(l)).filter(|w| w.form == Form::Control && w.letter == b'o') else { continue };
-            let Some(control) = scan.controls.get(w.index()) else { continue };
-            let span = control.label_span;
-            let label = file.chunks[c].text.get(span.range()).unwrap_or("").to_ascii_lowercase();
-            let start = scan.lines[l as usize].start;
-            let here = Span::new(control.span.start.saturating_sub(start), control.span.end.saturating_sub(start));
-            match control.keyword {
-                Keyword::If | Keyword::Repeat => open.push((control.keyword, label, line, here)),
-                // A file that is called may leave its `endsub` away and end with M2.
-                Keyword::Sub if main => open.push((control.keyword, label, line, here)),
-                Keyword::While if closes(&mut open, Keyword::Do, &label) => {}
-                Keyword::While | Keyword::Do => open.push((control.keyword, label, line, here)),
-                Keyword::Endsub => _ = closes(&mut open, Keyword::Sub, &label),
-                Keyword::Endif => _ = closes(&mut open, Keyword::If, &label),
-                Keyword::Endwhile => _ = closes(&mut open, Keyword::While, &label),
-                Keyword::Endrepeat => _ = closes(&mut open, Keyword::Repeat, &label),
-                _ => {}
-            }
-        }
-        for (keyword, label, line, span) in open {
-            let fault = Fault::own(code::FLOW_UNCLOSED).arg(format!("{label} {}", op_name(keyword)));
-            self.findings.push(crate::run::Finding { file: id, line, frame: FrameId::MAIN, fault, span: Some(span), text: "".into() });
-        }
+        let file = self.files.file(id);
+        let statements = index.lines.iter().filter_map(|line| {
+            let (c, l) = file.locate(*line)?;
+            Some(Statement { line: *line, ..statement(&file.chunks[c].scan, &file.chunks[c].text, l)? })
+        });
+        unclosed(statements, id, self.opened.order.first() == Some(&id))
     }
 
     // Macro B.
@@ -1106,11 +1130,9 @@ fn is_macro(keyword: Keyword) -> bool {
 }
 
 /// Takes out of `open` what a statement with this label closes. A computed label (`o#1`, `o[…]`) may be any.
-fn closes(open: &mut Vec<(Keyword, String, u32, Span)>, keyword: Keyword, label: &str) -> bool {
+fn closes(open: &mut Vec<Statement>, keyword: Keyword, label: &str) -> bool {
     let computed = |l: &str| l.contains(['#', '[']) && !l.contains('<');
-    let of = |o: &(Keyword, String, u32, Span), any: bool| {
-        o.0 == keyword && (o.1 == label || any && (computed(label) || computed(&o.1)))
-    };
+    let of = |o: &Statement, any: bool| o.keyword == keyword && (*o.label == *label || any && (computed(label) || computed(&o.label)));
     let Some(at) = open.iter().rposition(|o| of(o, false)).or_else(|| open.iter().rposition(|o| of(o, true))) else { return false };
     open.remove(at);
     true

@@ -48,7 +48,7 @@ mod wide;
 
 pub use block::{Block, Group};
 pub use carry::Carry;
-pub use control::is_stop;
+pub use control::{Statement, is_stop, statement, unclosed};
 pub use fault::{Fault, Res};
 pub use files::*;
 pub use params::Params;

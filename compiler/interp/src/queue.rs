@@ -6,7 +6,7 @@
 
 use std::hash::{Hash, Hasher};
 
-use gr_canon::{Axes, Call, Nurbs, Plane, Sink};
+use gr_canon::{Axes, Call, FileId, FrameId, Nurbs, Plane, Sink};
 use gr_spec::{code, rs274};
 
 use crate::arc::sweep;
@@ -100,6 +100,16 @@ impl Queue {
     pub fn count_lines_from(&mut self, by: u32) {
         for (_, place) in &mut self.items {
             place.line = place.line.wrapping_sub(by);
+        }
+    }
+    /// Blocks of the main program in this file, outside of calls and loops, asked for everything held back.
+    pub fn is_of(&self, file: FileId) -> bool {
+        self.items.iter().all(|(_, p)| p.file == file && p.frame == FrameId::MAIN)
+    }
+    /// The blocks that asked for what is held back are in this file from now on.
+    pub fn move_to(&mut self, file: FileId) {
+        for (_, place) in &mut self.items {
+            place.file = file;
         }
     }
     /// Forgets everything (restart).
