@@ -1,1 +1,0 @@
-vim.filetype.add({ extension = { ngc = "gcode", nc = "gcode", tap = "gcode", gcode = "gcode" } })

@@ -1,0 +1,138 @@
+-- Language server, commands and preview for G-code and STEP-NC.
+local M = {}
+
+local program = require("gcc-robot.program")
+
+M.filetypes = { "gcode", "p21" }
+M.root_markers = { "gcc-robot.toml", ".git" }
+
+M.options = {
+  -- The program; nil: on the PATH, then where cargo puts it.
+  program = nil,
+  -- Handed to the server as settings; see docs/editors.md.
+  settings = {},
+  -- Called with (client, buffer) when the server is ready: the place for key maps.
+  on_attach = nil,
+  -- Opens the address of a preview; nil: the system's browser.
+  open = nil,
+}
+
+local function complain(text)
+  vim.notify("gcc-robot: " .. text, vim.log.levels.ERROR)
+end
+
+--- The program, or nil after a message that says what to do.
+function M.program()
+  local found = program.find(M.options.program)
+  if not found then
+    complain("the program was not found. Build it with `cargo install --path compiler/cli`, or name it: "
+      .. 'require("gcc-robot").setup({ program = "/path/to/gcc-robot" })')
+  end
+  return found
+end
+
+--- The folder with the nearest root marker above a file, else the file's own folder.
+function M.root(path)
+  local folder = vim.fn.fnamemodify(path, ":p:h")
+  for _, marker in ipairs(M.root_markers) do
+    local found = vim.fn.findfile(marker, folder .. ";")
+    if found == "" then
+      found = vim.fn.finddir(marker, folder .. ";")
+    end
+    if found ~= "" then
+      return vim.fn.fnamemodify(found, ":p:h" .. (vim.fn.isdirectory(found) == 1 and ":h" or ""))
+    end
+  end
+  return folder
+end
+
+--- What Neovim is told of the server, in the form of `vim.lsp.start_client`.
+function M.config(root)
+  local found = M.program()
+  if not found then
+    return nil
+  end
+  return {
+    name = "gcc-robot",
+    cmd = { found, "lsp" },
+    root_dir = root,
+    settings = { ["gcc-robot"] = M.options.settings },
+    init_options = M.options.settings,
+    on_attach = M.options.on_attach,
+  }
+end
+
+-- Before Neovim 0.8 there is no vim.lsp.start: one client per root, kept here.
+local clients = {}
+
+local function attach_old(buffer, root)
+  local id = clients[root]
+  if not (id and vim.lsp.get_client_by_id(id)) then
+    local config = M.config(root)
+    if not config then
+      return
+    end
+    id = vim.lsp.start_client(config)
+    clients[root] = id
+  end
+  vim.lsp.buf_attach_client(buffer, id)
+end
+
+local function attach(buffer)
+  local name = vim.api.nvim_buf_get_name(buffer)
+  if name == "" or vim.bo[buffer].buftype ~= "" then
+    return
+  end
+  local root = M.root(name)
+  if not vim.lsp.start then
+    attach_old(buffer, root)
+    return
+  end
+  local config = M.config(root)
+  if config then
+    vim.lsp.start(config, { bufnr = buffer })
+  end
+end
+
+-- From 0.11 on the configuration is found by its name in lsp/gcc_robot.lua.
+local function enable_by_name()
+  local found = M.program()
+  if not found then
+    return
+  end
+  vim.lsp.config("gcc_robot", {
+    cmd = { found, "lsp" },
+    settings = { ["gcc-robot"] = M.options.settings },
+    init_options = M.options.settings,
+    on_attach = M.options.on_attach,
+  })
+  vim.lsp.enable("gcc_robot")
+end
+
+local function enable_by_event()
+  local group = vim.api.nvim_create_augroup("GccRobot", { clear = true })
+  vim.api.nvim_create_autocmd("FileType", {
+    group = group,
+    pattern = M.filetypes,
+    callback = function(event)
+      attach(event.buf)
+    end,
+  })
+  for _, buffer in ipairs(vim.api.nvim_list_bufs()) do
+    if vim.tbl_contains(M.filetypes, vim.bo[buffer].filetype) then
+      attach(buffer)
+    end
+  end
+end
+
+--- Starts the server for every G-code and STEP-NC buffer. Options: see M.options.
+function M.setup(options)
+  M.options = vim.tbl_extend("force", M.options, options or {})
+  if vim.lsp.config and vim.lsp.enable then
+    enable_by_name()
+  else
+    enable_by_event()
+  end
+end
+
+return M
