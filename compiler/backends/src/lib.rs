@@ -10,6 +10,6 @@ mod sources;
 mod sweep;
 mod target;
 
-pub use sources::{NoSources, Sources, Texts};
+pub use gr_ir::{NoSources, Sources, Texts};
 pub use sweep::Sweep;
 pub use target::{Target, targets};

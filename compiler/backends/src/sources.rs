@@ -1,61 +1,5 @@
-//! What a back end may ask about the source text. Motion is known from the IR alone; the text tells which words
-//! stood there, which matters where a number is only a simulation's: G53, G28, a word that happens to change
-//! nothing.
-
-use gr_ir::Source;
-use gr_text::{FileId, Span};
-
-/// Gives source lines.
-pub trait Sources {
-    /// The bytes of a line, for messages.
-    fn place(&self, source: Source) -> (FileId, Span);
-    /// The text of a line (from 0); none where there is no such line or no text.
-    fn line(&self, file: FileId, line: u32) -> Option<&str>;
-}
-
-/// No text at hand.
-pub struct NoSources;
-
-impl Sources for NoSources {
-    fn place(&self, source: Source) -> (FileId, Span) {
-        (source.file, Span::default())
-    }
-    fn line(&self, _file: FileId, _line: u32) -> Option<&str> {
-        None
-    }
-}
-
-/// Whole texts by file number.
-pub struct Texts<'a> {
-    files: Vec<(FileId, &'a str, gr_text::LineIndex)>,
-}
-
-impl<'a> Texts<'a> {
-    /// Indexes the lines of some files.
-    pub fn new(files: impl IntoIterator<Item = (FileId, &'a str)>) -> Texts<'a> {
-        let files = files.into_iter().map(|(id, t)| (id, t, gr_text::LineIndex::new(t.as_bytes())));
-        Texts { files: files.collect() }
-    }
-    fn span(&self, file: FileId, line: u32) -> Option<(&'a str, Span)> {
-        let (_, text, index) = self.files.iter().find(|f| f.0 == file)?;
-        let line = line as usize;
-        if line >= index.count() {
-            return None;
-        }
-        let (start, end) = (index.start(line), index.start(line.checked_add(1)?));
-        let body = text.get(start as usize..end as usize)?.trim_end_matches(['\r', '\n']);
-        Some((body, Span::new(start, start + body.len() as u32)))
-    }
-}
-
-impl Sources for Texts<'_> {
-    fn place(&self, source: Source) -> (FileId, Span) {
-        (source.file, self.span(source.file, source.line).map(|s| s.1).unwrap_or_default())
-    }
-    fn line(&self, file: FileId, line: u32) -> Option<&str> {
-        self.span(file, line).map(|s| s.0)
-    }
-}
+//! What words a source line holds. Motion is known from the IR alone; the text tells which words stood there,
+//! which matters where a number is only a simulation's: G53, G28, a word that happens to change nothing.
 
 /// What stands in a line, as far as a look at its letters tells: expressions are skipped, not evaluated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -66,8 +10,10 @@ pub struct Words {
 }
 
 /// Codes that [`Words`] looks for, times ten.
-const CODES: [u32; 22] =
-    [530, 280, 300, 281, 301, 400, 410, 420, 411, 421, 490, 520, 920, 921, 922, 923, 610, 611, 640, 430, 431, 432];
+const CODES: [u32; 22] = [
+    530, 280, 300, 281, 301, 400, 410, 420, 411, 421, 490, 520, 920, 921, 922, 923, 610, 611, 640,
+    430, 431, 432,
+];
 
 impl Words {
     /// Reads a line.
@@ -77,7 +23,12 @@ impl Words {
         let mut i = 0;
         while i < bytes.len() {
             match bytes[i].to_ascii_lowercase() {
-                b'(' => i += bytes[i..].iter().position(|b| *b == b')').unwrap_or(bytes.len()),
+                b'(' => {
+                    i += bytes[i..]
+                        .iter()
+                        .position(|b| *b == b')')
+                        .unwrap_or(bytes.len())
+                }
                 b';' => break,
                 b'[' => i = close(bytes, i),
                 // A parameter is a value here or the target of a setting, never an axis word.
@@ -105,7 +56,9 @@ impl Words {
                 _ => break,
             }
         }
-        let tenths = number.parse::<f64>().map_or(0, |v| (v * 10.0).round() as u32);
+        let tenths = number
+            .parse::<f64>()
+            .map_or(0, |v| (v * 10.0).round() as u32);
         if let Some(i) = CODES.iter().position(|c| *c == tenths) {
             self.codes |= 1 << i;
         }
@@ -117,7 +70,10 @@ impl Words {
     }
     /// Whether a G-code (times ten) of the list stands there.
     pub fn g(self, tenths: u32) -> bool {
-        CODES.iter().position(|c| *c == tenths).is_some_and(|i| self.codes & (1 << i) != 0)
+        CODES
+            .iter()
+            .position(|c| *c == tenths)
+            .is_some_and(|i| self.codes & (1 << i) != 0)
     }
 }
 
@@ -143,7 +99,12 @@ fn close(bytes: &[u8], i: usize) -> usize {
 
 fn parameter(bytes: &[u8], i: usize) -> usize {
     match bytes.get(i + 1) {
-        Some(b'<') => i + bytes[i..].iter().position(|b| *b == b'>').unwrap_or(bytes.len()),
+        Some(b'<') => {
+            i + bytes[i..]
+                .iter()
+                .position(|b| *b == b'>')
+                .unwrap_or(bytes.len())
+        }
         _ => i,
     }
 }
@@ -160,14 +121,5 @@ mod tests {
         assert!(Words::of("G28.1").g(281) && !Words::of("G28.1").g(280));
         assert!(Words::of("@5 ^30").has(b'y'));
         assert_eq!(Words::of("x[[[").has(b'x'), true);
-    }
-
-    #[test]
-    fn lines_of_texts() {
-        let texts = Texts::new([(FileId(3), "G0 X1\r\nG1 X2")]);
-        assert_eq!(texts.line(FileId(3), 1), Some("G1 X2"));
-        assert_eq!(texts.line(FileId(3), 2), None);
-        let at = Source { file: FileId(3), line: 0, ..Source::default() };
-        assert_eq!(texts.place(at), (FileId(3), Span::new(0, 5)));
     }
 }

@@ -10,6 +10,7 @@ pub mod geometry;
 mod lower;
 pub mod measure;
 mod op;
+mod sources;
 mod state;
 mod store;
 pub mod text;
@@ -17,6 +18,9 @@ pub mod text;
 pub use gr_canon::{Axes, FrameId, Plane, Units};
 pub use gr_text::FileId;
 pub use lower::Lowering;
-pub use op::{Arc, ArcPlane, FeedMode, Marker, Note, Op, Override, PathMode, Pose, Source, Stop, Turn};
+pub use op::{
+    Arc, ArcPlane, FeedMode, Marker, Note, Op, Override, PathMode, Pose, Source, Stop, Turn,
+};
+pub use sources::{NoSources, Sources, Texts};
 pub use state::{Spindle, State, Sync, plane_axes};
 pub use store::{Builder, Cursor, Frame, Frames, Program, Step, View};

@@ -1,0 +1,166 @@
+//! The motion of one machine, ready to be written in some language. Lengths in mm, angles in rad, time in s.
+
+use gr_ir::Source;
+use gr_machine::math::Frame;
+use gr_machine::{Machine, Signal};
+
+/// No machine here has more joints, external axes included.
+pub const MAX_JOINTS: usize = 12;
+
+/// A point of the path: where the tool is, and the joint values that put it there.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Target {
+    /// Tool point in the step's work frame, mm.
+    pub position: [f64; 3],
+    /// Tool frame's turn in the work frame: unit quaternion, scalar first, scalar never negative.
+    pub quaternion: [f64; 4],
+    /// Joint values, rad or mm, the machine's joints first, external axes after them; not yet as the controller
+    /// counts them ([`Machine::controller_values`]). Unused places are zero.
+    pub joints: [f64; MAX_JOINTS],
+    /// The configuration, as the kinematics number it.
+    pub branch: u8,
+}
+
+/// A tool the program uses.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Tool {
+    /// Its number in the program; 0 = none.
+    pub number: u32,
+    /// Its name on the controller.
+    pub name: String,
+    /// Tool point on the flange, spindle mounting and tool length included.
+    pub frame: Frame,
+    /// Mass, kg.
+    pub mass: Option<f64>,
+}
+
+/// A work frame (wobj, base, user frame) the program uses.
+#[derive(Clone, PartialEq, Debug)]
+pub struct WorkFrame {
+    /// Its name on the controller: `G54` …
+    pub name: String,
+    /// It in the robot's base.
+    pub frame: Frame,
+}
+
+/// What happens at the end of a move.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub enum Zone {
+    /// The tool stops there (G61, G61.1, before dwells and signals).
+    Stop,
+    /// It may cut the corner within this many mm; at most half of both neighboring moves.
+    Blend(f64),
+}
+
+/// One thing the machine does. Targets are indices into [`RobotProgram::targets`]; a move starts where the one before
+/// it ended.
+#[derive(Clone, PartialEq, Debug)]
+pub enum Action {
+    /// All joints start and stop together.
+    Joint {
+        /// Where to.
+        to: u32,
+        /// Share of the greatest joint speed, above 0 to 1.
+        speed: f64,
+        /// At its end.
+        zone: Zone,
+    },
+    /// The tool point goes in a straight line.
+    Linear {
+        /// Where to.
+        to: u32,
+        /// Of the tool point, mm/s.
+        speed: f64,
+        /// At its end.
+        zone: Zone,
+        /// A rapid of the program, done in a line.
+        rapid: bool,
+    },
+    /// The tool point goes round an arc of at most half a turn.
+    Arc {
+        /// A point in its middle.
+        via: u32,
+        /// Its end.
+        to: u32,
+        /// Its center in the work frame, mm.
+        center: [f64; 3],
+        /// Unit normal; the turn is positive about it.
+        normal: [f64; 3],
+        /// Angle turned, rad, positive.
+        angle: f64,
+        /// Of the tool point, mm/s.
+        speed: f64,
+        /// At its end.
+        zone: Zone,
+    },
+    /// From here on this tool (index into [`RobotProgram::tools`]) is the tool point.
+    UseTool(u16),
+    /// From here on targets are in this frame (index into [`RobotProgram::frames`]).
+    UseFrame(u16),
+    /// The tool must be changed to this number; `None` = the machine file doesn't say how: the operator does it.
+    ChangeTool {
+        /// Number.
+        number: u32,
+        /// Routine or signal.
+        by: Option<Signal>,
+    },
+    /// A signal or routine of the cell for a word of the program (M3, M8, S …).
+    Signal {
+        /// The word: `M3`.
+        word: String,
+        /// Number behind it, where there is one (S in rev/min, analog value).
+        value: Option<f64>,
+        /// What the machine file says it does.
+        signal: Signal,
+    },
+    /// Wait, s.
+    Dwell(f64),
+    /// Wait for an input of the controller.
+    WaitInput {
+        /// Its name.
+        name: String,
+        /// Its state.
+        on: bool,
+        /// For at most so long, s.
+        timeout: Option<f64>,
+    },
+    /// Shown to the operator.
+    Message(String),
+    /// For the reader of the program.
+    Comment(String),
+    /// The program waits for the operator (M0, M1, M60).
+    Pause {
+        /// Only when the switch is on.
+        optional: bool,
+    },
+    /// End of the program.
+    End,
+}
+
+/// An action and where it comes from; `None` = made by us (home, approach, retract).
+#[derive(Clone, PartialEq, Debug)]
+pub struct Step {
+    /// What.
+    pub action: Action,
+    /// Where from.
+    pub source: Option<Source>,
+}
+
+/// The motion of one machine.
+#[derive(Clone, PartialEq, Debug)]
+pub struct RobotProgram {
+    /// Name, as the file it comes from; languages shorten it to what they can.
+    pub name: String,
+    /// The machine.
+    pub machine: Machine,
+    /// Tools, by [`Action::UseTool`].
+    pub tools: Vec<Tool>,
+    /// Frames, by [`Action::UseFrame`].
+    pub frames: Vec<WorkFrame>,
+    /// Points of the path.
+    pub targets: Vec<Target>,
+    /// Where the program starts: joint values of the home position.
+    pub home: Target,
+    /// What happens, in order.
+    pub steps: Vec<Step>,
+}
