@@ -3,10 +3,7 @@
 
 use gr_ir::geometry::flatten;
 use gr_ir::measure::{Rates, measure};
-use gr_ir::{
-    Arc, ArcPlane, Axes, FeedMode, Note, Op, Override, PathMode, Program, Source, Stop, Turn,
-    Units, View,
-};
+use gr_ir::{Arc, ArcPlane, Axes, FeedMode, Note, Op, Override, PathMode, Program, Source, Stop, Turn, Units, View};
 use std::io::{Result, Write};
 
 const NAMES: [&str; 9] = ["x", "y", "z", "a", "b", "c", "u", "v", "w"];
@@ -14,10 +11,8 @@ const NAMES: [&str; 9] = ["x", "y", "z", "a", "b", "c", "u", "v", "w"];
 /// Writes one JSON object: header, files, calls and loop passes, then `operations`, one per line.
 pub fn json(program: &Program, out: &mut dyn Write) -> Result<()> {
     let mut line = Json::default();
-    line.0
-        .push_str("{\"format\":\"gcc-robot motion\",\"version\":1,");
-    line.0
-        .push_str("\"units\":{\"length\":\"mm\",\"angle\":\"rad\",\"time\":\"s\"},\n");
+    line.0.push_str("{\"format\":\"gcc-robot motion\",\"version\":1,");
+    line.0.push_str("\"units\":{\"length\":\"mm\",\"angle\":\"rad\",\"time\":\"s\"},\n");
     header(program, &mut line);
     line.0.push_str("\"operations\":[");
     let mut cursor = program.cursor();
@@ -42,13 +37,9 @@ fn header(program: &Program, line: &mut Json) {
     line.0.push_str("],\n\"frames\":[");
     for (i, frame) in program.frames.iter().enumerate() {
         line.0.push_str(if i == 0 { "\n{" } else { ",\n{" });
-        line.int("id", i64::from(frame.id.0))
-            .int("parent", i64::from(frame.parent.0));
-        line.int("file", i64::from(frame.file.0))
-            .int("line", i64::from(frame.line) + 1);
-        line.int("pass", i64::from(frame.pass))
-            .text("name", program.frames.name(frame))
-            .close();
+        line.int("id", i64::from(frame.id.0)).int("parent", i64::from(frame.parent.0));
+        line.int("file", i64::from(frame.file.0)).int("line", i64::from(frame.line) + 1);
+        line.int("pass", i64::from(frame.pass)).text("name", program.frames.name(frame)).close();
     }
     line.0.push_str("],\n");
 }
@@ -77,8 +68,7 @@ fn operation(line: &mut Json, view: &View<'_, '_>) {
 
 fn source(line: &mut Json, s: Source) {
     line.key("at").0.push('{');
-    line.int("file", i64::from(s.file.0))
-        .int("line", i64::from(s.line) + 1);
+    line.int("file", i64::from(s.file.0)).int("line", i64::from(s.line) + 1);
     if s.frame.0 != 0 {
         line.int("frame", i64::from(s.frame.0));
     }
@@ -90,18 +80,9 @@ fn motion(line: &mut Json, op: &Op<'_>) {
         Op::Rapid => line.op("rapid"),
         Op::Linear => line.op("linear"),
         Op::Arc(arc) => arc_fields(line, arc),
-        Op::Nurbs { order, points } => line
-            .op("nurbs")
-            .int("order", i64::from(*order))
-            .nums("points", points),
-        Op::Probe(kind) => line
-            .op("probe")
-            .int("kind", i64::from(*kind))
-            .flag("known_only_at_run_time", true),
-        Op::RigidTap { bottom, scale } => line
-            .op("rigid_tap")
-            .nums("bottom", bottom)
-            .num("scale", *scale),
+        Op::Nurbs { order, points } => line.op("nurbs").int("order", i64::from(*order)).nums("points", points),
+        Op::Probe(kind) => line.op("probe").int("kind", i64::from(*kind)).flag("known_only_at_run_time", true),
+        Op::RigidTap { bottom, scale } => line.op("rigid_tap").nums("bottom", bottom).num("scale", *scale),
         Op::Dwell(s) => line.op("dwell").num("seconds", *s),
         Op::SyncStart(s) => line
             .op("sync_start")
@@ -110,26 +91,17 @@ fn motion(line: &mut Json, op: &Op<'_>) {
             .flag("velocity", s.velocity),
         Op::SyncStop => line.op("sync_stop"),
         Op::ProbeMode(on) => line.op("probe_mode").flag("on", *on),
-        Op::Units(u) => line
-            .op("units")
-            .text("units", if *u == Units::Inch { "inch" } else { "mm" }),
-        Op::Plane(p) => line
-            .op("plane")
-            .text("plane", &format!("{p:?}").to_lowercase()),
+        Op::Units(u) => line.op("units").text("units", if *u == Units::Inch { "inch" } else { "mm" }),
+        Op::Plane(p) => line.op("plane").text("plane", &format!("{p:?}").to_lowercase()),
         Op::FeedMode { spindle, mode } => {
             let name = match mode {
                 FeedMode::PerTime => "per_time",
                 FeedMode::PerRev => "per_rev",
                 FeedMode::Inverse => "inverse",
             };
-            line.op("feed_mode")
-                .text("mode", name)
-                .int("spindle", i64::from(*spindle))
+            line.op("feed_mode").text("mode", name).int("spindle", i64::from(*spindle))
         }
-        Op::Feed { linear, angular } => line
-            .op("feed")
-            .num("linear", *linear)
-            .num("angular", *angular),
+        Op::Feed { linear, angular } => line.op("feed").num("linear", *linear).num("angular", *angular),
         Op::FeedReferenceXyz => line.op("feed_reference").text("reference", "xyz"),
         Op::PathMode(mode) => match mode {
             PathMode::ExactStop => line.op("path").text("mode", "exact_stop"),
@@ -147,8 +119,7 @@ fn arc_fields<'j>(line: &'j mut Json, arc: &Arc) -> &'j mut Json {
         ArcPlane::Work(plane) => line.text("plane", &format!("{plane:?}").to_lowercase()),
         ArcPlane::Free(normal) => line.nums("normal", &normal),
     };
-    line.nums("center", &arc.center)
-        .int("turns", i64::from(arc.turns))
+    line.nums("center", &arc.center).int("turns", i64::from(arc.turns))
 }
 
 fn machine<'j>(line: &'j mut Json, op: &Op<'_>) -> &'j mut Json {
@@ -161,33 +132,23 @@ fn machine<'j>(line: &'j mut Json, op: &Op<'_>) -> &'j mut Json {
                 None => line.text("mode", "rpm"),
             }
         }
-        Op::SpindleSpeed { spindle, speed } => line
-            .op("spindle_speed")
-            .int("spindle", n(*spindle))
-            .num("speed", *speed),
+        Op::SpindleSpeed { spindle, speed } => {
+            line.op("spindle_speed").int("spindle", n(*spindle)).num("speed", *speed)
+        }
         Op::SpindleTurn { spindle, turn } => {
             let turn = match turn {
                 Turn::Cw => "cw",
                 Turn::Ccw => "ccw",
                 Turn::Stop => "stop",
             };
-            line.op("spindle_turn")
-                .int("spindle", n(*spindle))
-                .text("turn", turn)
+            line.op("spindle_turn").int("spindle", n(*spindle)).text("turn", turn)
         }
-        Op::SpindleOrient {
-            spindle,
-            angle,
-            direction,
-        } => line
-            .op("spindle_orient")
-            .int("spindle", n(*spindle))
-            .num("angle", *angle)
-            .int("direction", n(*direction)),
-        Op::SpindleWait { spindle, timeout } => line
-            .op("spindle_wait")
-            .int("spindle", n(*spindle))
-            .num("timeout", *timeout),
+        Op::SpindleOrient { spindle, angle, direction } => {
+            line.op("spindle_orient").int("spindle", n(*spindle)).num("angle", *angle).int("direction", n(*direction))
+        }
+        Op::SpindleWait { spindle, timeout } => {
+            line.op("spindle_wait").int("spindle", n(*spindle)).num("timeout", *timeout)
+        }
         Op::Mist(on) => line.op("mist").flag("on", *on),
         Op::Flood(on) => line.op("flood").flag("on", *on),
         Op::ToolPrepare(tool) => line.op("tool_prepare").int("tool", n(*tool)),
@@ -195,15 +156,7 @@ fn machine<'j>(line: &'j mut Json, op: &Op<'_>) -> &'j mut Json {
         Op::ToolChange(pocket) => line.op("tool_change").int("pocket", n(*pocket)),
         Op::ToolNumber(tool) => line.op("tool_number").int("tool", n(*tool)),
         Op::ToolReload => line.op("tool_reload"),
-        Op::ToolEntry {
-            pocket,
-            tool,
-            offset,
-            diameter,
-            front,
-            back,
-            orientation,
-        } => line
+        Op::ToolEntry { pocket, tool, offset, diameter, front, back, orientation } => line
             .op("tool_entry")
             .int("pocket", n(*pocket))
             .int("tool", n(*tool))
@@ -213,10 +166,9 @@ fn machine<'j>(line: &'j mut Json, op: &Op<'_>) -> &'j mut Json {
             .num("back", *back)
             .int("orientation", n(*orientation)),
         Op::ToolOffset(axes) => line.op("tool_offset").nums("offset", axes),
-        Op::WorkOffset(number, axes) => line
-            .op("work_offset")
-            .int("number", n(i32::from(*number)))
-            .nums("offset", axes),
+        Op::WorkOffset(number, axes) => {
+            line.op("work_offset").int("number", n(i32::from(*number))).nums("offset", axes)
+        }
         Op::LocalOffset(axes) => line.op("local_offset").nums("offset", axes),
         Op::Rotation(r) => line.op("rotation").num("angle", *r),
         _ => rest(line, op),
@@ -232,32 +184,17 @@ fn rest<'j>(line: &'j mut Json, op: &Op<'_>) -> &'j mut Json {
                 Override::Feed => line.text("switch", "feed"),
                 Override::Adaptive => line.text("switch", "adaptive"),
                 Override::FeedHold => line.text("switch", "feed_hold"),
-                Override::Speed(spindle) => {
-                    line.text("switch", "speed").int("spindle", n(*spindle))
-                }
+                Override::Speed(spindle) => line.text("switch", "speed").int("spindle", n(*spindle)),
             };
             line.flag("on", *on)
         }
-        Op::DigitalOut { index, on, synced } => line
-            .op("digital_out")
-            .int("index", n(*index))
-            .flag("on", *on)
-            .flag("synced", *synced),
-        Op::AnalogOut {
-            index,
-            value,
-            synced,
-        } => line
-            .op("analog_out")
-            .int("index", n(*index))
-            .num("value", *value)
-            .flag("synced", *synced),
-        Op::InputWait {
-            index,
-            digital,
-            wait,
-            timeout,
-        } => line
+        Op::DigitalOut { index, on, synced } => {
+            line.op("digital_out").int("index", n(*index)).flag("on", *on).flag("synced", *synced)
+        }
+        Op::AnalogOut { index, value, synced } => {
+            line.op("analog_out").int("index", n(*index)).num("value", *value).flag("synced", *synced)
+        }
+        Op::InputWait { index, digital, wait, timeout } => line
             .op("input_wait")
             .int("index", n(*index))
             .flag("digital", *digital)
@@ -276,11 +213,7 @@ fn rest<'j>(line: &'j mut Json, op: &Op<'_>) -> &'j mut Json {
             line.op(name).text("text", text)
         }
         Op::LogClose => line.op("log_close"),
-        Op::UserM { code, p, q } => line
-            .op("user_m")
-            .int("code", n(*code))
-            .num("p", *p)
-            .num("q", *q),
+        Op::UserM { code, p, q } => line.op("user_m").int("code", n(*code)).num("p", *p).num("q", *q),
         Op::Stop(stop) => {
             let why = match stop {
                 Stop::Program => "program",
@@ -291,18 +224,13 @@ fn rest<'j>(line: &'j mut Json, op: &Op<'_>) -> &'j mut Json {
         }
         Op::Finish => line.op("finish"),
         Op::Reset => line.op("reset"),
-        Op::IndexerLock(axis, on) => line
-            .op("indexer_lock")
-            .int("axis", n(i32::from(*axis)))
-            .flag("lock", *on),
+        Op::IndexerLock(axis, on) => line.op("indexer_lock").int("axis", n(i32::from(*axis))).flag("lock", *on),
         Op::Begin { marker, code, text } => line
             .op("begin")
             .text("marker", &format!("{marker:?}").to_lowercase())
             .int("code", n(*code))
             .text("text", text),
-        Op::Close(marker) => line
-            .op("close")
-            .text("marker", &format!("{marker:?}").to_lowercase()),
+        Op::Close(marker) => line.op("close").text("marker", &format!("{marker:?}").to_lowercase()),
         _ => line.op("end"),
     }
 }
@@ -330,8 +258,7 @@ impl Json {
     fn text(&mut self, key: &str, text: &str) -> &mut Json {
         self.key(key);
         // A string always has a JSON form.
-        self.0
-            .push_str(&serde_json::to_string(text).unwrap_or_default());
+        self.0.push_str(&serde_json::to_string(text).unwrap_or_default());
         self
     }
     fn int(&mut self, key: &str, v: i64) -> &mut Json {
@@ -386,7 +313,9 @@ pub struct CsvOptions {
 
 /// Writes one row per move: number, kind, X … W (mm, degrees), feed, elapsed time, tool, spindle, source.
 pub fn csv(program: &Program, options: &CsvOptions, out: &mut dyn Write) -> Result<()> {
-    out.write_all(b"op,kind,x_mm,y_mm,z_mm,a_deg,b_deg,c_deg,u_mm,v_mm,w_mm,feed,feed_unit,time_s,tool,spindle,file,line\n")?;
+    out.write_all(
+        b"op,kind,x_mm,y_mm,z_mm,a_deg,b_deg,c_deg,u_mm,v_mm,w_mm,feed,feed_unit,time_s,tool,spindle,file,line\n",
+    )?;
     let mut buffer = String::new();
     let mut ns = 0;
     let mut cursor = program.cursor();
@@ -397,9 +326,7 @@ pub fn csv(program: &Program, options: &CsvOptions, out: &mut dyn Write) -> Resu
         }
         match options.tolerance {
             Some(tolerance) if view.op.moves() => {
-                flatten(&view.op, view.start, view.end, tolerance, |p| {
-                    row(&mut buffer, &view, p, ns, options)
-                });
+                flatten(&view.op, view.start, view.end, tolerance, |p| row(&mut buffer, &view, p, ns, options));
             }
             _ => row(&mut buffer, &view, &view.end.axes, ns, options),
         }
@@ -412,24 +339,13 @@ pub fn csv(program: &Program, options: &CsvOptions, out: &mut dyn Write) -> Resu
 }
 
 fn row(out: &mut String, view: &View<'_, '_>, axes: &Axes, ns: u64, options: &CsvOptions) {
-    let p = if options.machine {
-        view.state.machine(axes)
-    } else {
-        *axes
-    };
+    let p = if options.machine { view.state.machine(axes) } else { *axes };
     out.push_str(&(view.index + 1).to_string());
     out.push(',');
     out.push_str(kind(&view.op));
     for (i, v) in p.iter().enumerate() {
         out.push(',');
-        push_number(
-            out,
-            if (3..6).contains(&i) {
-                v.to_degrees()
-            } else {
-                *v
-            },
-        );
+        push_number(out, if (3..6).contains(&i) { v.to_degrees() } else { *v });
     }
     let (factor, unit) = match view.state.feed_mode {
         FeedMode::PerTime => (60.0, "mm/min"),
@@ -441,17 +357,9 @@ fn row(out: &mut String, view: &View<'_, '_>, axes: &Axes, ns: u64, options: &Cs
     let spindle = view.state.spindle(0);
     let speed = spindle.speed * f64::from(spindle.turn as i8);
     let source = view.source;
-    out.push_str(&format!(
-        ",{unit},{:.6},{},",
-        ns as f64 / 1e9,
-        view.state.tool
-    ));
+    out.push_str(&format!(",{unit},{:.6},{},", ns as f64 / 1e9, view.state.tool));
     push_number(out, speed);
-    out.push_str(&format!(
-        ",{},{}\n",
-        source.file.0,
-        u64::from(source.line) + 1
-    ));
+    out.push_str(&format!(",{},{}\n", source.file.0, u64::from(source.line) + 1));
 }
 
 fn kind(op: &Op<'_>) -> &'static str {

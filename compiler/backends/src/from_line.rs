@@ -3,10 +3,7 @@
 
 use crate::sources::Words;
 use gr_ir::Sources;
-use gr_ir::{
-    Builder, FrameId, Marker, Note, Op, Override, PathMode, Pose, Program, Source, State, Turn,
-    Units,
-};
+use gr_ir::{Builder, FrameId, Marker, Note, Op, Override, PathMode, Pose, Program, Source, State, Turn, Units};
 use gr_text::{Diagnostic, FileId, Span, code};
 
 /// Line number of operations that no source line asked for.
@@ -40,18 +37,9 @@ pub fn from_line(
     sources: &dyn Sources,
 ) -> Result<Restart, Vec<Diagnostic>> {
     let target = line.saturating_sub(1);
-    let place = sources.place(Source {
-        file,
-        line: target,
-        ..Source::default()
-    });
+    let place = sources.place(Source { file, line: target, ..Source::default() });
     let Some(found) = find(program, file, target) else {
-        return Err(vec![Diagnostic::new(
-            code::FROM_LINE_NOTHING_LEFT,
-            place.0,
-            place.1,
-            &[line.to_string()],
-        )]);
+        return Err(vec![Diagnostic::new(code::FROM_LINE_NOTHING_LEFT, place.0, place.1, &[line.to_string()])]);
     };
     let mut notes = Vec::new();
     let fault = |code| Err(vec![Diagnostic::new(code, place.0, place.1, &[])]);
@@ -63,12 +51,7 @@ pub fn from_line(
         return fault(code::FROM_LINE_INSIDE_CYCLE);
     }
     if let Some(way) = found.repeated {
-        notes.push(Diagnostic::new(
-            code::FROM_LINE_INSIDE_LOOP,
-            place.0,
-            place.1,
-            &[way],
-        ));
+        notes.push(Diagnostic::new(code::FROM_LINE_INSIDE_LOOP, place.0, place.1, &[way]));
     }
     let (state, pose) = (*cursor.state(), *cursor.pose());
     let safe = options.safe_z.unwrap_or_else(|| {
@@ -76,27 +59,12 @@ pub fn from_line(
         notes.push(no_height(place, top));
         top
     });
-    let restart = build(
-        program,
-        found.index,
-        &state,
-        &pose,
-        safe.max(pose.axes[2]),
-        line,
-    );
-    Ok(Restart {
-        program: restart,
-        notes,
-    })
+    let restart = build(program, found.index, &state, &pose, safe.max(pose.axes[2]), line);
+    Ok(Restart { program: restart, notes })
 }
 
 fn no_height(place: (FileId, Span), top: f64) -> Diagnostic {
-    Diagnostic::new(
-        code::FROM_LINE_NO_SAFE_HEIGHT,
-        place.0,
-        place.1,
-        &[format!("{top:.3}")],
-    )
+    Diagnostic::new(code::FROM_LINE_NO_SAFE_HEIGHT, place.0, place.1, &[format!("{top:.3}")])
 }
 
 struct Found {
@@ -107,11 +75,7 @@ struct Found {
 
 /// The first operation that the line asks for, itself or through a call; failing that the first of a later line.
 fn find(program: &Program, file: FileId, line: u32) -> Option<Found> {
-    let skip = program
-        .steps()
-        .take(8)
-        .position(|s| s.op == Op::Reset)
-        .map_or(0, |i| i + 1);
+    let skip = program.steps().take(8).position(|s| s.op == Op::Reset).map_or(0, |i| i + 1);
     let mut first: Option<usize> = None;
     let mut later: Option<usize> = None;
     let mut ways: Vec<Source> = Vec::new();
@@ -120,47 +84,26 @@ fn find(program: &Program, file: FileId, line: u32) -> Option<Found> {
             continue;
         }
         let own = step.source.file == file && step.source.line == line;
-        let through = program
-            .call_stack(step.source)
-            .find(|f| f.file == file && f.line == line);
+        let through = program.call_stack(step.source).find(|f| f.file == file && f.line == line);
         if own || through.is_some() {
             first.get_or_insert(step.index);
-            let frame = if own {
-                step.source.frame
-            } else {
-                through.map_or(FrameId::MAIN, |f| f.parent)
-            };
+            let frame = if own { step.source.frame } else { through.map_or(FrameId::MAIN, |f| f.parent) };
             let way = Source { file, line, frame };
             if ways.len() < 1000 && !ways.contains(&way) {
                 ways.push(way);
             }
         }
-        let outer = program
-            .call_stack(step.source)
-            .last()
-            .map_or(step.source.line, |f| f.line);
+        let outer = program.call_stack(step.source).last().map_or(step.source.line, |f| f.line);
         if later.is_none() && step.source.file == file && outer > line {
             later = Some(step.index);
         }
     }
     let repeated = (ways.len() > 1).then(|| {
         let inner = program.call_stack(ways[0]).next();
-        let name = inner
-            .map(|f| program.frames.name(f).to_string())
-            .unwrap_or_default();
-        format!(
-            "{} times, in {name}",
-            if ways.len() < 1000 {
-                ways.len().to_string()
-            } else {
-                "many".into()
-            }
-        )
+        let name = inner.map(|f| program.frames.name(f).to_string()).unwrap_or_default();
+        format!("{} times, in {name}", if ways.len() < 1000 { ways.len().to_string() } else { "many".into() })
     });
-    Some(Found {
-        index: first.or(later)?,
-        repeated,
-    })
+    Some(Found { index: first.or(later)?, repeated })
 }
 
 /// Whether cutter compensation is on before an operation. The motion shows no trace of it, so the lines that were
@@ -186,9 +129,7 @@ fn compensated(program: &Program, index: usize, line: u32, sources: &dyn Sources
         }
         // Lines that asked for nothing, a lone G40 for one, lie between the two.
         let from = match last {
-            Some(l) if l.file == source.file && l.frame == source.frame && l.line < source.line => {
-                l.line + 1
-            }
+            Some(l) if l.file == source.file && l.frame == source.frame && l.line < source.line => l.line + 1,
             _ => source.line,
         };
         for l in from..=source.line {
@@ -208,10 +149,7 @@ fn inside_cycle(program: &Program, index: usize) -> bool {
     let mut depth = 0i32;
     for step in program.steps().take(index) {
         match step.op {
-            Op::Begin {
-                marker: Marker::Cycle,
-                ..
-            } => depth += 1,
+            Op::Begin { marker: Marker::Cycle, .. } => depth += 1,
             Op::Close(Marker::Cycle) => depth -= 1,
             _ => {}
         }
@@ -228,30 +166,13 @@ fn top(program: &Program, state: &State) -> f64 {
             highest = highest.max(view.state.machine(&view.end.axes)[2]);
         }
     }
-    if highest.is_finite() {
-        highest - state.machine(&[0.0; 9])[2]
-    } else {
-        0.0
-    }
+    if highest.is_finite() { highest - state.machine(&[0.0; 9])[2] } else { 0.0 }
 }
 
-fn build(
-    program: &Program,
-    index: usize,
-    state: &State,
-    pose: &Pose,
-    safe: f64,
-    line: u32,
-) -> Program {
+fn build(program: &Program, index: usize, state: &State, pose: &Pose, safe: f64, line: u32) -> Program {
     // A place that no program names, so that every axis of the approach moves and has its word.
     let used = axes_used(program);
-    let far = Pose::at(std::array::from_fn(|i| {
-        if i < 3 || used[i] {
-            pose.axes[i] + 777.25
-        } else {
-            pose.axes[i]
-        }
-    }));
+    let far = Pose::at(std::array::from_fn(|i| if i < 3 || used[i] { pose.axes[i] + 777.25 } else { pose.axes[i] }));
     let mut out = Builder::from_state(far, State::default());
     for (id, name) in &program.files {
         out.file(*id, name);
@@ -259,34 +180,15 @@ fn build(
     for frame in program.frames.iter() {
         let name = program.frames.name(frame).into();
         let (parent, file, line, pass) = (frame.parent, frame.file, frame.line, frame.pass);
-        out.frame(
-            frame.id,
-            &gr_canon::CallFrame {
-                parent,
-                file,
-                line,
-                name,
-                pass,
-            },
-        );
+        out.frame(frame.id, &gr_canon::CallFrame { parent, file, line, name, pass });
     }
-    let mut restore = Restore {
-        out,
-        source: Source {
-            line: INSERTED,
-            ..Source::default()
-        },
-    };
+    let mut restore = Restore { out, source: Source { line: INSERTED, ..Source::default() } };
     restore.push(Op::Note(Note::Comment, &format!("restart at line {line}")));
     restore.frame(state);
     restore.tool(state);
     if units_under_offset(program, index) {
         // The same change again, which shows in no motion: G28 depends on it.
-        let other = if state.units == Units::Mm {
-            Units::Inch
-        } else {
-            Units::Mm
-        };
+        let other = if state.units == Units::Mm { Units::Inch } else { Units::Mm };
         restore.push(Op::Units(other));
         restore.push(Op::Units(state.units));
     }
@@ -362,35 +264,20 @@ impl Restore {
                 self.push(Op::Override(which, on));
             }
         }
-        self.push(Op::FeedMode {
-            spindle: s.feed_spindle,
-            mode: s.feed_mode,
-        });
-        self.push(Op::Feed {
-            linear: s.feed,
-            angular: s.feed_angular,
-        });
+        self.push(Op::FeedMode { spindle: s.feed_spindle, mode: s.feed_mode });
+        self.push(Op::Feed { linear: s.feed, angular: s.feed_angular });
     }
 
     fn spindles(&mut self, s: &State) {
         for (number, spindle) in (0..).zip(&s.spindles) {
             if spindle.surface.is_some() {
-                self.push(Op::SpindleMode {
-                    spindle: number,
-                    surface: spindle.surface,
-                });
+                self.push(Op::SpindleMode { spindle: number, surface: spindle.surface });
             }
             if spindle.speed != 0.0 {
-                self.push(Op::SpindleSpeed {
-                    spindle: number,
-                    speed: spindle.speed,
-                });
+                self.push(Op::SpindleSpeed { spindle: number, speed: spindle.speed });
             }
             if spindle.turn != Turn::Stop {
-                self.push(Op::SpindleTurn {
-                    spindle: number,
-                    turn: spindle.turn,
-                });
+                self.push(Op::SpindleTurn { spindle: number, turn: spindle.turn });
             }
         }
         if s.mist {

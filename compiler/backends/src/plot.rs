@@ -45,13 +45,7 @@ pub struct Options {
 
 impl Default for Options {
     fn default() -> Options {
-        Options {
-            show: Show::All,
-            width: 1400,
-            height: 900,
-            title: String::new(),
-            rapids: true,
-        }
+        Options { show: Show::All, width: 1400, height: 900, title: String::new(), rapids: true }
     }
 }
 

@@ -45,11 +45,7 @@ pub fn sheet(program: &Program, options: &Options) -> Sheet {
             from_table(tool, row);
         }
     }
-    Sheet {
-        title: options.title.clone(),
-        report,
-        rates: options.rates,
-    }
+    Sheet { title: options.title.clone(), report, rates: options.rates }
 }
 
 /// The table knows the tool better than the program's comments do; a row the program itself wrote (G10 L1) is
@@ -78,11 +74,7 @@ fn tool_notes(program: &Program, report: &mut Report) {
     for tool in report.tools.iter_mut().filter(|t| t.tool >= 0) {
         let named = notes.iter().find(|(_, text)| describes(text, tool.tool));
         let first = tool.first;
-        let there = || {
-            notes
-                .iter()
-                .find(|(s, _)| s.file == first.file && s.line == first.line)
-        };
+        let there = || notes.iter().find(|(s, _)| s.file == first.file && s.line == first.line);
         tool.note = named.or_else(there).map(|(_, t)| (*t).to_owned());
     }
 }
@@ -92,9 +84,7 @@ fn describes(text: &str, tool: i32) -> bool {
     let Some(rest) = text.strip_prefix(['T', 't']) else {
         return false;
     };
-    let digits = rest
-        .find(|c: char| !c.is_ascii_digit())
-        .unwrap_or(rest.len());
+    let digits = rest.find(|c: char| !c.is_ascii_digit()).unwrap_or(rest.len());
     rest[..digits].parse() == Ok(tool)
 }
 
@@ -109,16 +99,8 @@ fn offset_name(number: u8) -> String {
 
 fn number(v: f64) -> String {
     let text = format!("{v:.3}");
-    let text = if text.contains('.') {
-        text.trim_end_matches('0').trim_end_matches('.')
-    } else {
-        &text
-    };
-    if text == "-0" {
-        "0".into()
-    } else {
-        text.to_owned()
-    }
+    let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
+    if text == "-0" { "0".into() } else { text.to_owned() }
 }
 
 fn range(r: &Range, factor: f64) -> String {
@@ -143,11 +125,7 @@ fn clock(ns: u64) -> String {
 }
 
 fn tool_name(tool: i32) -> String {
-    if tool < 0 {
-        "none named".into()
-    } else {
-        format!("T{tool}")
-    }
+    if tool < 0 { "none named".into() } else { format!("T{tool}") }
 }
 
 fn coolant(t: &ToolUse) -> &'static str {
@@ -160,10 +138,7 @@ fn coolant(t: &ToolUse) -> &'static str {
 }
 
 fn works(t: &ToolUse) -> String {
-    let names: Vec<String> = (1..=9)
-        .filter(|n| t.work >> n & 1 == 1)
-        .map(offset_name)
-        .collect();
+    let names: Vec<String> = (1..=9).filter(|n| t.work >> n & 1 == 1).map(offset_name).collect();
     names.join(" ")
 }
 
@@ -171,11 +146,7 @@ fn speed(t: &ToolUse) -> String {
     match (t.rpm.0, t.surface.0) {
         (_, None) => format!("{} rpm", range(&t.rpm, 1.0)),
         (None, _) => format!("{} m/min", range(&t.surface, 0.06)),
-        _ => format!(
-            "{} rpm, {} m/min",
-            range(&t.rpm, 1.0),
-            range(&t.surface, 0.06)
-        ),
+        _ => format!("{} rpm, {} m/min", range(&t.rpm, 1.0), range(&t.surface, 0.06)),
     }
 }
 
@@ -183,11 +154,7 @@ fn feed(t: &ToolUse) -> String {
     match (t.feed.0, t.feed_per_rev.0) {
         (_, None) => format!("{} mm/min", range(&t.feed, 60.0)),
         (None, _) => format!("{} mm/rev", range(&t.feed_per_rev, 1.0)),
-        _ => format!(
-            "{} mm/min, {} mm/rev",
-            range(&t.feed, 60.0),
-            range(&t.feed_per_rev, 1.0)
-        ),
+        _ => format!("{} mm/min, {} mm/rev", range(&t.feed, 60.0), range(&t.feed_per_rev, 1.0)),
     }
 }
 
@@ -196,10 +163,7 @@ fn remarks(sheet: &Sheet) -> Vec<String> {
     let r = &sheet.report;
     let mut out = Vec::new();
     if r.totals.untimed > 0 {
-        out.push(format!(
-            "{} moves have no feed or a stopped spindle: their time is not counted.",
-            r.totals.untimed
-        ));
+        out.push(format!("{} moves have no feed or a stopped spindle: their time is not counted.", r.totals.untimed));
     }
     if r.run_time {
         out.push("The program probes or waits for inputs: path and time depend on what the machine finds.".into());
@@ -249,35 +213,16 @@ impl Sheet {
         }
         for (n, axes) in &r.offsets {
             let values: Vec<String> = axes[..3].iter().map(|v| number(*v)).collect();
-            let _ = writeln!(
-                out,
-                "{:<8} X{} Y{} Z{}",
-                offset_name(*n),
-                values[0],
-                values[1],
-                values[2]
-            );
+            let _ = writeln!(out, "{:<8} X{} Y{} Z{}", offset_name(*n), values[0], values[1], values[2]);
         }
         out.push('\n');
         out.push_str(&table(&self.tool_rows()));
         for c in &r.cycles {
-            let _ = writeln!(
-                out,
-                "\nG{:<7} {} passes, {}",
-                f64::from(c.code) / 10.0,
-                c.passes,
-                clock(c.totals.ns())
-            );
+            let _ = writeln!(out, "\nG{:<7} {} passes, {}", f64::from(c.code) / 10.0, c.passes, clock(c.totals.ns()));
         }
         for s in &r.stretches {
             let name = format!("{:?}", s.marker).to_lowercase();
-            let _ = writeln!(
-                out,
-                "{name} {} {}: {}",
-                s.code,
-                s.text,
-                clock(s.totals.ns())
-            );
+            let _ = writeln!(out, "{name} {} {}: {}", s.code, s.text, clock(s.totals.ns()));
         }
         out.push('\n');
         for remark in remarks(self) {
@@ -287,18 +232,7 @@ impl Sheet {
     }
 
     fn tool_rows(&self) -> Vec<[String; 10]> {
-        let head = [
-            "Tool",
-            "Line",
-            "Diameter",
-            "Offset Z",
-            "Speed",
-            "Feed",
-            "Coolant",
-            "Work",
-            "Z at feed",
-            "Time",
-        ];
+        let head = ["Tool", "Line", "Diameter", "Offset Z", "Speed", "Feed", "Coolant", "Work", "Z at feed", "Time"];
         let mut rows = vec![head.map(str::to_owned)];
         for t in &self.report.tools {
             let name = match &t.note {
@@ -308,11 +242,7 @@ impl Sheet {
             };
             rows.push([
                 name,
-                if t.tool < 0 {
-                    "-".into()
-                } else {
-                    (u64::from(t.first.line) + 1).to_string()
-                },
+                if t.tool < 0 { "-".into() } else { (u64::from(t.first.line) + 1).to_string() },
                 t.diameter.map_or("-".into(), number),
                 range(&t.offset_z, 1.0),
                 speed(t),
@@ -368,55 +298,31 @@ impl Sheet {
         let r = &self.report;
         let mut out = String::from(HEAD);
         let title = escape(&self.title);
-        let _ = writeln!(
-            out,
-            "<title>Setup sheet: {title}</title>\n<h1>Setup sheet</h1>\n<p class=\"name\">{title}</p>"
-        );
+        let _ =
+            writeln!(out, "<title>Setup sheet: {title}</title>\n<h1>Setup sheet</h1>\n<p class=\"name\">{title}</p>");
         out.push_str("<table class=\"sums\">\n");
         let t = &r.totals;
         let mut pair = |name: &str, value: String| {
             let _ = writeln!(out, "<tr><th>{name}</th><td>{}</td></tr>", escape(&value));
         };
         pair("Time", clock(t.ns()));
-        pair(
-            "At feed",
-            format!("{}, {} m", clock(t.feed_ns), number(t.feed_nm as f64 / 1e9)),
-        );
-        pair(
-            "Rapids",
-            format!(
-                "{}, {} m",
-                clock(t.rapid_ns),
-                number(t.rapid_nm as f64 / 1e9)
-            ),
-        );
+        pair("At feed", format!("{}, {} m", clock(t.feed_ns), number(t.feed_nm as f64 / 1e9)));
+        pair("Rapids", format!("{}, {} m", clock(t.rapid_ns), number(t.rapid_nm as f64 / 1e9)));
         pair("Waiting", clock(t.wait_ns));
         for (axis, name) in ["X", "Y", "Z"].into_iter().enumerate() {
-            pair(
-                &format!("{name} at feed"),
-                format!("{} mm", span(&r.cut, axis)),
-            );
+            pair(&format!("{name} at feed"), format!("{} mm", span(&r.cut, axis)));
         }
         for (axis, name) in ["X", "Y", "Z"].into_iter().enumerate() {
-            pair(
-                &format!("{name} in the machine"),
-                format!("{} mm", span(&r.machine, axis)),
-            );
+            pair(&format!("{name} in the machine"), format!("{} mm", span(&r.machine, axis)));
         }
         for (n, axes) in &r.offsets {
             let values: Vec<String> = axes[..3].iter().map(|v| number(*v)).collect();
-            pair(
-                &offset_name(*n),
-                format!("X {}   Y {}   Z {}", values[0], values[1], values[2]),
-            );
+            pair(&offset_name(*n), format!("X {}   Y {}   Z {}", values[0], values[1], values[2]));
         }
         out.push_str("</table>\n<table class=\"tools\">\n");
         for (i, row) in self.tool_rows().iter().enumerate() {
             let tag = if i == 0 { "th" } else { "td" };
-            let cells: String = row
-                .iter()
-                .map(|c| format!("<{tag}>{}</{tag}>", escape(c)))
-                .collect();
+            let cells: String = row.iter().map(|c| format!("<{tag}>{}</{tag}>", escape(c))).collect();
             let _ = writeln!(out, "<tr>{cells}</tr>");
         }
         out.push_str("</table>\n");
@@ -436,9 +342,7 @@ th, td { text-align: left; padding: 3px 10px; border-bottom: 1px solid #ccc; ver
 @media print { body { margin: 0; font-size: 11px } }\n</style>\n";
 
 fn escape(text: &str) -> String {
-    text.replace('&', "&amp;")
-        .replace('<', "&lt;")
-        .replace('>', "&gt;")
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 
 fn seconds(t: &gr_ir::measure::Totals) -> serde_json::Value {
@@ -449,26 +353,17 @@ fn seconds(t: &gr_ir::measure::Totals) -> serde_json::Value {
 }
 
 fn extent_json(e: &Extent) -> serde_json::Value {
-    if e.is_empty() {
-        serde_json::Value::Null
-    } else {
-        serde_json::json!({"min": e.min, "max": e.max})
-    }
+    if e.is_empty() { serde_json::Value::Null } else { serde_json::json!({"min": e.min, "max": e.max}) }
 }
 
 fn range_json(r: &Range, factor: f64) -> serde_json::Value {
     // Without the last bits of a conversion: 1200, not 1199.9999999999998.
     let round = |v: f64| libm::round(v * factor * 1e9) / 1e9;
-    r.0.map_or(serde_json::Value::Null, |(a, b)| {
-        serde_json::json!([round(a), round(b)])
-    })
+    r.0.map_or(serde_json::Value::Null, |(a, b)| serde_json::json!([round(a), round(b)]))
 }
 
 fn tool_json(t: &ToolUse) -> serde_json::Value {
-    let work: Vec<String> = (1..=9)
-        .filter(|n| t.work >> n & 1 == 1)
-        .map(offset_name)
-        .collect();
+    let work: Vec<String> = (1..=9).filter(|n| t.work >> n & 1 == 1).map(offset_name).collect();
     serde_json::json!({
         "tool": if t.tool < 0 { serde_json::Value::Null } else { t.tool.into() },
         "note": t.note, "changes": t.changes, "line": u64::from(t.first.line) + 1, "diameter_mm": t.diameter,

@@ -10,10 +10,8 @@ pub struct Words {
 }
 
 /// Codes that [`Words`] looks for, times ten.
-const CODES: [u32; 22] = [
-    530, 280, 300, 281, 301, 400, 410, 420, 411, 421, 490, 520, 920, 921, 922, 923, 610, 611, 640,
-    430, 431, 432,
-];
+const CODES: [u32; 22] =
+    [530, 280, 300, 281, 301, 400, 410, 420, 411, 421, 490, 520, 920, 921, 922, 923, 610, 611, 640, 430, 431, 432];
 
 impl Words {
     /// Reads a line.
@@ -23,12 +21,7 @@ impl Words {
         let mut i = 0;
         while i < bytes.len() {
             match bytes[i].to_ascii_lowercase() {
-                b'(' => {
-                    i += bytes[i..]
-                        .iter()
-                        .position(|b| *b == b')')
-                        .unwrap_or(bytes.len())
-                }
+                b'(' => i += bytes[i..].iter().position(|b| *b == b')').unwrap_or(bytes.len()),
                 b';' => break,
                 b'[' => i = close(bytes, i),
                 // A parameter is a value here or the target of a setting, never an axis word.
@@ -56,9 +49,7 @@ impl Words {
                 _ => break,
             }
         }
-        let tenths = number
-            .parse::<f64>()
-            .map_or(0, |v| (v * 10.0).round() as u32);
+        let tenths = number.parse::<f64>().map_or(0, |v| (v * 10.0).round() as u32);
         if let Some(i) = CODES.iter().position(|c| *c == tenths) {
             self.codes |= 1 << i;
         }
@@ -70,10 +61,7 @@ impl Words {
     }
     /// Whether a G-code (times ten) of the list stands there.
     pub fn g(self, tenths: u32) -> bool {
-        CODES
-            .iter()
-            .position(|c| *c == tenths)
-            .is_some_and(|i| self.codes & (1 << i) != 0)
+        CODES.iter().position(|c| *c == tenths).is_some_and(|i| self.codes & (1 << i) != 0)
     }
 }
 
@@ -99,12 +87,7 @@ fn close(bytes: &[u8], i: usize) -> usize {
 
 fn parameter(bytes: &[u8], i: usize) -> usize {
     match bytes.get(i + 1) {
-        Some(b'<') => {
-            i + bytes[i..]
-                .iter()
-                .position(|b| *b == b'>')
-                .unwrap_or(bytes.len())
-        }
+        Some(b'<') => i + bytes[i..].iter().position(|b| *b == b'>').unwrap_or(bytes.len()),
         _ => i,
     }
 }

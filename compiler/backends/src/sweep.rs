@@ -15,11 +15,7 @@ pub struct Sweep {
 impl Sweep {
     /// Works out an arc.
     pub fn new(start: &Pose, end: &Pose, arc: &Arc) -> Sweep {
-        Sweep {
-            shape: ArcShape::new(arc, start, end),
-            start: *start,
-            end: *end,
-        }
+        Sweep { shape: ArcShape::new(arc, start, end), start: *start, end: *end }
     }
 
     /// Angle turned through, rad; > 0 counter-clockwise seen against the normal.
@@ -65,11 +61,7 @@ mod tests {
     }
 
     fn degrees(start: Pose, end: Pose, center: [f64; 3], turns: i32) -> f64 {
-        let arc = Arc {
-            plane: ArcPlane::Work(Plane::Xy),
-            center,
-            turns,
-        };
+        let arc = Arc { plane: ArcPlane::Work(Plane::Xy), center, turns };
         (Sweep::new(&start, &end, &arc).angle().to_degrees() * 1e9).round() / 1e9
     }
 
@@ -85,11 +77,7 @@ mod tests {
 
     #[test]
     fn points_of_a_helix() {
-        let arc = Arc {
-            plane: ArcPlane::Work(Plane::Xy),
-            center: [0.0; 3],
-            turns: 1,
-        };
+        let arc = Arc { plane: ArcPlane::Work(Plane::Xy), center: [0.0; 3], turns: 1 };
         let sweep = Sweep::new(&pose(10.0, 0.0, 0.0), &pose(0.0, 10.0, 6.0), &arc);
         let p = sweep.at(1.0 / 3.0).xyz();
         assert!((p[0] - 10.0 * (30.0_f64).to_radians().cos()).abs() < 1e-12);

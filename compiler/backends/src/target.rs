@@ -15,16 +15,8 @@ mod tests {
         let mut seen = std::collections::BTreeSet::new();
         for t in super::targets() {
             assert!(seen.insert(t.id), "{} twice", t.id);
-            assert!(
-                matches!(t.status, "stable" | "experimental" | "planned"),
-                "{}",
-                t.id
-            );
-            assert!(
-                !t.extension.is_empty() && !t.title.is_empty() && !t.what.is_empty(),
-                "{}",
-                t.id
-            );
+            assert!(matches!(t.status, "stable" | "experimental" | "planned"), "{}", t.id);
+            assert!(!t.extension.is_empty() && !t.title.is_empty() && !t.what.is_empty(), "{}", t.id);
         }
         assert!(gr_spec::TargetDef::find("joint-gcode").is_some());
     }

@@ -10,15 +10,7 @@ fn at(x: f64, y: f64, z: f64) -> Axes {
 
 fn arc(end: [f64; 2], center: [f64; 2], rotation: i32, z: f64) -> Call {
     let ([first_end, second_end], [first_axis, second_axis]) = (end, center);
-    Call::ArcFeed {
-        first_end,
-        second_end,
-        first_axis,
-        second_axis,
-        rotation,
-        axis_end: z,
-        rest: [0.0; 6],
-    }
+    Call::ArcFeed { first_end, second_end, first_axis, second_axis, rotation, axis_end: z, rest: [0.0; 6] }
 }
 
 /// Outline with rounded corners, a helix into a pocket, four holes with a second tool.
@@ -78,15 +70,7 @@ fn part() -> Program {
     let mut out = Lowering::new();
     out.builder_mut().file(FileId(0), "part.ngc");
     for (line, call) in (0..).zip(&calls) {
-        out.call(
-            &At {
-                file: FileId(0),
-                line,
-                frame: FrameId::MAIN,
-                now: b"",
-            },
-            call,
-        );
+        out.call(&At { file: FileId(0), line, frame: FrameId::MAIN, now: b"" }, call);
     }
     out.finish()
 }
@@ -99,21 +83,9 @@ fn json_is_json_and_says_where_from() {
     let operations = value["operations"].as_array().expect("array");
     assert_eq!(operations.len(), part().len());
     let rapid = &operations[10];
-    assert_eq!(
-        (rapid["op"].as_str(), rapid["to"]["x"].as_f64()),
-        (Some("rapid"), Some(10.0))
-    );
-    assert_eq!(
-        (
-            rapid["at"]["line"].as_u64(),
-            value["files"][0]["name"].as_str()
-        ),
-        (Some(11), Some("part.ngc"))
-    );
-    assert!(
-        rapid["to"].get("a").is_none(),
-        "what does not change is not there"
-    );
+    assert_eq!((rapid["op"].as_str(), rapid["to"]["x"].as_f64()), (Some("rapid"), Some(10.0)));
+    assert_eq!((rapid["at"]["line"].as_u64(), value["files"][0]["name"].as_str()), (Some(11), Some("part.ngc")));
+    assert!(rapid["to"].get("a").is_none(), "what does not change is not there");
 }
 
 #[test]
@@ -126,20 +98,14 @@ fn csv_rows() {
     let columns = text.lines().next().map(|l| l.split(',').count());
     assert!(text.lines().all(|l| Some(l.split(',').count()) == columns));
     let mut fine = Vec::new();
-    let options = dump::CsvOptions {
-        tolerance: Some(0.01),
-        ..Default::default()
-    };
+    let options = dump::CsvOptions { tolerance: Some(0.01), ..Default::default() };
     dump::csv(&part(), &options, &mut fine).expect("memory");
     assert!(fine.len() > text.len() * 2);
 }
 
 #[test]
 fn sheet_as_text() {
-    let options = sheet::Options {
-        title: "part.ngc".into(),
-        ..Default::default()
-    };
+    let options = sheet::Options { title: "part.ngc".into(), ..Default::default() };
     let sheet = sheet::sheet(&part(), &options);
     insta::assert_snapshot!(sheet.text());
     let value: serde_json::Value = serde_json::from_str(&sheet.json()).expect("valid JSON");
@@ -150,9 +116,7 @@ fn sheet_as_text() {
 
 /// Colour of a pixel.
 fn pixel(map: &tiny_skia::Pixmap, x: u32, y: u32) -> [u8; 3] {
-    map.pixel(x, y)
-        .map(|p| [p.red(), p.green(), p.blue()])
-        .unwrap_or_default()
+    map.pixel(x, y).map(|p| [p.red(), p.green(), p.blue()]).unwrap_or_default()
 }
 
 #[test]
@@ -166,22 +130,9 @@ fn feed_is_blue_and_rapid_orange() {
         Call::StraightTraverse(at(100.0, 100.0, 0.0)),
     ];
     for (line, call) in (0..).zip(&calls) {
-        out.call(
-            &At {
-                file: FileId(0),
-                line,
-                frame: FrameId::MAIN,
-                now: b"",
-            },
-            call,
-        );
+        out.call(&At { file: FileId(0), line, frame: FrameId::MAIN, now: b"" }, call);
     }
-    let options = plot::Options {
-        show: plot::Show::Top,
-        width: 600,
-        height: 600,
-        ..Default::default()
-    };
+    let options = plot::Options { show: plot::Show::Top, width: 600, height: 600, ..Default::default() };
     let bytes = plot::png(&out.finish(), &options).expect("png");
     let map = tiny_skia::Pixmap::decode_png(&bytes).expect("valid png");
     let (mut blue, mut orange) = (Vec::new(), Vec::new());
@@ -197,10 +148,7 @@ fn feed_is_blue_and_rapid_orange() {
     }
     let span = |v: &[(u32, u32)]| {
         let (xs, ys) = (v.iter().map(|p| p.0), v.iter().map(|p| p.1));
-        (
-            xs.clone().max().unwrap_or(0) - xs.min().unwrap_or(0),
-            ys.clone().max().unwrap_or(0) - ys.min().unwrap_or(0),
-        )
+        (xs.clone().max().unwrap_or(0) - xs.min().unwrap_or(0), ys.clone().max().unwrap_or(0) - ys.min().unwrap_or(0))
     };
     let ((w, h), (v, u)) = (span(&blue), span(&orange));
     assert!(w > 350 && h <= 3, "feed lies along X: {w} × {h}");
@@ -211,25 +159,15 @@ fn feed_is_blue_and_rapid_orange() {
 
 #[test]
 fn svg_and_html_are_whole() {
-    let options = plot::Options {
-        title: "a<b>.ngc".into(),
-        ..Default::default()
-    };
+    let options = plot::Options { title: "a<b>.ngc".into(), ..Default::default() };
     let svg = plot::svg(&part(), &options);
     assert!(svg.starts_with("<svg") && svg.ends_with("</svg>\n"));
-    assert!(
-        svg.contains("<title>a&lt;b&gt;.ngc</title>") && svg.contains("100 mm")
-            || svg.contains("20 mm")
-    );
+    assert!(svg.contains("<title>a&lt;b&gt;.ngc</title>") && svg.contains("100 mm") || svg.contains("20 mm"));
     for class in ["rapid", "feed", "arc"] {
         assert!(svg.contains(&format!("<path class=\"{class}\"")), "{class}");
     }
     let page = plot::html(&part(), &options);
-    assert!(
-        !page.contains("@@")
-            && page.contains("a&lt;b&gt;.ngc")
-            && page.contains("names:[\"rapid\"")
-    );
+    assert!(!page.contains("@@") && page.contains("a&lt;b&gt;.ngc") && page.contains("names:[\"rapid\""));
 }
 
 #[test]
@@ -239,9 +177,5 @@ fn an_empty_program_gives_an_empty_picture() {
     assert!(plot::png(&empty, &options).is_ok());
     assert!(plot::svg(&empty, &options).contains("no motion"));
     assert!(plot::html(&empty, &options).contains("runs:[]"));
-    assert!(
-        sheet::sheet(&empty, &sheet::Options::default())
-            .text()
-            .contains("Time     0:00:00")
-    );
+    assert!(sheet::sheet(&empty, &sheet::Options::default()).text().contains("Time     0:00:00"));
 }

@@ -26,42 +26,21 @@ fn setup(dialect: &'static Dialect) -> Setup {
     let tool = |number: i32, z: f64| {
         let mut offset: Axes = [0.0; 9];
         offset[2] = z;
-        Tool {
-            number,
-            pocket: number,
-            offset,
-            diameter: 6.0,
-            ..Tool::default()
-        }
+        Tool { number, pocket: number, offset, diameter: 6.0, ..Tool::default() }
     };
-    let mut setup = Setup {
-        dialect,
-        ..Setup::default()
-    };
+    let mut setup = Setup { dialect, ..Setup::default() };
     setup.tools.rows = vec![tool(0, 0.0), tool(1, 50.0), tool(2, 62.5), tool(3, 0.0)];
     setup
 }
 
 fn tools() -> Vec<(i32, Axes)> {
     let setup = setup(Dialect::linuxcnc());
-    setup
-        .tools
-        .rows
-        .iter()
-        .skip(1)
-        .map(|t| (t.number, t.offset))
-        .collect()
+    setup.tools.rows.iter().skip(1).map(|t| (t.number, t.offset)).collect()
 }
 
 fn run_as(text: &str, dialect: &str) -> Result<Program, String> {
     let dialect = Dialect::find(dialect).expect("a dialect");
-    let mut files = One(File::new(
-        "a.ngc",
-        vec![Chunk {
-            text: text.into(),
-            scan: Arc::new(scan(text, dialect)),
-        }],
-    ));
+    let mut files = One(File::new("a.ngc", vec![Chunk { text: text.into(), scan: Arc::new(scan(text, dialect)) }]));
     let setup = setup(dialect);
     let mut interp = Interp::new(&mut files, &setup, Lowering::new());
     let outcome = interp.run(FileId(0));
@@ -76,11 +55,7 @@ fn run(text: &str) -> Program {
 }
 
 fn options(language: Language) -> Options {
-    Options {
-        language,
-        tools: tools(),
-        ..Options::default()
-    }
+    Options { language, tools: tools(), ..Options::default() }
 }
 
 fn write(text: &str, options: &Options) -> String {
@@ -95,10 +70,7 @@ fn errors(text: &str, language: Language) -> Vec<(&'static str, String)> {
     let program = run(text);
     let texts = Texts::new([(FileId(0), text)]);
     let found = emit(&program, &options(language), &texts).expect_err("not expressible");
-    found
-        .iter()
-        .map(|d| (d.code.def().slug, text[d.primary().1.range()].to_string()))
-        .collect()
+    found.iter().map(|d| (d.code.def().slug, text[d.primary().1.range()].to_string())).collect()
 }
 
 /// The program written with these options, read again, moves like the source.
@@ -110,33 +82,17 @@ fn same(text: &str, options: &Options, length: f64) {
         Language::Grbl => "grbl",
     };
     let again = run_as(&written, dialect).unwrap_or_else(|e| panic!("{e}\n--- from\n{text}"));
-    let tolerance = Tolerance {
-        length,
-        angle: length,
-        rate: 2e-3,
-        ..Tolerance::default()
-    };
+    let tolerance = Tolerance { length, angle: length, rate: 2e-3, ..Tolerance::default() };
     let found = diff(&run(text), &again, &tolerance);
     // Rounding changes the length of a short program by more than the total time allows for.
-    let bad = found
-        .differences
-        .iter()
-        .any(|d| d.aspect != gr_ir::diff::Aspect::Time);
-    assert!(
-        !bad,
-        "{:#?}\n{text}\n--- written\n{written}",
-        found.differences
-    );
+    let bad = found.differences.iter().any(|d| d.aspect != gr_ir::diff::Aspect::Time);
+    assert!(!bad, "{:#?}\n{text}\n--- written\n{written}", found.differences);
 }
 
 /// How far apart the ways may be: one unit of the last decimal.
 fn unit(o: &Options) -> f64 {
     let mm = if o.units == Units::Inch { 25.4 } else { 1.0 };
-    if o.places() >= 7 {
-        1e-6 * mm
-    } else {
-        1.8 * mm * 10f64.powi(-(o.places() as i32))
-    }
+    if o.places() >= 7 { 1e-6 * mm } else { 1.8 * mm * 10f64.powi(-(o.places() as i32)) }
 }
 
 const PLAIN: &str = "\
@@ -303,36 +259,20 @@ fn snapshots() {
         ("odd", ODD),
     ];
     for (name, text) in all {
-        for (to, language) in [
-            ("linuxcnc", Language::Linuxcnc),
-            ("fanuc", Language::FanucMill),
-            ("grbl", Language::Grbl),
-        ] {
+        for (to, language) in
+            [("linuxcnc", Language::Linuxcnc), ("fanuc", Language::FanucMill), ("grbl", Language::Grbl)]
+        {
             let program = run(text);
-            let out = match emit(
-                &program,
-                &options(language),
-                &Texts::new([(FileId(0), text)]),
-            ) {
+            let out = match emit(&program, &options(language), &Texts::new([(FileId(0), text)])) {
                 Ok(e) => {
-                    e.text
-                        + &e.notes
-                            .iter()
-                            .map(|d| format!("{:?}: {}\n", d.severity, d.message))
-                            .collect::<String>()
+                    e.text + &e.notes.iter().map(|d| format!("{:?}: {}\n", d.severity, d.message)).collect::<String>()
                 }
-                Err(e) => e
-                    .iter()
-                    .map(|d| format!("{:?}: {}\n", d.code, d.message))
-                    .collect(),
+                Err(e) => e.iter().map(|d| format!("{:?}: {}\n", d.code, d.message)).collect(),
             };
             insta::assert_snapshot!(format!("{name}_{to}"), out);
         }
     }
-    insta::assert_snapshot!(
-        "events_linuxcnc",
-        write(EVENTS, &options(Language::Linuxcnc))
-    );
+    insta::assert_snapshot!("events_linuxcnc", write(EVENTS, &options(Language::Linuxcnc)));
     let many = Options {
         units: Units::Inch,
         decimals: Some(3),
@@ -351,12 +291,7 @@ fn every_program_moves_the_same() {
         for units in [Units::Mm, Units::Inch] {
             for decimals in [None, Some(3), Some(8)] {
                 for arcs in [Arcs::Ijk, Arcs::IjkAbsolute, Arcs::R] {
-                    let o = Options {
-                        units,
-                        decimals,
-                        arcs,
-                        ..options(Language::Linuxcnc)
-                    };
+                    let o = Options { units, decimals, arcs, ..options(Language::Linuxcnc) };
                     same(text, &o, unit(&o));
                 }
             }
@@ -369,10 +304,7 @@ fn other_languages_move_the_same() {
     for text in [PLAIN, STRUCTURED, COMPENSATED] {
         for language in [Language::Grbl, Language::FanucMill] {
             for arcs in [Arcs::Ijk, Arcs::R] {
-                let o = Options {
-                    arcs,
-                    ..options(language)
-                };
+                let o = Options { arcs, ..options(language) };
                 same(text, &o, unit(&o));
             }
         }
@@ -381,12 +313,7 @@ fn other_languages_move_the_same() {
 
 #[test]
 fn arcs_as_lines() {
-    let o = Options {
-        arcs: Arcs::Lines,
-        arc_tolerance: 0.01,
-        decimals: Some(6),
-        ..options(Language::Linuxcnc)
-    };
+    let o = Options { arcs: Arcs::Lines, arc_tolerance: 0.01, decimals: Some(6), ..options(Language::Linuxcnc) };
     let written = write(PLAIN, &o);
     assert!(!written.contains("G2 ") && !written.contains("G3 "));
     same(PLAIN, &o, 0.011);
@@ -394,26 +321,11 @@ fn arcs_as_lines() {
 
 #[test]
 fn nothing_is_dropped_silently() {
-    assert_eq!(
-        errors("G21 G90\nM64 P1\nM2\n", Language::Grbl),
-        [("emit/not-expressible", "M64 P1".to_string())]
-    );
-    assert_eq!(
-        errors("G21 G90 F100\nG1 A10\nM2\n", Language::Grbl),
-        [("emit/not-expressible", "G1 A10".to_string())]
-    );
-    assert_eq!(
-        errors("G21 G90 M3 S100\nG33 Z-3 K1\nM2\n", Language::Grbl)[0].1,
-        "G33 Z-3 K1"
-    );
-    assert_eq!(
-        errors("G21 G90 M3 S100\nG95 F1\nG1 X1\nM2\n", Language::Grbl)[0].1,
-        "G1 X1"
-    );
-    assert_eq!(
-        errors("G21 G90 F100\nG38.2 Z-1\nM2\n", Language::FanucMill)[0].1,
-        "G38.2 Z-1"
-    );
+    assert_eq!(errors("G21 G90\nM64 P1\nM2\n", Language::Grbl), [("emit/not-expressible", "M64 P1".to_string())]);
+    assert_eq!(errors("G21 G90 F100\nG1 A10\nM2\n", Language::Grbl), [("emit/not-expressible", "G1 A10".to_string())]);
+    assert_eq!(errors("G21 G90 M3 S100\nG33 Z-3 K1\nM2\n", Language::Grbl)[0].1, "G33 Z-3 K1");
+    assert_eq!(errors("G21 G90 M3 S100\nG95 F1\nG1 X1\nM2\n", Language::Grbl)[0].1, "G1 X1");
+    assert_eq!(errors("G21 G90 F100\nG38.2 Z-1\nM2\n", Language::FanucMill)[0].1, "G38.2 Z-1");
 }
 
 #[test]
@@ -428,16 +340,9 @@ fn machine_positions_stay_machine_positions() {
 fn rounding_does_not_add_up() {
     // A thousand steps of a third: each word comes from the absolute position.
     let text = "G21 G90 G0 X0 Y0 Z0\no1 repeat [1000]\nG91 G1 X[1/3] F100\no1 endrepeat\nM2\n";
-    let o = Options {
-        decimals: Some(3),
-        ..options(Language::Linuxcnc)
-    };
+    let o = Options { decimals: Some(3), ..options(Language::Linuxcnc) };
     let written = write(text, &o);
-    assert!(
-        written.contains("X333.333\n"),
-        "{}",
-        &written[written.len() - 200..]
-    );
+    assert!(written.contains("X333.333\n"), "{}", &written[written.len() - 200..]);
     same(text, &o, 0.0006);
 }
 
@@ -447,11 +352,7 @@ fn coarse_arcs_still_make_circles() {
     for decimals in [1, 2, 3] {
         for arcs in [Arcs::Ijk, Arcs::R] {
             for language in [Language::Linuxcnc, Language::Grbl] {
-                let o = Options {
-                    decimals: Some(decimals),
-                    arcs,
-                    ..options(language)
-                };
+                let o = Options { decimals: Some(decimals), arcs, ..options(language) };
                 same(text, &o, unit(&o));
             }
         }
@@ -466,19 +367,11 @@ fn starts_from_a_line() {
         let o = from_line::Options { safe_z: Some(25.0) };
         from_line::from_line(&program, FileId(0), line, &o, &texts).map(|r| {
             let slugs: Vec<_> = r.notes.iter().map(|d| d.code.def().slug).collect();
-            (
-                emit(&r.program, &options(Language::Linuxcnc), &texts)
-                    .expect("written")
-                    .text,
-                slugs,
-            )
+            (emit(&r.program, &options(Language::Linuxcnc), &texts).expect("written").text, slugs)
         })
     };
     let slug = |r: Result<_, Vec<gr_text::Diagnostic>>| -> &'static str {
-        r.map(|_: (String, Vec<&str>)| ()).expect_err("no start")[0]
-            .code
-            .def()
-            .slug
+        r.map(|_: (String, Vec<&str>)| ()).expect_err("no start")[0].code.def().slug
     };
     let (text, notes) = from(PLAIN, 11).unwrap();
     assert!(notes.is_empty());
@@ -501,11 +394,7 @@ fn rows_of_the_registry() {
         }
         let found = |text: &str| -> Vec<&'static str> {
             let program = run(text);
-            let out = emit(
-                &program,
-                &options(Language::Grbl),
-                &Texts::new([(FileId(0), text)]),
-            );
+            let out = emit(&program, &options(Language::Grbl), &Texts::new([(FileId(0), text)]));
             let found = match out {
                 Ok(e) => e.notes,
                 Err(e) => e,
@@ -513,11 +402,7 @@ fn rows_of_the_registry() {
             found.iter().map(|d| d.code.def().code).collect()
         };
         assert_eq!(found(row.bad.expect("an example")), [row.code]);
-        assert!(
-            found(row.good.expect("an example")).is_empty(),
-            "{}",
-            row.code
-        );
+        assert!(found(row.good.expect("an example")).is_empty(), "{}", row.code);
         tried += 1;
     }
     assert_eq!(tried, 2);
@@ -525,24 +410,15 @@ fn rows_of_the_registry() {
 
 #[test]
 fn an_unmeasured_tool_keeps_its_offset_word() {
-    let written = write(
-        "G21 G90\nT3 M6\nG43 H3\nG0 Z5\nG49\nM2\n",
-        &options(Language::Linuxcnc),
-    );
-    assert!(
-        written.contains("G43 H3\n") && written.contains("G49\n"),
-        "{written}"
-    );
+    let written = write("G21 G90\nT3 M6\nG43 H3\nG0 Z5\nG49\nM2\n", &options(Language::Linuxcnc));
+    assert!(written.contains("G43 H3\n") && written.contains("G49\n"), "{written}");
 }
 
 #[test]
 fn after_a_probe_only_named_axes_are_written() {
     let text = "G21 G90 F100\nG0 X0 Y0 Z10\nG38.2 Z-10\nG0 X5\nG0 Z20\nM2\n";
     let written = write(text, &options(Language::Linuxcnc));
-    assert!(
-        written.contains("G38.2 Z-10 F100\nG0 X5\nZ20\n"),
-        "{written}"
-    );
+    assert!(written.contains("G38.2 Z-10 F100\nG0 X5\nZ20\n"), "{written}");
 }
 
 #[test]
@@ -551,17 +427,8 @@ fn home_after_a_change_of_units_under_a_tool_offset() {
     let o = options(Language::Linuxcnc);
     same(text, &o, unit(&o));
     let written = write(text, &o);
-    assert!(
-        written.contains("G53 G0 X0 Y0 Z") && !written.contains("G28"),
-        "{written}"
-    );
-    for end in [
-        "G28 Z4",
-        "G30 X1 Z2",
-        "G49\nG28 Z1",
-        "G28 X1\nG28 Z2",
-        "G21\nG28",
-    ] {
+    assert!(written.contains("G53 G0 X0 Y0 Z") && !written.contains("G28"), "{written}");
+    for end in ["G28 Z4", "G30 X1 Z2", "G49\nG28 Z1", "G28 X1\nG28 Z2", "G21\nG28"] {
         same(&text.replace("G28", end), &o, unit(&o));
     }
     // The control's own reference stays its own where nothing is in doubt.
@@ -597,34 +464,17 @@ mod oracle {
             .stdout(Stdio::null())
             .output()
             .expect("rs274 runs");
-        assert!(
-            status.status.success(),
-            "{}\n{text}",
-            String::from_utf8_lossy(&status.stderr)
-        );
+        assert!(status.status.success(), "{}\n{text}", String::from_utf8_lossy(&status.stderr));
         let moves = ["STRAIGHT_", "ARC_FEED", "NURBS", "RIGID_TAP", "DWELL"];
         let out = std::fs::read_to_string(out).expect("output");
-        let call = |l: &str| {
-            l.splitn(3, ' ')
-                .nth(2)
-                .unwrap_or("")
-                .trim()
-                .replace("-0.0000", "0.0000")
-        };
+        let call = |l: &str| l.splitn(3, ' ').nth(2).unwrap_or("").trim().replace("-0.0000", "0.0000");
         let calls = out.lines().map(|l| call(l.trim_start()));
-        Some(
-            calls
-                .filter(|c| moves.iter().any(|m| c.starts_with(m)))
-                .collect(),
-        )
+        Some(calls.filter(|c| moves.iter().any(|m| c.starts_with(m))).collect())
     }
 
     #[test]
     fn rs274_moves_the_same() {
-        let o = Options {
-            decimals: Some(9),
-            ..options(Language::Linuxcnc)
-        };
+        let o = Options { decimals: Some(9), ..options(Language::Linuxcnc) };
         for text in [PLAIN, STRUCTURED, COMPENSATED, TOOLS, OFFSETS] {
             let written = write(text, &o);
             let (Some(a), Some(b)) = (canon(text), canon(&written)) else {
@@ -663,10 +513,7 @@ fn corpus() {
             let Ok(program) = run_as(&text, "linuxcnc") else {
                 continue;
             };
-            let o = Options {
-                decimals: Some(8),
-                ..options(Language::Linuxcnc)
-            };
+            let o = Options { decimals: Some(8), ..options(Language::Linuxcnc) };
             tried += 1;
             let written = match emit(&program, &o, &Texts::new([(FileId(0), text.as_str())])) {
                 Ok(e) => e.text,
@@ -675,23 +522,13 @@ fn corpus() {
                     continue;
                 }
             };
-            let tolerance = Tolerance {
-                length: 1e-6,
-                angle: 1e-6,
-                rate: 1e-3,
-                limit: 3,
-                ..Tolerance::default()
-            };
+            let tolerance = Tolerance { length: 1e-6, angle: 1e-6, rate: 1e-3, limit: 3, ..Tolerance::default() };
             match run_as(&written, "linuxcnc") {
                 Ok(again) => {
                     let found = diff(&program, &again, &tolerance);
                     if !found.is_empty() {
                         bad += 1;
-                        let all: Vec<_> = found
-                            .differences
-                            .iter()
-                            .map(|d| (&d.message, d.a, d.b))
-                            .collect();
+                        let all: Vec<_> = found.differences.iter().map(|d| (&d.message, d.a, d.b)).collect();
                         println!("{}: {all:?}", path.display());
                     }
                 }

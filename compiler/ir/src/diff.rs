@@ -24,13 +24,7 @@ pub struct Tolerance {
 
 impl Default for Tolerance {
     fn default() -> Tolerance {
-        Tolerance {
-            length: 1e-6,
-            angle: 1e-8,
-            rate: 1e-6,
-            limit: 20,
-            work_frame: false,
-        }
+        Tolerance { length: 1e-6, angle: 1e-8, rate: 1e-6, limit: 20, work_frame: false }
     }
 }
 
@@ -98,12 +92,7 @@ impl Diff {
     fn note(&mut self, limit: usize, aspect: Aspect, a: Spot, b: Spot, message: String) {
         self.count += 1;
         if self.differences.len() < limit {
-            self.differences.push(Difference {
-                aspect,
-                a,
-                b,
-                message,
-            });
+            self.differences.push(Difference { aspect, a, b, message });
         }
     }
 }
@@ -121,13 +110,7 @@ pub fn diff(a: &Program, b: &Program, tolerance: &Tolerance) -> Diff {
     let (s, t) = (out.totals_a.seconds(), out.totals_b.seconds());
     // Rounded feeds and lengths add up; a tenth of a percent is not worth a line of its own.
     if out.count == 0 && !close(s, t, tolerance.rate.max(1e-3)) {
-        out.note(
-            tolerance.limit,
-            Aspect::Time,
-            None,
-            None,
-            format!("takes {s:.3} s, the other {t:.3} s"),
-        );
+        out.note(tolerance.limit, Aspect::Time, None, None, format!("takes {s:.3} s, the other {t:.3} s"));
     }
     out
 }
@@ -196,14 +179,7 @@ impl Conditions {
             None => state.feed,
         };
         let coolant = (state.flood, state.mist);
-        Conditions {
-            class,
-            tool: state.tool,
-            mode: state.feed_mode,
-            feed,
-            spindles: state.spindles,
-            coolant,
-        }
+        Conditions { class, tool: state.tool, mode: state.feed_mode, feed, spindles: state.spindles, coolant }
     }
 }
 
@@ -232,17 +208,8 @@ impl Event {
             Op::ToolChange(_) | Op::ToolNumber(_) => Event::ToolChange(view.state.tool),
             Op::Stop(stop) => Event::Stop(stop),
             Op::DigitalOut { index, on, synced } => Event::Digital(index, on, synced),
-            Op::AnalogOut {
-                index,
-                value,
-                synced,
-            } => Event::Analog(index, value, synced),
-            Op::InputWait {
-                index,
-                digital,
-                wait,
-                ..
-            } => Event::Input(index, digital, wait),
+            Op::AnalogOut { index, value, synced } => Event::Analog(index, value, synced),
+            Op::InputWait { index, digital, wait, .. } => Event::Input(index, digital, wait),
             Op::UserM { code, p, q } => Event::UserM(code, p, q),
             Op::SpindleOrient { spindle, angle, .. } => Event::Orient(spindle, angle),
             _ => return None,
@@ -251,22 +218,14 @@ impl Event {
     fn same(&self, other: &Event, rate: f64) -> bool {
         match (self, other) {
             (Event::Dwell(a), Event::Dwell(b)) => close(*a, *b, rate),
-            (Event::Analog(i, a, s), Event::Analog(j, b, t)) => {
-                i == j && s == t && close(*a, *b, rate)
-            }
+            (Event::Analog(i, a, s), Event::Analog(j, b, t)) => i == j && s == t && close(*a, *b, rate),
             (Event::Orient(i, a), Event::Orient(j, b)) => i == j && close(*a, *b, rate),
-            (Event::UserM(i, p, q), Event::UserM(j, r, s)) => {
-                i == j && close(*p, *r, rate) && close(*q, *s, rate)
-            }
+            (Event::UserM(i, p, q), Event::UserM(j, r, s)) => i == j && close(*p, *r, rate) && close(*q, *s, rate),
             (a, b) => a == b,
         }
     }
     fn aspect(&self) -> Aspect {
-        if matches!(self, Event::ToolChange(_)) {
-            Aspect::Tool
-        } else {
-            Aspect::Event
-        }
+        if matches!(self, Event::ToolChange(_)) { Aspect::Tool } else { Aspect::Event }
     }
     fn text(&self) -> String {
         match self {
@@ -290,30 +249,20 @@ impl Event {
 #[allow(clippy::large_enum_variant)]
 #[derive(Clone, Copy, Debug)]
 enum Item {
-    Move {
-        conditions: Conditions,
-        end: Axes,
-        middle: Option<[f64; 3]>,
-    },
+    Move { conditions: Conditions, end: Axes, middle: Option<[f64; 3]> },
     Event(Event),
     End,
 }
 
 fn place(state: &State, axes: &Axes, tolerance: &Tolerance) -> Axes {
-    if tolerance.work_frame {
-        *axes
-    } else {
-        state.machine(axes)
-    }
+    if tolerance.work_frame { *axes } else { state.machine(axes) }
 }
 
 /// A point inside a curve, so that two curves with the same ends can be told apart.
 fn middle(op: &Op<'_>, start: &Pose, end: &Pose) -> Option<[f64; 3]> {
     match op {
         Op::Arc(arc) => Some(ArcShape::new(arc, start, end).point(1.0 / 3.0)),
-        Op::Nurbs { order, points } => {
-            nurbs_point(*order, points, 1.0 / 3.0).map(|[x, y]| [x, y, start.axes[2]])
-        }
+        Op::Nurbs { order, points } => nurbs_point(*order, points, 1.0 / 3.0).map(|[x, y]| [x, y, start.axes[2]]),
         Op::RigidTap { bottom, .. } => Some(*bottom),
         _ => None,
     }
@@ -337,11 +286,7 @@ fn item(view: &View<'_, '_>, tolerance: &Tolerance) -> Option<Item> {
         [m[0], m[1], m[2]]
     });
     let end = place(view.state, &view.end.axes, tolerance);
-    Some(Item::Move {
-        conditions: Conditions::of(view),
-        end,
-        middle: inner,
-    })
+    Some(Item::Move { conditions: Conditions::of(view), end, middle: inner })
 }
 
 fn next_item(cursor: &mut Cursor<'_>, tolerance: &Tolerance) -> (Item, Spot) {
@@ -380,30 +325,13 @@ fn same_item(
     tolerance: &Tolerance,
 ) -> bool {
     match (x, y) {
-        (
-            Item::Move {
-                conditions: c,
-                end,
-                middle,
-            },
-            Item::Move {
-                conditions: d,
-                end: e,
-                middle: m,
-            },
-        ) => {
+        (Item::Move { conditions: c, end, middle }, Item::Move { conditions: d, end: e, middle: m }) => {
             let far = distance(end, e).max(match (middle, m) {
-                (Some(p), Some(q)) => {
-                    libm::hypot(libm::hypot(p[0] - q[0], p[1] - q[1]), p[2] - q[2])
-                }
+                (Some(p), Some(q)) => libm::hypot(libm::hypot(p[0] - q[0], p[1] - q[1]), p[2] - q[2]),
                 (None, None) => 0.0,
                 _ => f64::INFINITY,
             });
-            if far.is_nan()
-                || far > tolerance.length
-                || turned(end, e) > tolerance.angle
-                || c.class != d.class
-            {
+            if far.is_nan() || far > tolerance.length || turned(end, e) > tolerance.angle || c.class != d.class {
                 return false;
             }
             out.deviation = out.deviation.max(far);
@@ -422,10 +350,7 @@ fn same_item(
 }
 
 fn distance(a: &Axes, b: &Axes) -> f64 {
-    let sum: f64 = [0, 1, 2, 6, 7, 8]
-        .into_iter()
-        .map(|i: usize| (a[i] - b[i]) * (a[i] - b[i]))
-        .sum();
+    let sum: f64 = [0, 1, 2, 6, 7, 8].into_iter().map(|i: usize| (a[i] - b[i]) * (a[i] - b[i])).sum();
     libm::sqrt(sum)
 }
 
@@ -447,43 +372,27 @@ fn compare_conditions(
         return;
     }
     let before = last.replace((*c, *d));
-    let fresh = |f: &dyn Fn(&Conditions, &Conditions) -> bool| {
-        f(c, d) && !before.is_some_and(|(p, q)| f(&p, &q))
-    };
+    let fresh = |f: &dyn Fn(&Conditions, &Conditions) -> bool| f(c, d) && !before.is_some_and(|(p, q)| f(&p, &q));
     let mut note = |aspect, message| out.note(tolerance.limit, aspect, a, b, message);
     if fresh(&|c, d| c.tool != d.tool) {
-        note(
-            Aspect::Tool,
-            format!("works with tool {}, the other with tool {}", c.tool, d.tool),
-        );
+        note(Aspect::Tool, format!("works with tool {}, the other with tool {}", c.tool, d.tool));
     }
     let feeds = !matches!(c.class, Class::Rapid | Class::Tap);
     if feeds && (c.mode != d.mode || !close(c.feed, d.feed, tolerance.rate)) {
-        note(
-            Aspect::Feed,
-            format!("feeds {}, the other {}", feed_text(c), feed_text(d)),
-        );
+        note(Aspect::Feed, format!("feeds {}, the other {}", feed_text(c), feed_text(d)));
     }
     if c.class != Class::Rapid && fresh(&|c, d| !same_spindles(c, d, tolerance.rate)) {
-        note(
-            Aspect::Spindle,
-            format!("spindle {}, the other {}", spindle_text(c), spindle_text(d)),
-        );
+        note(Aspect::Spindle, format!("spindle {}, the other {}", spindle_text(c), spindle_text(d)));
     }
     if c.class != Class::Rapid && fresh(&|c, d| c.coolant != d.coolant) {
-        note(
-            Aspect::Coolant,
-            format!("coolant {}, the other {}", coolant_text(c), coolant_text(d)),
-        );
+        note(Aspect::Coolant, format!("coolant {}, the other {}", coolant_text(c), coolant_text(d)));
     }
 }
 
 fn same_spindles(c: &Conditions, d: &Conditions, rate: f64) -> bool {
     c.spindles.iter().zip(&d.spindles).all(|(s, t)| {
         let off = s.turn == Turn::Stop && t.turn == Turn::Stop;
-        off || (s.turn == t.turn
-            && s.surface.is_some() == t.surface.is_some()
-            && close(s.speed, t.speed, rate))
+        off || (s.turn == t.turn && s.surface.is_some() == t.surface.is_some() && close(s.speed, t.speed, rate))
     })
 }
 
@@ -504,11 +413,7 @@ fn spindle_text(c: &Conditions) -> String {
     let on = c.spindles.iter().find(|s| s.turn != Turn::Stop);
     on.map_or("stopped".into(), |s| {
         let unit = if s.surface.is_some() { "mm/s" } else { "rpm" };
-        let turn = if s.turn == Turn::Cw {
-            "clockwise"
-        } else {
-            "counter-clockwise"
-        };
+        let turn = if s.turn == Turn::Cw { "clockwise" } else { "counter-clockwise" };
         format!("{turn} at {} {unit}", s.speed)
     })
 }

@@ -37,11 +37,7 @@ fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    ]
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 fn sub(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
@@ -69,33 +65,16 @@ impl ArcShape {
             ArcPlane::Free(normal) => free_basis(arc.center, normal, from),
         };
         let (a, b) = (sub(from, center), sub(to, center));
-        let (a, b2, rise) = (
-            (dot(a, u), dot(a, v)),
-            (dot(b, u), dot(b, v)),
-            dot(sub(to, from), normal),
-        );
+        let (a, b2, rise) = ((dot(a, u), dot(a, v)), (dot(b, u), dot(b, v)), dot(sub(to, from), normal));
         let angle = libm::atan2(a.1, a.0);
         let sweep = sweep(angle, libm::atan2(b2.1, b2.0), arc.turns);
         let (radius, end_radius) = (libm::hypot(a.0, a.1), libm::hypot(b2.0, b2.1));
-        ArcShape {
-            center,
-            u,
-            v,
-            normal,
-            radius,
-            end_radius,
-            angle,
-            sweep,
-            rise,
-        }
+        ArcShape { center, u, v, normal, radius, end_radius, angle, sweep, rise }
     }
 
     /// Length of the path.
     pub fn length(&self) -> f64 {
-        libm::hypot(
-            self.sweep * (self.radius + self.end_radius) / 2.0,
-            self.rise,
-        )
+        libm::hypot(self.sweep * (self.radius + self.end_radius) / 2.0, self.rise)
     }
 
     /// The point at a share (0 … 1) of the way.
@@ -103,9 +82,7 @@ impl ArcShape {
         let (s, c) = libm::sincos(self.angle + self.sweep * share);
         let r = self.radius + (self.end_radius - self.radius) * share;
         std::array::from_fn(|i| {
-            self.center[i]
-                + r * (c * self.u[i] + s * self.v[i])
-                + self.rise * share * self.normal[i]
+            self.center[i] + r * (c * self.u[i] + s * self.v[i]) + self.rise * share * self.normal[i]
         })
     }
 
@@ -123,11 +100,7 @@ impl ArcShape {
     fn extremes(&self, i: usize) -> [Option<f64>; 4] {
         let turn = self.sweep.signum();
         let amplitude = self.radius * libm::hypot(self.u[i], self.v[i]);
-        let slope = if self.sweep == 0.0 {
-            0.0
-        } else {
-            self.rise * self.normal[i] / self.sweep
-        };
+        let slope = if self.sweep == 0.0 { 0.0 } else { self.rise * self.normal[i] / self.sweep };
         if amplitude == 0.0 || slope.abs() > amplitude || self.sweep == 0.0 {
             return [None; 4];
         }
@@ -155,26 +128,14 @@ fn wrap(angle: f64) -> f64 {
     if a < 0.0 { a + TAU } else { a }
 }
 
-fn free_basis(
-    center: [f64; 3],
-    normal: [f64; 3],
-    from: [f64; 3],
-) -> ([f64; 3], [f64; 3], [f64; 3], [f64; 3]) {
+fn free_basis(center: [f64; 3], normal: [f64; 3], from: [f64; 3]) -> ([f64; 3], [f64; 3], [f64; 3], [f64; 3]) {
     let length = norm(normal);
-    let n = if length > 0.0 {
-        normal.map(|v| v / length)
-    } else {
-        unit(2)
-    };
+    let n = if length > 0.0 { normal.map(|v| v / length) } else { unit(2) };
     let height = dot(sub(from, center), n);
     let center: [f64; 3] = std::array::from_fn(|i| center[i] + height * n[i]);
     let radial = sub(from, center);
     let r = norm(radial);
-    let u = if r > 0.0 {
-        radial.map(|v| v / r)
-    } else {
-        any_across(n)
-    };
+    let u = if r > 0.0 { radial.map(|v| v / r) } else { any_across(n) };
     (u, cross(n, u), n, center)
 }
 
@@ -217,11 +178,7 @@ pub fn nurbs_point(order: u32, points: &[f64], share: f64) -> Option<[f64; 2]> {
         for j in (r..k).rev() {
             let i = span + j;
             let (low, high) = (knot(i), knot(i + k - r));
-            let a = if high > low {
-                (t - low) / (high - low)
-            } else {
-                0.0
-            };
+            let a = if high > low { (t - low) / (high - low) } else { 0.0 };
             d[j] = std::array::from_fn(|c| (1.0 - a) * d[j - 1][c] + a * d[j][c]);
         }
     }
@@ -231,10 +188,7 @@ pub fn nurbs_point(order: u32, points: &[f64], share: f64) -> Option<[f64; 2]> {
 
 fn nurbs_pieces(points: &[f64], tolerance: f64) -> usize {
     let (points, _) = points.as_chunks::<3>();
-    let polygon: f64 = points
-        .windows(2)
-        .map(|p| libm::hypot(p[1][0] - p[0][0], p[1][1] - p[0][1]))
-        .sum();
+    let polygon: f64 = points.windows(2).map(|p| libm::hypot(p[1][0] - p[0][0], p[1][1] - p[0][1])).sum();
     // A curve of length L bent by at most its polygon: chords of √(8·tolerance·L) keep the tolerance for
     // radii from L up; four times as many cover sharper bends.
     let chord = libm::sqrt(8.0 * tolerance.max(1e-9) * polygon.max(1e-9)) / 4.0;
@@ -294,10 +248,7 @@ pub struct Extent {
 
 impl Default for Extent {
     fn default() -> Extent {
-        Extent {
-            min: [f64::INFINITY; 3],
-            max: [f64::NEG_INFINITY; 3],
-        }
+        Extent { min: [f64::INFINITY; 3], max: [f64::NEG_INFINITY; 3] }
     }
 }
 
@@ -390,9 +341,5 @@ fn straight(start: &Pose, end: &Pose) -> Length {
         return Length::Linear(uvw);
     }
     let abc = norm([d(3), d(4), d(5)]);
-    if abc > 0.0 {
-        Length::Angular(abc)
-    } else {
-        Length::Linear(0.0)
-    }
+    if abc > 0.0 { Length::Angular(abc) } else { Length::Linear(0.0) }
 }

@@ -18,9 +18,7 @@ pub mod text;
 pub use gr_canon::{Axes, FrameId, Plane, Units};
 pub use gr_text::FileId;
 pub use lower::Lowering;
-pub use op::{
-    Arc, ArcPlane, FeedMode, Marker, Note, Op, Override, PathMode, Pose, Source, Stop, Turn,
-};
+pub use op::{Arc, ArcPlane, FeedMode, Marker, Note, Op, Override, PathMode, Pose, Source, Stop, Turn};
 pub use sources::{NoSources, Sources, Texts};
 pub use state::{Spindle, State, Sync, plane_axes};
 pub use store::{Builder, Cursor, Frame, Frames, Program, Step, View};

@@ -3,9 +3,7 @@
 
 use crate::op::{Arc, ArcPlane, Pose, Source};
 use crate::state::{State, Sync, plane_axes};
-use crate::{
-    Axes, Builder, FeedMode, Marker, Note, Op, Override, PathMode, Program, Stop, Turn, Units,
-};
+use crate::{Axes, Builder, FeedMode, Marker, Note, Op, Override, PathMode, Program, Stop, Turn, Units};
 use gr_canon::{At, Call, CallFrame, FrameId, Mark, Sink};
 
 const RAD: f64 = std::f64::consts::PI / 180.0;
@@ -24,10 +22,7 @@ impl Lowering {
     }
     /// Goes on from a pose and a state (for a program lowered in pieces).
     pub fn from_state(pose: Pose, state: State) -> Lowering {
-        Lowering {
-            out: Builder::from_state(pose, state),
-            points: Vec::new(),
-        }
+        Lowering { out: Builder::from_state(pose, state), points: Vec::new() }
     }
     /// The program.
     pub fn finish(self) -> Program {
@@ -44,27 +39,13 @@ impl Lowering {
 
     #[inline]
     fn scale(&self) -> f64 {
-        if self.out.state().units == Units::Inch {
-            25.4
-        } else {
-            1.0
-        }
+        if self.out.state().units == Units::Inch { 25.4 } else { 1.0 }
     }
     #[inline]
     fn axes(&self, a: &Axes) -> Axes {
         let k = self.scale();
         let r = RAD;
-        [
-            a[0] * k,
-            a[1] * k,
-            a[2] * k,
-            a[3] * r,
-            a[4] * r,
-            a[5] * r,
-            a[6] * k,
-            a[7] * k,
-            a[8] * k,
-        ]
+        [a[0] * k, a[1] * k, a[2] * k, a[3] * r, a[4] * r, a[5] * r, a[6] * k, a[7] * k, a[8] * k]
     }
     #[inline]
     fn goto(&mut self, op: Op<'_>, axes: &Axes, source: Source) {
@@ -72,14 +53,7 @@ impl Lowering {
         self.out.push_to(op, &pose, source);
     }
 
-    fn arc(
-        &mut self,
-        ends: [f64; 3],
-        center: [f64; 2],
-        turns: i32,
-        rest: &[f64; 6],
-        source: Source,
-    ) {
+    fn arc(&mut self, ends: [f64; 3], center: [f64; 2], turns: i32, rest: &[f64; 6], source: Source) {
         let k = self.scale();
         let plane = self.out.state().plane;
         let (first, second, third) = plane_axes(plane);
@@ -91,15 +65,7 @@ impl Lowering {
         let mut c = self.out.pose().xyz();
         c[first] = center[0] * k;
         c[second] = center[1] * k;
-        self.goto(
-            Op::Arc(Arc {
-                plane: ArcPlane::Work(plane),
-                center: c,
-                turns,
-            }),
-            &end,
-            source,
-        );
+        self.goto(Op::Arc(Arc { plane: ArcPlane::Work(plane), center: c, turns }), &end, source);
     }
 
     fn nurbs(&mut self, nurbs: &gr_canon::Nurbs, source: Source) {
@@ -114,14 +80,7 @@ impl Lowering {
         if let Some(last) = nurbs.points.last() {
             (end.axes[0], end.axes[1]) = (last[0] * k, last[1] * k);
         }
-        self.out.push_to(
-            Op::Nurbs {
-                order: nurbs.order,
-                points: &points,
-            },
-            &end,
-            source,
-        );
+        self.out.push_to(Op::Nurbs { order: nurbs.order, points: &points }, &end, source);
         self.points = points;
     }
 
@@ -130,19 +89,9 @@ impl Lowering {
     fn nurbs_as_lines(&mut self, nurbs: &gr_canon::Nurbs, source: Source) {
         const PIECES: usize = 200;
         let k = self.scale();
-        let (first, second) = if nurbs.plane == gr_canon::Plane::Yz {
-            (1, 2)
-        } else {
-            (2, 0)
-        };
-        let points: Vec<f64> = nurbs
-            .points
-            .iter()
-            .flat_map(|p| [p[0] * k, p[1] * k, p[2]])
-            .collect();
-        let spans = (nurbs.points.len() + 1)
-            .saturating_sub(nurbs.order as usize)
-            .max(1);
+        let (first, second) = if nurbs.plane == gr_canon::Plane::Yz { (1, 2) } else { (2, 0) };
+        let points: Vec<f64> = nurbs.points.iter().flat_map(|p| [p[0] * k, p[1] * k, p[2]]).collect();
+        let spans = (nurbs.points.len() + 1).saturating_sub(nurbs.order as usize).max(1);
         let count = spans * PIECES;
         for i in 1..=count {
             let share = i as f64 / count as f64;
@@ -156,15 +105,8 @@ impl Lowering {
     }
 
     fn feed(&mut self, rate: f64, source: Source) {
-        let per = if self.out.state().feed_mode == FeedMode::PerTime {
-            60.0
-        } else {
-            1.0
-        };
-        let op = Op::Feed {
-            linear: rate * self.scale() / per,
-            angular: rate * RAD / per,
-        };
+        let per = if self.out.state().feed_mode == FeedMode::PerTime { 60.0 } else { 1.0 };
+        let op = Op::Feed { linear: rate * self.scale() / per, angular: rate * RAD / per };
         self.out.push(op, source);
     }
 
@@ -172,11 +114,7 @@ impl Lowering {
         // Under constant surface speed S is in m/min or feet/min.
         let surface = self.out.state().spindle(spindle).surface.is_some();
         let per_minute = if self.scale() == 1.0 { 1000.0 } else { 304.8 };
-        let speed = if surface {
-            speed * per_minute / 60.0
-        } else {
-            speed
-        };
+        let speed = if surface { speed * per_minute / 60.0 } else { speed };
         self.out.push(Op::SpindleSpeed { spindle, speed }, source);
     }
 
@@ -184,15 +122,7 @@ impl Lowering {
         match call {
             Call::StraightTraverse(end) => self.goto(Op::Rapid, end, s),
             Call::StraightFeed(end) => self.goto(Op::Linear, end, s),
-            Call::ArcFeed {
-                first_end,
-                second_end,
-                first_axis,
-                second_axis,
-                rotation,
-                axis_end,
-                rest,
-            } => {
+            Call::ArcFeed { first_end, second_end, first_axis, second_axis, rotation, axis_end, rest } => {
                 let ends = [*first_end, *second_end, *axis_end];
                 self.arc(ends, [*first_axis, *second_axis], *rotation, rest, s);
             }
@@ -200,13 +130,7 @@ impl Lowering {
             Call::StraightProbe(end, kind) => self.goto(Op::Probe(*kind), end, s),
             Call::RigidTap(p, scale) => {
                 let k = self.scale();
-                self.out.push(
-                    Op::RigidTap {
-                        bottom: p.map(|v| v * k),
-                        scale: *scale,
-                    },
-                    s,
-                );
+                self.out.push(Op::RigidTap { bottom: p.map(|v| v * k), scale: *scale }, s);
             }
             _ => return false,
         }
@@ -224,18 +148,12 @@ impl Lowering {
             Call::OnReset => Op::Reset,
             Call::SelectPlane(plane) => Op::Plane(plane),
             Call::SetFeedMode(spindle, mode) => {
-                let mode = if mode == 0 {
-                    FeedMode::PerTime
-                } else {
-                    FeedMode::PerRev
-                };
+                let mode = if mode == 0 { FeedMode::PerTime } else { FeedMode::PerRev };
                 Op::FeedMode { spindle, mode }
             }
-            Call::StartSpeedFeedSynch(spindle, per_rev, velocity) => Op::SyncStart(Sync {
-                spindle,
-                per_rev: per_rev * k,
-                velocity,
-            }),
+            Call::StartSpeedFeedSynch(spindle, per_rev, velocity) => {
+                Op::SyncStart(Sync { spindle, per_rev: per_rev * k, velocity })
+            }
             Call::StopSpeedFeedSynch => Op::SyncStop,
             Call::TurnProbeOn => Op::ProbeMode(true),
             Call::TurnProbeOff => Op::ProbeMode(false),
@@ -247,47 +165,31 @@ impl Lowering {
             }),
             Call::SetNaivecamTolerance(t) => Op::MergeTolerance(t * k),
             Call::UseToolLengthOffset(ref a) => Op::ToolOffset(self.axes(a)),
-            Call::SetToolTableEntry(pocket, tool, ref o, diameter, front, back, orientation) => {
-                Op::ToolEntry {
-                    pocket,
-                    tool,
-                    offset: self.axes(o),
-                    diameter: diameter * k,
-                    front: front * RAD,
-                    back: back * RAD,
-                    orientation,
-                }
-            }
+            Call::SetToolTableEntry(pocket, tool, ref o, diameter, front, back, orientation) => Op::ToolEntry {
+                pocket,
+                tool,
+                offset: self.axes(o),
+                diameter: diameter * k,
+                front: front * RAD,
+                back: back * RAD,
+                orientation,
+            },
             _ => return None,
         })
     }
 
     fn switch(call: &Call) -> Option<Op<'static>> {
         Some(match *call {
-            Call::SetSpindleMode(spindle, limit) => Op::SpindleMode {
-                spindle,
-                surface: (limit != 0.0).then_some(limit),
-            },
-            Call::StartSpindleClockwise(spindle) => Op::SpindleTurn {
-                spindle,
-                turn: Turn::Cw,
-            },
-            Call::StartSpindleCounterclockwise(spindle) => Op::SpindleTurn {
-                spindle,
-                turn: Turn::Ccw,
-            },
-            Call::StopSpindleTurning(spindle) => Op::SpindleTurn {
-                spindle,
-                turn: Turn::Stop,
-            },
-            Call::OrientSpindle(spindle, angle, direction) => Op::SpindleOrient {
-                spindle,
-                angle: angle * RAD,
-                direction,
-            },
-            Call::WaitSpindleOrientComplete(spindle, timeout) => {
-                Op::SpindleWait { spindle, timeout }
+            Call::SetSpindleMode(spindle, limit) => {
+                Op::SpindleMode { spindle, surface: (limit != 0.0).then_some(limit) }
             }
+            Call::StartSpindleClockwise(spindle) => Op::SpindleTurn { spindle, turn: Turn::Cw },
+            Call::StartSpindleCounterclockwise(spindle) => Op::SpindleTurn { spindle, turn: Turn::Ccw },
+            Call::StopSpindleTurning(spindle) => Op::SpindleTurn { spindle, turn: Turn::Stop },
+            Call::OrientSpindle(spindle, angle, direction) => {
+                Op::SpindleOrient { spindle, angle: angle * RAD, direction }
+            }
+            Call::WaitSpindleOrientComplete(spindle, timeout) => Op::SpindleWait { spindle, timeout },
             Call::SelectTool(n) => Op::ToolPrepare(n),
             Call::StartChange => Op::ToolChangeStart,
             Call::ChangeTool(pocket) => Op::ToolChange(pocket),
@@ -305,42 +207,13 @@ impl Lowering {
             Call::DisableAdaptiveFeed => Op::Override(Override::Adaptive, false),
             Call::EnableFeedHold => Op::Override(Override::FeedHold, true),
             Call::DisableFeedHold => Op::Override(Override::FeedHold, false),
-            Call::SetMotionOutputBit(index) => Op::DigitalOut {
-                index,
-                on: true,
-                synced: true,
-            },
-            Call::ClearMotionOutputBit(index) => Op::DigitalOut {
-                index,
-                on: false,
-                synced: true,
-            },
-            Call::SetAuxOutputBit(index) => Op::DigitalOut {
-                index,
-                on: true,
-                synced: false,
-            },
-            Call::ClearAuxOutputBit(index) => Op::DigitalOut {
-                index,
-                on: false,
-                synced: false,
-            },
-            Call::SetMotionOutputValue(index, value) => Op::AnalogOut {
-                index,
-                value,
-                synced: true,
-            },
-            Call::SetAuxOutputValue(index, value) => Op::AnalogOut {
-                index,
-                value,
-                synced: false,
-            },
-            Call::WaitInput(index, digital, wait, timeout) => Op::InputWait {
-                index,
-                digital,
-                wait,
-                timeout,
-            },
+            Call::SetMotionOutputBit(index) => Op::DigitalOut { index, on: true, synced: true },
+            Call::ClearMotionOutputBit(index) => Op::DigitalOut { index, on: false, synced: true },
+            Call::SetAuxOutputBit(index) => Op::DigitalOut { index, on: true, synced: false },
+            Call::ClearAuxOutputBit(index) => Op::DigitalOut { index, on: false, synced: false },
+            Call::SetMotionOutputValue(index, value) => Op::AnalogOut { index, value, synced: true },
+            Call::SetAuxOutputValue(index, value) => Op::AnalogOut { index, value, synced: false },
+            Call::WaitInput(index, digital, wait, timeout) => Op::InputWait { index, digital, wait, timeout },
             Call::LogClose => Op::LogClose,
             Call::UserM(code, p, q) => Op::UserM { code, p, q },
             Call::ProgramStop => Op::Stop(Stop::Program),
@@ -366,11 +239,7 @@ impl Lowering {
 }
 
 fn source(at: &At<'_>) -> Source {
-    Source {
-        file: at.file,
-        line: at.line,
-        frame: at.frame,
-    }
+    Source { file: at.file, line: at.line, frame: at.frame }
 }
 
 impl Sink for Lowering {
@@ -384,11 +253,7 @@ impl Sink for Lowering {
             Call::SetSpindleSpeed(spindle, speed) => return self.spindle_speed(spindle, speed, s),
             _ => {}
         }
-        if let Some(op) = self
-            .setting(call)
-            .or_else(|| Self::switch(call))
-            .or_else(|| Self::note(call))
-        {
+        if let Some(op) = self.setting(call).or_else(|| Self::switch(call)).or_else(|| Self::note(call)) {
             self.out.push(op, s);
         }
     }
@@ -397,11 +262,7 @@ impl Sink for Lowering {
     }
     fn mark(&mut self, at: &At<'_>, mark: &Mark) {
         let op = match mark {
-            Mark::CycleBegin(code) => Op::Begin {
-                marker: Marker::Cycle,
-                code: *code,
-                text: "",
-            },
+            Mark::CycleBegin(code) => Op::Begin { marker: Marker::Cycle, code: *code, text: "" },
             Mark::CycleEnd => Op::Close(Marker::Cycle),
             Mark::RuntimeValue(what) => Op::RunTime(what),
         };

@@ -18,11 +18,7 @@ pub struct Rates {
 impl Default for Rates {
     /// 6 m/min, 60°/s, tool change in no time.
     fn default() -> Rates {
-        Rates {
-            rapid: 100.0,
-            rapid_angular: std::f64::consts::FRAC_PI_3,
-            tool_change: 0.0,
-        }
+        Rates { rapid: 100.0, rapid_angular: std::f64::consts::FRAC_PI_3, tool_change: 0.0 }
     }
 }
 
@@ -50,9 +46,7 @@ pub struct Totals {
 impl Totals {
     /// All time, ns.
     pub fn ns(&self) -> u64 {
-        self.rapid_ns
-            .saturating_add(self.feed_ns)
-            .saturating_add(self.wait_ns)
+        self.rapid_ns.saturating_add(self.feed_ns).saturating_add(self.wait_ns)
     }
     /// All time, s.
     pub fn seconds(&self) -> f64 {
@@ -82,11 +76,7 @@ fn speed(state: &State, view: &View<'_, '_>, angular: bool) -> f64 {
     if let Some(sync) = state.sync.filter(|s| !s.velocity) {
         return sync.per_rev * rpm(state, sync.spindle, view) / 60.0;
     }
-    let feed = if angular {
-        state.feed_angular
-    } else {
-        state.feed
-    };
+    let feed = if angular { state.feed_angular } else { state.feed };
     match state.feed_mode {
         FeedMode::PerRev => feed * rpm(state, state.feed_spindle, view) / 60.0,
         _ => feed,
@@ -106,19 +96,14 @@ fn rpm(state: &State, spindle: i32, view: &View<'_, '_>) -> f64 {
 
 /// What one operation adds.
 pub fn measure(view: &View<'_, '_>, rates: &Rates) -> Totals {
-    let mut t = Totals {
-        operations: 1,
-        ..Totals::default()
-    };
+    let mut t = Totals { operations: 1, ..Totals::default() };
     match view.op {
         Op::Dwell(s) => t.wait_ns = nano(s),
         Op::ToolChange(_) => t.wait_ns = nano(rates.tool_change),
         Op::Rapid => {
             t.moves = 1;
             match length(&view.op, view.start, view.end) {
-                Length::Linear(mm) => {
-                    (t.rapid_ns, t.rapid_nm) = (nano(mm / rates.rapid), mm_to_nm(mm))
-                }
+                Length::Linear(mm) => (t.rapid_ns, t.rapid_nm) = (nano(mm / rates.rapid), mm_to_nm(mm)),
                 Length::Angular(rad) => t.rapid_ns = nano(rad / rates.rapid_angular),
             }
         }
@@ -250,14 +235,8 @@ pub struct Report {
 
 /// Measures a program.
 pub fn report(program: &Program, rates: &Rates) -> Report {
-    let mut run = Run {
-        known: Known::default(),
-        out: Report::default(),
-        tool: 0,
-        open: Vec::new(),
-        cycle: None,
-        offset: None,
-    };
+    let mut run =
+        Run { known: Known::default(), out: Report::default(), tool: 0, open: Vec::new(), cycle: None, offset: None };
     run.select(program.start_state().tool, Source::default());
     let mut cursor = program.cursor();
     while let Some(view) = cursor.next() {
@@ -349,11 +328,7 @@ impl Run {
     fn select(&mut self, tool: i32, first: Source) {
         let found = self.out.tools.iter().position(|t| t.tool == tool);
         self.tool = found.unwrap_or_else(|| {
-            self.out.tools.push(ToolUse {
-                tool,
-                first,
-                ..ToolUse::default()
-            });
+            self.out.tools.push(ToolUse { tool, first, ..ToolUse::default() });
             self.out.tools.len() - 1
         });
     }
@@ -362,22 +337,12 @@ impl Run {
         if marker != Marker::Cycle {
             self.open.push(self.out.stretches.len());
             let totals = Totals::default();
-            self.out.stretches.push(Stretch {
-                marker,
-                code,
-                text: text.to_owned(),
-                source,
-                totals,
-            });
+            self.out.stretches.push(Stretch { marker, code, text: text.to_owned(), source, totals });
             return;
         }
         let found = self.out.cycles.iter().position(|c| c.code == code);
         let at = found.unwrap_or_else(|| {
-            self.out.cycles.push(CycleUse {
-                code,
-                passes: 0,
-                totals: Totals::default(),
-            });
+            self.out.cycles.push(CycleUse { code, passes: 0, totals: Totals::default() });
             self.out.cycles.len() - 1
         });
         self.out.cycles[at].passes += 1;
@@ -387,11 +352,7 @@ impl Run {
     fn close(&mut self, marker: Marker) {
         if marker == Marker::Cycle {
             self.cycle = None;
-        } else if let Some(i) = self
-            .open
-            .iter()
-            .rposition(|i| self.out.stretches[*i].marker == marker)
-        {
+        } else if let Some(i) = self.open.iter().rposition(|i| self.out.stretches[*i].marker == marker) {
             self.open.remove(i);
         }
     }
@@ -428,9 +389,7 @@ impl Run {
         }
         self.out.machine.add(shifted(view.state, start.xyz()));
         crate::geometry::flatten(&view.op, start, view.end, 1e-3, |p| {
-            self.out
-                .machine
-                .add(shifted(view.state, [p[0], p[1], p[2]]));
+            self.out.machine.add(shifted(view.state, [p[0], p[1], p[2]]));
         });
     }
 }

@@ -17,11 +17,7 @@ pub struct Pose {
 impl Pose {
     /// The pose with these axis values and nothing else.
     pub fn at(axes: Axes) -> Pose {
-        Pose {
-            axes,
-            tool_axis: None,
-            spin: None,
-        }
+        Pose { axes, tool_axis: None, spin: None }
     }
     /// X Y Z.
     pub fn xyz(&self) -> [f64; 3] {
@@ -365,10 +361,7 @@ pub enum Op<'a> {
 impl Op<'_> {
     /// Whether the tool may move: these have an end pose of their own.
     pub fn moves(&self) -> bool {
-        matches!(
-            self,
-            Op::Rapid | Op::Linear | Op::Arc(_) | Op::Nurbs { .. } | Op::Probe(_)
-        )
+        matches!(self, Op::Rapid | Op::Linear | Op::Arc(_) | Op::Nurbs { .. } | Op::Probe(_))
     }
     /// Whether it cuts: moves at feed.
     pub fn feeds(&self) -> bool {

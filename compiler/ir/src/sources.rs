@@ -31,12 +31,8 @@ pub struct Texts<'a> {
 impl<'a> Texts<'a> {
     /// Indexes the lines of some files.
     pub fn new(files: impl IntoIterator<Item = (FileId, &'a str)>) -> Texts<'a> {
-        let files = files
-            .into_iter()
-            .map(|(id, t)| (id, t, gr_text::LineIndex::new(t.as_bytes())));
-        Texts {
-            files: files.collect(),
-        }
+        let files = files.into_iter().map(|(id, t)| (id, t, gr_text::LineIndex::new(t.as_bytes())));
+        Texts { files: files.collect() }
     }
     fn span(&self, file: FileId, line: u32) -> Option<(&'a str, Span)> {
         let (_, text, index) = self.files.iter().find(|f| f.0 == file)?;
@@ -45,21 +41,14 @@ impl<'a> Texts<'a> {
             return None;
         }
         let (start, end) = (index.start(line), index.start(line.checked_add(1)?));
-        let body = text
-            .get(start as usize..end as usize)?
-            .trim_end_matches(['\r', '\n']);
+        let body = text.get(start as usize..end as usize)?.trim_end_matches(['\r', '\n']);
         Some((body, Span::new(start, start + body.len() as u32)))
     }
 }
 
 impl Sources for Texts<'_> {
     fn place(&self, source: Source) -> (FileId, Span) {
-        (
-            source.file,
-            self.span(source.file, source.line)
-                .map(|s| s.1)
-                .unwrap_or_default(),
-        )
+        (source.file, self.span(source.file, source.line).map(|s| s.1).unwrap_or_default())
     }
     fn line(&self, file: FileId, line: u32) -> Option<&str> {
         self.span(file, line).map(|s| s.0)
@@ -75,11 +64,7 @@ mod tests {
         let texts = Texts::new([(FileId(3), "G0 X1\r\nG1 X2")]);
         assert_eq!(texts.line(FileId(3), 1), Some("G1 X2"));
         assert_eq!(texts.line(FileId(3), 2), None);
-        let at = Source {
-            file: FileId(3),
-            line: 0,
-            ..Source::default()
-        };
+        let at = Source { file: FileId(3), line: 0, ..Source::default() };
         assert_eq!(texts.place(at), (FileId(3), Span::new(0, 5)));
     }
 }

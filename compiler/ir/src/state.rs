@@ -144,10 +144,7 @@ impl State {
 
     /// The spindle of this number (a number out of range: the first).
     pub fn spindle(&self, number: i32) -> &Spindle {
-        usize::try_from(number)
-            .ok()
-            .and_then(|n| self.spindles.get(n))
-            .unwrap_or(&self.spindles[0])
+        usize::try_from(number).ok().and_then(|n| self.spindles.get(n)).unwrap_or(&self.spindles[0])
     }
 
     /// Whether any spindle turns.
@@ -157,10 +154,7 @@ impl State {
 
     /// Whether an operation moves the frame positions are written in.
     pub(crate) fn moves_frame(op: &Op<'_>) -> bool {
-        matches!(
-            op,
-            Op::ToolOffset(_) | Op::WorkOffset(..) | Op::LocalOffset(_) | Op::Rotation(_)
-        )
+        matches!(op, Op::ToolOffset(_) | Op::WorkOffset(..) | Op::LocalOffset(_) | Op::Rotation(_))
     }
 
     /// Takes over what the operation sets. When it moves the frame, the pose is written anew: the machine
@@ -237,11 +231,7 @@ impl State {
             Override::FeedHold => self.feed_hold = on,
             Override::Speed(n) => {
                 let bit = 1u8 << n.clamp(0, 7);
-                self.speed_override = if on {
-                    self.speed_override | bit
-                } else {
-                    self.speed_override & !bit
-                };
+                self.speed_override = if on { self.speed_override | bit } else { self.speed_override & !bit };
             }
         }
     }

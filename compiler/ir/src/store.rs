@@ -40,14 +40,7 @@ impl Frames {
     /// Adds a node.
     pub fn add(&mut self, id: FrameId, frame: &gr_canon::CallFrame) {
         let name = self.name_index(&frame.name);
-        let row = Frame {
-            id,
-            parent: frame.parent,
-            file: frame.file,
-            line: frame.line,
-            name,
-            pass: frame.pass,
-        };
+        let row = Frame { id, parent: frame.parent, file: frame.file, line: frame.line, name, pass: frame.pass };
         match self.rows.last() {
             Some(last) if last.id >= id => match self.rows.binary_search_by_key(&id, |r| r.id) {
                 Ok(i) => self.rows[i] = row,
@@ -67,10 +60,7 @@ impl Frames {
     }
     /// A node.
     pub fn get(&self, id: FrameId) -> Option<&Frame> {
-        self.rows
-            .binary_search_by_key(&id, |r| r.id)
-            .ok()
-            .map(|i| &self.rows[i])
+        self.rows.binary_search_by_key(&id, |r| r.id).ok().map(|i| &self.rows[i])
     }
     /// Its name.
     pub fn name(&self, frame: &Frame) -> &str {
@@ -81,8 +71,7 @@ impl Frames {
         self.rows.iter()
     }
     fn bytes(&self) -> usize {
-        self.rows.capacity() * size_of::<Frame>()
-            + self.names.iter().map(|n| n.len() + 16).sum::<usize>()
+        self.rows.capacity() * size_of::<Frame>() + self.names.iter().map(|n| n.len() + 16).sum::<usize>()
     }
 }
 
@@ -156,10 +145,7 @@ impl Program {
     pub fn cursor_at(&self, index: usize) -> Cursor<'_> {
         let mut cursor = self.cursor();
         let index = index.min(self.len());
-        if let Some(c) = (index / STRIDE)
-            .checked_sub(1)
-            .and_then(|i| self.checkpoints.get(i))
-        {
+        if let Some(c) = (index / STRIDE).checked_sub(1).and_then(|i| self.checkpoints.get(i)) {
             cursor.at = c.place;
             (cursor.start, cursor.end) = (c.pose, c.pose);
             (cursor.state, cursor.source) = (c.state, c.source);
@@ -192,21 +178,14 @@ impl Program {
     }
     /// The name of a file.
     pub fn file_name(&self, file: FileId) -> Option<&str> {
-        self.files
-            .iter()
-            .find(|(id, _)| *id == file)
-            .map(|(_, n)| n.as_str())
+        self.files.iter().find(|(id, _)| *id == file).map(|(_, n)| n.as_str())
     }
     /// The frames from a place's own outward.
     pub fn call_stack(&self, source: Source) -> impl Iterator<Item = &Frame> {
         let mut next = self.frames.get(source.frame);
         std::iter::from_fn(move || {
             let frame = next?;
-            next = if frame.parent < frame.id {
-                self.frames.get(frame.parent)
-            } else {
-                None
-            };
+            next = if frame.parent < frame.id { self.frames.get(frame.parent) } else { None };
             Some(frame)
         })
     }
@@ -221,16 +200,7 @@ impl Program {
         for frame in other.frames.iter() {
             let name = other.frames.name(frame).into();
             let (parent, file, line, pass) = (frame.parent, frame.file, frame.line, frame.pass);
-            self.frames.add(
-                frame.id,
-                &gr_canon::CallFrame {
-                    parent,
-                    file,
-                    line,
-                    name,
-                    pass,
-                },
-            );
+            self.frames.add(frame.id, &gr_canon::CallFrame { parent, file, line, name, pass });
         }
     }
 }
@@ -285,14 +255,7 @@ impl<'p> Cursor<'p> {
     pub fn next(&mut self) -> Option<View<'_, 'p>> {
         let index = self.at.op;
         let op = self.advance()?;
-        Some(View {
-            index,
-            op,
-            start: &self.start,
-            end: &self.end,
-            state: &self.state,
-            source: self.source,
-        })
+        Some(View { index, op, start: &self.start, end: &self.end, state: &self.state, source: self.source })
     }
     /// The state after what has been read.
     pub fn state(&self) -> &State {
@@ -309,13 +272,7 @@ impl<'p> Cursor<'p> {
     fn step(&mut self) -> Option<Step<'p>> {
         let index = self.at.op;
         let op = self.advance()?;
-        Some(Step {
-            index,
-            op,
-            start: self.start,
-            end: self.end,
-            source: self.source,
-        })
+        Some(Step { index, op, start: self.start, end: self.end, source: self.source })
     }
 
     #[inline]
@@ -400,10 +357,7 @@ impl<'p> Cursor<'p> {
         Some(slice)
     }
     fn str(&mut self) -> Option<&'p str> {
-        let end = self
-            .at
-            .text
-            .checked_add(usize::try_from(self.int()?).ok()?)?;
+        let end = self.at.text.checked_add(usize::try_from(self.int()?).ok()?)?;
         let s = self.program.text.get(self.at.text..end)?;
         self.at.text = end;
         Some(s)
@@ -412,22 +366,14 @@ impl<'p> Cursor<'p> {
         let turns = self.int()?;
         if free {
             let center = self.three()?;
-            return Some(Arc {
-                plane: ArcPlane::Free(self.three()?),
-                center,
-                turns,
-            });
+            return Some(Arc { plane: ArcPlane::Free(self.three()?), center, turns });
         }
         let plane = code::plane(self.int()?);
         let (first, second, _) = crate::state::plane_axes(plane);
         let mut center = self.start.xyz();
         center[first] = self.value()?;
         center[second] = self.value()?;
-        Some(Arc {
-            plane: ArcPlane::Work(plane),
-            center,
-            turns,
-        })
+        Some(Arc { plane: ArcPlane::Work(plane), center, turns })
     }
 }
 
@@ -452,17 +398,8 @@ impl Builder {
     }
     /// Starts empty, from a pose and a state (for programs built in pieces).
     pub fn from_state(pose: Pose, state: State) -> Builder {
-        let program = Program {
-            start: pose,
-            start_state: state,
-            ..Program::default()
-        };
-        Builder {
-            program,
-            pose,
-            state,
-            ..Builder::default()
-        }
+        let program = Program { start: pose, start_state: state, ..Program::default() };
+        Builder { program, pose, state, ..Builder::default() }
     }
     /// Sets what the program starts from, keeping files and frames. Only before the first operation.
     pub(crate) fn restart(&mut self, pose: Pose, state: State) {
@@ -473,12 +410,7 @@ impl Builder {
     pub fn resume(program: Program) -> Builder {
         let cursor = program.cursor_at(program.len());
         let (pose, state, source) = (cursor.end, cursor.state, cursor.source);
-        Builder {
-            program,
-            pose,
-            state,
-            source,
-        }
+        Builder { program, pose, state, source }
     }
     /// The pose so far.
     pub fn pose(&self) -> &Pose {
@@ -554,12 +486,7 @@ impl Builder {
             text: p.text.len(),
             jump: p.jumps.len(),
         };
-        let checkpoint = Checkpoint {
-            place,
-            pose: self.pose,
-            state: self.state,
-            source: self.source,
-        };
+        let checkpoint = Checkpoint { place, pose: self.pose, state: self.state, source: self.source };
         self.program.checkpoints.push(checkpoint);
     }
 
@@ -588,19 +515,11 @@ impl Builder {
             }
         }
         if end.tool_axis != self.pose.tool_axis {
-            mask |= if end.tool_axis.is_some() {
-                AXIS_SET
-            } else {
-                AXIS_GONE
-            };
+            mask |= if end.tool_axis.is_some() { AXIS_SET } else { AXIS_GONE };
             self.program.values.extend(end.tool_axis.iter().flatten());
         }
         if end.spin != self.pose.spin {
-            mask |= if end.spin.is_some() {
-                SPIN_SET
-            } else {
-                SPIN_GONE
-            };
+            mask |= if end.spin.is_some() { SPIN_SET } else { SPIN_GONE };
             self.program.values.extend(end.spin);
         }
         self.program.masks.push(mask);

@@ -186,12 +186,13 @@ fn nurbs_begin_and_end_at_their_outer_points() {
     let quarter = [1.0, 0.0, 1.0, 1.0, 1.0, libm::sqrt(0.5), 0.0, 1.0, 1.0];
     let [x, y] = nurbs_point(3, &quarter, 0.3).expect("point");
     assert!((libm::hypot(x, y) - 1.0).abs() < 1e-15);
-    let nurbs = Nurbs { plane: gr_canon::Plane::Xy, order: 3, points: vec![[1.0, 0.0, 1.0], [1.0, 1.0, libm::sqrt(0.5)], [0.0, 1.0, 1.0]] };
-    let program = lower(&[
-        Call::SetFeedRate(60.0),
-        Call::StraightTraverse(at(1.0, 0.0, 0.0)),
-        Call::NurbsFeed(Box::new(nurbs)),
-    ]);
+    let nurbs = Nurbs {
+        plane: gr_canon::Plane::Xy,
+        order: 3,
+        points: vec![[1.0, 0.0, 1.0], [1.0, 1.0, libm::sqrt(0.5)], [0.0, 1.0, 1.0]],
+    };
+    let program =
+        lower(&[Call::SetFeedRate(60.0), Call::StraightTraverse(at(1.0, 0.0, 0.0)), Call::NurbsFeed(Box::new(nurbs))]);
     let r = report(&program, &Rates::default());
     assert!((r.totals.feed_nm as f64 / 1e6 - FRAC_PI_2).abs() < 1e-4);
 }

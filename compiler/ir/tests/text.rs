@@ -43,15 +43,13 @@ fn op() -> impl Strategy<Value = Op<'static>> {
         Just(Op::Rapid),
         Just(Op::Linear),
         arc,
-        (2u32..5, prop::collection::vec(three(), 0..6)).prop_map(|(order, p)| {
-            Op::Nurbs { order, points: p.concat().leak() }
-        }),
+        (2u32..5, prop::collection::vec(three(), 0..6))
+            .prop_map(|(order, p)| { Op::Nurbs { order, points: p.concat().leak() } }),
         any::<u8>().prop_map(Op::Probe),
         (three(), number()).prop_map(|(bottom, scale)| Op::RigidTap { bottom, scale }),
         number().prop_map(Op::Dwell),
-        (int(), number(), any::<bool>()).prop_map(|(spindle, per_rev, velocity)| {
-            Op::SyncStart(Sync { spindle, per_rev, velocity })
-        }),
+        (int(), number(), any::<bool>())
+            .prop_map(|(spindle, per_rev, velocity)| { Op::SyncStart(Sync { spindle, per_rev, velocity }) }),
     ];
     let frames = prop_oneof![
         axes().prop_map(Op::ToolOffset),
@@ -76,7 +74,11 @@ fn op() -> impl Strategy<Value = Op<'static>> {
         (int(), number()).prop_map(|(spindle, speed)| Op::SpindleSpeed { spindle, speed }),
         (int(), prop::sample::select(vec![Turn::Cw, Turn::Ccw, Turn::Stop]))
             .prop_map(|(spindle, turn)| Op::SpindleTurn { spindle, turn }),
-        (int(), number(), int()).prop_map(|(spindle, angle, direction)| Op::SpindleOrient { spindle, angle, direction }),
+        (int(), number(), int()).prop_map(|(spindle, angle, direction)| Op::SpindleOrient {
+            spindle,
+            angle,
+            direction
+        }),
         (int(), number()).prop_map(|(spindle, timeout)| Op::SpindleWait { spindle, timeout }),
     ];
     let rest = prop_oneof![
@@ -106,7 +108,7 @@ fn op() -> impl Strategy<Value = Op<'static>> {
         (int(), any::<bool>(), any::<bool>()).prop_map(|(index, on, synced)| Op::DigitalOut { index, on, synced }),
         (int(), number(), any::<bool>()).prop_map(|(index, value, synced)| Op::AnalogOut { index, value, synced }),
         (int(), any::<bool>(), int(), number())
-            .prop_map(|(index, digital, wait, timeout)| Op::InputWait { index, digital, wait, timeout }),
+            .prop_map(|(index, digital, wait, timeout)| { Op::InputWait { index, digital, wait, timeout } }),
         text().prop_map(Op::RunTime),
         (prop::sample::select(vec![Note::Comment, Note::Message, Note::Log, Note::LogOpen, Note::LogAppend]), text())
             .prop_map(|(n, t)| Op::Note(n, t)),
@@ -131,8 +133,11 @@ fn pose() -> impl Strategy<Value = Pose> {
 }
 
 fn source() -> impl Strategy<Value = Source> {
-    (0u32..3, prop_oneof![0u32..400, any::<u32>()], 0u32..3)
-        .prop_map(|(file, line, frame)| Source { file: FileId(file), line, frame: FrameId(frame) })
+    (0u32..3, prop_oneof![0u32..400, any::<u32>()], 0u32..3).prop_map(|(file, line, frame)| Source {
+        file: FileId(file),
+        line,
+        frame: FrameId(frame),
+    })
 }
 
 fn build(ops: &[(Op<'static>, Pose, Source)]) -> Program {

@@ -47,11 +47,7 @@ pub fn read(id: FileId, file: &File) -> (Vec<Command>, Vec<Diagnostic>) {
     let (mut commands, mut faults) = (Vec::new(), Vec::new());
     for (i, chunk) in file.chunks.iter().enumerate() {
         for line in 0..chunk.scan.lines.len() as u32 {
-            let reader = Reader {
-                text: &chunk.text,
-                scan: &chunk.scan,
-                line,
-            };
+            let reader = Reader { text: &chunk.text, scan: &chunk.scan, line };
             let by = file.starts[i];
             match reader.command(file.first_lines[i] + line) {
                 Ok(Some(mut command)) => {
@@ -59,9 +55,7 @@ pub fn read(id: FileId, file: &File) -> (Vec<Command>, Vec<Diagnostic>) {
                     commands.push(command);
                 }
                 Ok(None) => {}
-                Err((code, span, arg)) => {
-                    faults.push(Diagnostic::new(code, id, span.shifted(by), &[arg]))
-                }
+                Err((code, span, arg)) => faults.push(Diagnostic::new(code, id, span.shifted(by), &[arg])),
             }
         }
     }
@@ -78,10 +72,7 @@ struct Reader<'a> {
 
 impl Reader<'_> {
     fn words(&self) -> impl Iterator<Item = &Word> {
-        self.scan
-            .words(self.line)
-            .iter()
-            .filter(|w| w.form != Form::Comment)
+        self.scan.words(self.line).iter().filter(|w| w.form != Form::Comment)
     }
 
     fn span(&self, word: &Word) -> Span {
@@ -114,11 +105,7 @@ impl Reader<'_> {
             Some(w) => {
                 let span = self.span(w);
                 let shown = self.text.get(span.range()).unwrap_or("").trim();
-                Err((
-                    code::UFMG_UNKNOWN_WORD,
-                    span,
-                    shown.chars().take(20).collect(),
-                ))
+                Err((code::UFMG_UNKNOWN_WORD, span, shown.chars().take(20).collect()))
             }
             None => Ok(()),
         }
@@ -135,10 +122,7 @@ impl Reader<'_> {
             Some(2.0) => Motion::Clockwise,
             Some(3.0) => Motion::Counterclockwise,
             _ => {
-                return wrong(
-                    self.span(g),
-                    "there is no such G word; the language has G00, G01, G02 and G03",
-                );
+                return wrong(self.span(g), "there is no such G word; the language has G00, G01, G02 and G03");
             }
         };
         if !self.words().any(|w| TARGETS.contains(&w.letter)) {
@@ -151,18 +135,11 @@ impl Reader<'_> {
                 None => Ok(motion),
             },
             Motion::Clockwise | Motion::Counterclockwise => {
-                let missing = CENTER
-                    .iter()
-                    .find(|c| !self.words().any(|w| w.letter == **c));
+                let missing = CENTER.iter().find(|c| !self.words().any(|w| w.letter == **c));
                 match missing {
                     Some(c) => {
                         let c = char::from(c.to_ascii_uppercase());
-                        wrong(
-                            all,
-                            &format!(
-                                "an arc needs I, J and K, the absolute centre; {c} is missing"
-                            ),
-                        )
+                        wrong(all, &format!("an arc needs I, J and K, the absolute centre; {c} is missing"))
                     }
                     None => Ok(motion),
                 }
@@ -175,30 +152,17 @@ impl Reader<'_> {
         // Words given twice have a check of their own.
         let twice = |w: &Word| {
             let at = self.span(w);
-            faults.iter().any(|f| {
-                f.code == code::WORD_REPEATED && f.span.start < at.end && at.start < f.span.end
-            })
+            faults.iter().any(|f| f.code == code::WORD_REPEATED && f.span.start < at.end && at.start < f.span.end)
         };
         let bad = |w: &&Word| w.form != Form::Literal || !w.value.is_finite();
         if let Some(w) = self.words().filter(|w| !twice(w)).find(bad) {
-            return Err((
-                code::UFMG_BAD_VALUE,
-                self.span(w),
-                char::from(w.letter.to_ascii_uppercase()).into(),
-            ));
+            return Err((code::UFMG_BAD_VALUE, self.span(w), char::from(w.letter.to_ascii_uppercase()).into()));
         }
         match faults.iter().find(|f| f.code != code::WORD_REPEATED) {
             Some(fault) => {
-                let letter = self
-                    .words()
-                    .find(|w| self.span(w).end >= fault.span.start)
-                    .or(self.words().last());
+                let letter = self.words().find(|w| self.span(w).end >= fault.span.start).or(self.words().last());
                 let letter = letter.map_or('?', |w| char::from(w.letter.to_ascii_uppercase()));
-                let span = if fault.span.start < fault.span.end {
-                    fault.span
-                } else {
-                    all
-                };
+                let span = if fault.span.start < fault.span.end { fault.span } else { all };
                 Err((code::UFMG_BAD_VALUE, span, letter.into()))
             }
             _ => Ok(()),
@@ -217,11 +181,7 @@ impl Reader<'_> {
 
     fn once(&self) -> Result<(), Wrong> {
         match self.repeated() {
-            Some(w) => Err((
-                code::UFMG_REPEATED,
-                self.span(w),
-                char::from(w.letter.to_ascii_uppercase()).into(),
-            )),
+            Some(w) => Err((code::UFMG_REPEATED, self.span(w), char::from(w.letter.to_ascii_uppercase()).into())),
             None => Ok(()),
         }
     }
@@ -242,10 +202,7 @@ impl Reader<'_> {
 fn trimmed(text: &str, span: Span) -> Span {
     let line = text.get(span.range()).unwrap_or("");
     let before = line.len() - line.trim_start().len();
-    Span::new(
-        span.start + before as u32,
-        span.start + (before + line.trim().len()) as u32,
-    )
+    Span::new(span.start + before as u32, span.start + (before + line.trim().len()) as u32)
 }
 
 #[cfg(test)]
@@ -257,32 +214,17 @@ mod tests {
 
     fn file(text: &str) -> File {
         let dialect = Dialect::find("ufmg2008").unwrap();
-        File::new(
-            "a.g",
-            vec![Chunk {
-                text: text.into(),
-                scan: Arc::new(scan(text, dialect)),
-            }],
-        )
+        File::new("a.g", vec![Chunk { text: text.into(), scan: Arc::new(scan(text, dialect)) }])
     }
 
     #[test]
     fn commands_of_the_thesis() {
-        let (commands, faults) = read(
-            FileId(0),
-            &file("G01 X20 Y20 C-80 F500\nG02 X120 Y120 C-10 I120 J20 K0\n"),
-        );
+        let (commands, faults) = read(FileId(0), &file("G01 X20 Y20 C-80 F500\nG02 X120 Y120 C-10 I120 J20 K0\n"));
         assert_eq!(faults, []);
         assert_eq!(commands[0].motion, Motion::Line);
-        assert_eq!(
-            commands[0].target,
-            [Some(20.0), Some(20.0), None, None, None, Some(-80.0)]
-        );
+        assert_eq!(commands[0].target, [Some(20.0), Some(20.0), None, None, None, Some(-80.0)]);
         assert_eq!(commands[0].feed, Some(500.0));
-        assert_eq!(
-            (commands[1].motion, commands[1].center),
-            (Motion::Clockwise, [120.0, 20.0, 0.0])
-        );
+        assert_eq!((commands[1].motion, commands[1].center), (Motion::Clockwise, [120.0, 20.0, 0.0]));
         assert_eq!(commands[1].line, 1);
     }
 
@@ -290,10 +232,7 @@ mod tests {
     fn decimal_comma_and_point() {
         let (commands, faults) = read(FileId(0), &file("G01 X97,96 Y-95.78 Z-90,74 F394,85\n\n"));
         assert_eq!(faults, []);
-        assert_eq!(
-            commands[0].target[..3],
-            [Some(97.96), Some(-95.78), Some(-90.74)]
-        );
+        assert_eq!(commands[0].target[..3], [Some(97.96), Some(-95.78), Some(-90.74)]);
         assert_eq!(commands[0].feed, Some(394.85));
     }
 
@@ -322,18 +261,9 @@ mod tests {
             let found = read(FileId(0), &file(row.bad.unwrap())).1;
             // Feed and arc plane are found when the motion is made.
             if !matches!(row.slug, "ufmg/no-feed" | "ufmg/arc-plane") {
-                assert_eq!(
-                    found.iter().map(|d| d.code.def().code).collect::<Vec<_>>(),
-                    [row.code],
-                    "{found:?}"
-                );
+                assert_eq!(found.iter().map(|d| d.code.def().code).collect::<Vec<_>>(), [row.code], "{found:?}");
             }
-            assert_eq!(
-                read(FileId(0), &file(row.good.unwrap())).1,
-                [],
-                "{}",
-                row.code
-            );
+            assert_eq!(read(FileId(0), &file(row.good.unwrap())).1, [], "{}", row.code);
         }
     }
 }

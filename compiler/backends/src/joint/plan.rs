@@ -46,13 +46,7 @@ impl Default for Options {
 impl Options {
     /// `--reference ufmg2008`: the settings under which the thesis's figures were made.
     pub fn ufmg2008() -> Options {
-        Options {
-            decimals: 2,
-            comma: true,
-            rounding: Rounding::Truncate,
-            reference: true,
-            ..Options::default()
-        }
+        Options { decimals: 2, comma: true, rounding: Rounding::Truncate, reference: true, ..Options::default() }
     }
 }
 
@@ -100,18 +94,8 @@ pub fn compile(
     let kinematics = machine.kinematics();
     let kinds: Vec<JointKind> = machine.joints.iter().map(|j| j.kind).collect();
     let letters = ['X', 'Y', 'Z', 'A', 'B', 'C', 'U', 'V', 'W'];
-    let words = machine
-        .joints
-        .iter()
-        .zip(letters)
-        .map(|(j, l)| j.word.unwrap_or(l))
-        .collect();
-    let out = JointProgram {
-        points: Vec::new(),
-        words,
-        kinds,
-        options: *options,
-    };
+    let words = machine.joints.iter().zip(letters).map(|(j, l)| j.word.unwrap_or(l)).collect();
+    let out = JointProgram { points: Vec::new(), words, kinds, options: *options };
     let mut plan = Plan {
         machine,
         kinematics: &*kinematics,
@@ -124,11 +108,7 @@ pub fn compile(
     };
     plan.start(program);
     plan.run(program);
-    if plan.faults.is_empty() {
-        Ok(plan.out)
-    } else {
-        Err(plan.faults)
-    }
+    if plan.faults.is_empty() { Ok(plan.out) } else { Err(plan.faults) }
 }
 
 struct Plan<'a> {
@@ -169,40 +149,22 @@ impl Plan<'_> {
     }
 
     fn start(&mut self, program: &Program) {
-        let pose = six(&Pose::at(
-            program.start_state().machine(&program.start().axes),
-        ));
+        let pose = six(&Pose::at(program.start_state().machine(&program.start().axes)));
         let at_start = pose == self.machine.start.coordinates();
-        let joints = self
-            .machine
-            .start_joints
-            .clone()
-            .filter(|_| at_start || self.options.reference);
+        let joints = self.machine.start_joints.clone().filter(|_| at_start || self.options.reference);
         let found = match joints {
             Some(joints) => {
-                let branches = self
-                    .kinematics
-                    .inverse(&gr_machine::Pose::from_coordinates(pose))
-                    .unwrap_or_default();
+                let branches = self.kinematics.inverse(&gr_machine::Pose::from_coordinates(pose)).unwrap_or_default();
                 let branch = nearest(&branches, &joints, &self.out.kinds).map_or(0, |s| s.branch);
                 Ok((joints, branch))
             }
-            None => self
-                .kinematics
-                .inverse(&self.machine.start)
-                .map(|all| (all[0].joints.clone(), all[0].branch)),
+            None => self.kinematics.inverse(&self.machine.start).map(|all| (all[0].joints.clone(), all[0].branch)),
         };
         match found {
             Ok((joints, branch)) => {
                 self.branch = branch;
                 let pose = self.machine.start.coordinates();
-                self.out.points.push(JointPoint {
-                    time: 0.0,
-                    pose,
-                    joints,
-                    speed: 0.0,
-                    source: None,
-                });
+                self.out.points.push(JointPoint { time: 0.0, pose, joints, speed: 0.0, source: None });
             }
             Err(e) => self.unreachable(&e, self.machine.start.coordinates(), Source::default()),
         }
@@ -217,35 +179,22 @@ impl Plan<'_> {
             let (start, end) = (six(view.start), six(view.end));
             let source = view.source;
             match view.op {
-                Op::Rapid | Op::Linear | Op::Arc(_)
-                    if self.foreign_axes(view.start, view.end, source) => {}
+                Op::Rapid | Op::Linear | Op::Arc(_) if self.foreign_axes(view.start, view.end, source) => {}
                 Op::Rapid => self.joint_move(view.state, view.end, source),
                 Op::Linear => {
                     let way = distance(&start, &end);
                     let turn = turned(&start, &end);
                     let (a, b) = (*view.start, *view.end);
-                    self.path(view.state, way, turn, source, &|share| {
-                        between(&a, &b, share)
-                    });
+                    self.path(view.state, way, turn, source, &|share| between(&a, &b, share));
                 }
                 Op::Arc(arc) => {
                     let sweep = Sweep::new(view.start, view.end, &arc);
                     // Eq. 4.2 counts the circle; its length is that of a helix where there is one.
-                    self.path(
-                        view.state,
-                        sweep.shape.length(),
-                        turned(&start, &end),
-                        source,
-                        &|share| sweep.at(share),
-                    );
+                    self.path(view.state, sweep.shape.length(), turned(&start, &end), source, &|share| sweep.at(share));
                 }
                 ref op => {
                     if let Some(what) = no_joint_form(op) {
-                        self.fault(
-                            code::EMIT_NOT_EXPRESSIBLE,
-                            source,
-                            &[what.into(), "joint-space G-code".into()],
-                        );
+                        self.fault(code::EMIT_NOT_EXPRESSIBLE, source, &[what.into(), "joint-space G-code".into()]);
                     }
                 }
             }
@@ -264,14 +213,8 @@ impl Plan<'_> {
         }
         let turns = (3..6).find(|i| start.axes[*i] != end.axes[*i]);
         match (turns, &self.machine.orientation) {
-            (Some(i), None | Some(Orientation::Fixed))
-                if self.machine.kind == gr_machine::Kind::Robot =>
-            {
-                self.fault(
-                    code::ROBOT_ROTARY_WORDS,
-                    source,
-                    &[["A", "B", "C"][i - 3].into()],
-                );
+            (Some(i), None | Some(Orientation::Fixed)) if self.machine.kind == gr_machine::Kind::Robot => {
+                self.fault(code::ROBOT_ROTARY_WORDS, source, &[["A", "B", "C"][i - 3].into()]);
                 true
             }
             _ => false,
@@ -281,33 +224,14 @@ impl Plan<'_> {
     /// G00: straight in joint space, so only the end counts.
     fn joint_move(&mut self, state: &State, end: &Pose, source: Source) {
         let pose = six(&Pose::at(state.machine(&end.axes)));
-        self.go(
-            Aim {
-                pose,
-                time: self.options.interval,
-                free: true,
-                feed: 0.0,
-            },
-            source,
-        );
+        self.go(Aim { pose, time: self.options.interval, free: true, feed: 0.0 }, source);
     }
 
     /// A path in space at the programmed feed, cut into equal steps.
-    fn path(
-        &mut self,
-        state: &State,
-        way: f64,
-        turn: f64,
-        source: Source,
-        at: &dyn Fn(f64) -> Pose,
-    ) {
+    fn path(&mut self, state: &State, way: f64, turn: f64, source: Source, at: &dyn Fn(f64) -> Pose) {
         if state.feed_mode != FeedMode::PerTime || state.sync.is_some() {
             let what = "a feed per revolution or in inverse time".to_string();
-            return self.fault(
-                code::EMIT_NOT_EXPRESSIBLE,
-                source,
-                &[what, "joint-space G-code".into()],
-            );
+            return self.fault(code::EMIT_NOT_EXPRESSIBLE, source, &[what, "joint-space G-code".into()]);
         }
         let interval = self.options.interval;
         let (time, feed) = match (way > 0.0, self.options.reference) {
@@ -323,35 +247,15 @@ impl Plan<'_> {
         } else {
             libm::ceil(time / interval * (1.0 - 1e-12)).max(1.0)
         };
-        let steps = if steps.is_finite() {
-            steps as usize
-        } else {
-            usize::MAX
-        };
+        let steps = if steps.is_finite() { steps as usize } else { usize::MAX };
         if steps.saturating_add(self.out.points.len()) > MOST_POINTS {
             let what = format!("a move of {steps} points");
-            return self.fault(
-                code::EMIT_NOT_EXPRESSIBLE,
-                source,
-                &[what, "joint-space G-code".into()],
-            );
+            return self.fault(code::EMIT_NOT_EXPRESSIBLE, source, &[what, "joint-space G-code".into()]);
         }
-        let step = if self.options.reference {
-            interval
-        } else {
-            time / steps as f64
-        };
+        let step = if self.options.reference { interval } else { time / steps as f64 };
         for k in 1..=steps {
             let pose = six(&Pose::at(state.machine(&at(k as f64 / steps as f64).axes)));
-            if !self.go(
-                Aim {
-                    pose,
-                    time: step,
-                    free: false,
-                    feed,
-                },
-                source,
-            ) {
+            if !self.go(Aim { pose, time: step, free: false, feed }, source) {
                 return;
             }
         }
@@ -359,10 +263,7 @@ impl Plan<'_> {
 
     /// Adds a point; false when it can't be had.
     fn go(&mut self, aim: Aim, source: Source) -> bool {
-        let all = match self
-            .kinematics
-            .inverse(&gr_machine::Pose::from_coordinates(aim.pose))
-        {
+        let all = match self.kinematics.inverse(&gr_machine::Pose::from_coordinates(aim.pose)) {
             Ok(all) => all,
             Err(e) => {
                 self.unreachable(&e, aim.pose, source);
@@ -375,38 +276,16 @@ impl Plan<'_> {
         let Some(last) = self.out.points.last() else {
             return false;
         };
-        let change: Vec<f64> = joints
-            .iter()
-            .zip(&last.joints)
-            .map(|(new, old)| new - old)
-            .collect();
-        let time = if aim.free && !self.options.reference {
-            self.calm_time(&change)
-        } else {
-            aim.time
-        };
+        let change: Vec<f64> = joints.iter().zip(&last.joints).map(|(new, old)| new - old).collect();
+        let time = if aim.free && !self.options.reference { self.calm_time(&change) } else { aim.time };
         if !self.options.reference && !self.slow_enough(&change, time, &aim, source) {
             return false;
         }
-        let squares: f64 = change
-            .iter()
-            .zip(&self.out.kinds)
-            .map(|(d, k)| shown(*d, *k) * shown(*d, *k))
-            .sum();
-        let speed = if time > 0.0 {
-            libm::sqrt(squares) / time
-        } else {
-            0.0
-        };
+        let squares: f64 = change.iter().zip(&self.out.kinds).map(|(d, k)| shown(*d, *k) * shown(*d, *k)).sum();
+        let speed = if time > 0.0 { libm::sqrt(squares) / time } else { 0.0 };
         let time = self.out.points.last().map_or(0.0, |p| p.time) + time;
         self.branch = branch;
-        self.out.points.push(JointPoint {
-            time,
-            pose: aim.pose,
-            joints,
-            speed,
-            source: Some(source),
-        });
+        self.out.points.push(JointPoint { time, pose: aim.pose, joints, speed, source: Some(source) });
         true
     }
 
@@ -416,43 +295,18 @@ impl Plan<'_> {
         if self.options.reference {
             return all.first().map(|s| (s.joints.clone(), s.branch));
         }
-        let wrapped: Vec<Solution> = all
-            .iter()
-            .map(|s| self.within_limits(s, &last, aim.free))
-            .collect();
+        let wrapped: Vec<Solution> = all.iter().map(|s| self.within_limits(s, &last, aim.free)).collect();
         // Along a path the arm keeps its configuration; only a joint move may change it.
-        let fits: Vec<Solution> = wrapped
-            .iter()
-            .filter(|s| aim.free || s.branch == self.branch || s.singular)
-            .cloned()
-            .collect();
-        let good: Vec<Solution> = fits
-            .iter()
-            .filter(|s| self.outside(s).is_none())
-            .cloned()
-            .collect();
+        let fits: Vec<Solution> =
+            wrapped.iter().filter(|s| aim.free || s.branch == self.branch || s.singular).cloned().collect();
+        let good: Vec<Solution> = fits.iter().filter(|s| self.outside(s).is_none()).cloned().collect();
         if let Some(best) = nearest(&good, &last, &self.out.kinds) {
-            return Some((
-                best.joints.clone(),
-                if best.singular {
-                    self.branch
-                } else {
-                    best.branch
-                },
-            ));
+            return Some((best.joints.clone(), if best.singular { self.branch } else { best.branch }));
         }
         let (index, value) = fits.first().and_then(|s| self.outside(s))?;
         let joint = &self.machine.joints[index];
-        let limit = if joint.max.is_some_and(|m| value > m) {
-            joint.max
-        } else {
-            joint.min
-        };
-        let args = [
-            joint.name.clone(),
-            joint.show(value),
-            limit.map_or(String::new(), |l| joint.show(l)),
-        ];
+        let limit = if joint.max.is_some_and(|m| value > m) { joint.max } else { joint.min };
+        let args = [joint.name.clone(), joint.show(value), limit.map_or(String::new(), |l| joint.show(l))];
         self.fault(code::ROBOT_JOINT_LIMIT, source, &args);
         None
     }
@@ -466,10 +320,7 @@ impl Plan<'_> {
             if joint.kind == JointKind::Revolute {
                 let near = *value + TURN * libm::round((old - *value) / TURN);
                 let all = [near, near - TURN, near + TURN];
-                *value = all
-                    .into_iter()
-                    .find(|v| free && joint.allows(*v))
-                    .unwrap_or(near);
+                *value = all.into_iter().find(|v| free && joint.allows(*v)).unwrap_or(near);
             }
         }
         out
@@ -477,9 +328,7 @@ impl Plan<'_> {
 
     fn outside(&self, solution: &Solution) -> Option<(usize, f64)> {
         let mut pairs = self.machine.joints.iter().zip(&solution.joints).enumerate();
-        pairs
-            .find(|(_, (j, v))| !j.allows(**v))
-            .map(|(i, (_, v))| (i, *v))
+        pairs.find(|(_, (j, v))| !j.allows(**v)).map(|(i, (_, v))| (i, *v))
     }
 
     fn limit(&self, joint: usize, rapid: bool) -> Option<f64> {
@@ -493,10 +342,7 @@ impl Plan<'_> {
 
     /// The time a joint move takes: the slowest joint runs at its limit.
     fn calm_time(&self, change: &[f64]) -> f64 {
-        let times = change
-            .iter()
-            .enumerate()
-            .map(|(i, d)| d.abs() / self.limit(i, true).unwrap_or(CALM));
+        let times = change.iter().enumerate().map(|(i, d)| d.abs() / self.limit(i, true).unwrap_or(CALM));
         times.fold(0.0, f64::max)
     }
 
@@ -513,27 +359,15 @@ impl Plan<'_> {
         let joint = &self.machine.joints[i];
         let per_second = |v: f64| format!("{}/s", joint.show(v));
         let feed = libm::floor(aim.feed * limit / speed * 100.0) / 100.0;
-        let args = [
-            joint.name.clone(),
-            per_second(speed),
-            per_second(limit),
-            format!("{feed} mm/s"),
-        ];
+        let args = [joint.name.clone(), per_second(speed), per_second(limit), format!("{feed} mm/s")];
         self.fault(code::ROBOT_JOINT_SPEED, source, &args);
         false
     }
 
     fn unreachable(&mut self, error: &KinematicsError, pose: [f64; 6], source: Source) {
-        let at = format!(
-            "X {:.3} Y {:.3}, C {:.3}°",
-            pose[0],
-            pose[1],
-            pose[5].to_degrees()
-        );
+        let at = format!("X {:.3} Y {:.3}, C {:.3}°", pose[0], pose[1], pose[5].to_degrees());
         match error {
-            KinematicsError::Singular => {
-                self.fault(code::ROBOT_SINGULAR, source, &[format!("{at}; {error}")])
-            }
+            KinematicsError::Singular => self.fault(code::ROBOT_SINGULAR, source, &[format!("{at}; {error}")]),
             KinematicsError::OutOfPlane { word, value } => {
                 let value = if matches!(word, 'A' | 'B' | 'C') {
                     format!("{:.3}°", value.to_degrees())
@@ -542,11 +376,7 @@ impl Plan<'_> {
                 };
                 self.fault(code::ROBOT_OUT_OF_PLANE, source, &[word.to_string(), value]);
             }
-            _ => self.fault(
-                code::ROBOT_OUT_OF_REACH,
-                source,
-                &[format!("{at}; {error}")],
-            ),
+            _ => self.fault(code::ROBOT_OUT_OF_REACH, source, &[format!("{at}; {error}")]),
         }
     }
 }
@@ -570,12 +400,7 @@ fn turned(a: &[f64; 6], b: &[f64; 6]) -> f64 {
 /// The solution with the smallest greatest joint change.
 fn nearest<'s>(all: &'s [Solution], last: &[f64], kinds: &[JointKind]) -> Option<&'s Solution> {
     let far = |s: &Solution| {
-        let changes = s
-            .joints
-            .iter()
-            .zip(last)
-            .zip(kinds)
-            .map(|((a, b), k)| shown((a - b).abs(), *k));
+        let changes = s.joints.iter().zip(last).zip(kinds).map(|((a, b), k)| shown((a - b).abs(), *k));
         changes.fold(0.0, f64::max)
     };
     all.iter().min_by(|a, b| far(a).total_cmp(&far(b)))

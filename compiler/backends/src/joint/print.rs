@@ -20,14 +20,7 @@ impl JointProgram {
         let head = ["t", "X", "Y", "Z", "A", "B", "C"].map(String::from);
         self.csv(&head, |p| {
             let degrees = |v: f64| v.to_degrees();
-            vec![
-                p.pose[0],
-                p.pose[1],
-                p.pose[2],
-                degrees(p.pose[3]),
-                degrees(p.pose[4]),
-                degrees(p.pose[5]),
-            ]
+            vec![p.pose[0], p.pose[1], p.pose[2], degrees(p.pose[3]), degrees(p.pose[4]), degrees(p.pose[5])]
         })
     }
 
@@ -35,13 +28,7 @@ impl JointProgram {
     pub fn joint_csv(&self) -> String {
         let names = (1..=self.kinds.len()).map(|i| format!("J{i}"));
         let head: Vec<String> = std::iter::once("t".to_string()).chain(names).collect();
-        self.csv(&head, |p| {
-            p.joints
-                .iter()
-                .zip(&self.kinds)
-                .map(|(v, k)| shown(*v, *k))
-                .collect()
-        })
+        self.csv(&head, |p| p.joints.iter().zip(&self.kinds).map(|(v, k)| shown(*v, *k)).collect())
     }
 
     fn csv(&self, head: &[String], row: impl Fn(&super::JointPoint) -> Vec<f64>) -> String {
@@ -52,10 +39,7 @@ impl JointProgram {
         for point in &self.points {
             let time = self.trimmed(format!("{:.6}", point.time));
             let cells = row(point).into_iter().map(|v| self.number(v));
-            out += &std::iter::once(time)
-                .chain(cells)
-                .collect::<Vec<_>>()
-                .join(between);
+            out += &std::iter::once(time).chain(cells).collect::<Vec<_>>().join(between);
             out.push('\n');
         }
         out
@@ -75,16 +59,8 @@ impl JointProgram {
     }
 
     fn trimmed(&self, text: String) -> String {
-        let text = if text.contains('.') {
-            text.trim_end_matches('0').trim_end_matches('.')
-        } else {
-            &text
-        };
+        let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
         let text = if text == "-0" { "0" } else { text };
-        if self.options.comma {
-            text.replace('.', ",")
-        } else {
-            text.to_string()
-        }
+        if self.options.comma { text.replace('.', ",") } else { text.to_string() }
     }
 }

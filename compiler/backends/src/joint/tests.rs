@@ -11,20 +11,10 @@ fn arm() -> Machine {
 
 fn file(text: &str) -> File {
     let dialect = Dialect::find("ufmg2008").unwrap();
-    File::new(
-        "a.g",
-        vec![Chunk {
-            text: text.into(),
-            scan: Arc::new(scan(text, dialect)),
-        }],
-    )
+    File::new("a.g", vec![Chunk { text: text.into(), scan: Arc::new(scan(text, dialect)) }])
 }
 
-fn build(
-    text: &str,
-    machine: &Machine,
-    options: &Options,
-) -> Result<JointProgram, Vec<Diagnostic>> {
+fn build(text: &str, machine: &Machine, options: &Options) -> Result<JointProgram, Vec<Diagnostic>> {
     let file = file(text);
     let (commands, faults) = language::read(FileId(0), &file);
     if !faults.is_empty() {
@@ -34,9 +24,7 @@ fn build(
     if !faults.is_empty() {
         return Err(faults);
     }
-    compile(&program, machine, options, &|s| {
-        (s.file, file.line_span(s.line))
-    })
+    compile(&program, machine, options, &|s| (s.file, file.line_span(s.line)))
 }
 
 fn reference(text: &str) -> JointProgram {
@@ -44,21 +32,11 @@ fn reference(text: &str) -> JointProgram {
 }
 
 fn slugs(result: Result<JointProgram, Vec<Diagnostic>>) -> Vec<(&'static str, Span)> {
-    result
-        .expect_err("faulty")
-        .iter()
-        .map(|d| (d.code.def().slug, d.primary().1))
-        .collect()
+    result.expect_err("faulty").iter().map(|d| (d.code.def().slug, d.primary().1)).collect()
 }
 
 fn last_degrees(p: &JointProgram) -> Vec<f64> {
-    p.points
-        .last()
-        .unwrap()
-        .joints
-        .iter()
-        .map(|j| j.to_degrees())
-        .collect()
+    p.points.last().unwrap().joints.iter().map(|j| j.to_degrees()).collect()
 }
 
 const FIG_5_1: &str = include_str!("../../../../tests/golden/ufmg2008/fig5-1.g");
@@ -71,46 +49,24 @@ fn figure_5_4() {
     let made = reference(FIG_5_1);
     assert_eq!(made.gcode(), FIG_5_4);
     assert_eq!(made.points.len(), 21);
-    let rows: Vec<String> = TABLE
-        .lines()
-        .skip(1)
-        .map(|l| l.trim().to_string())
-        .collect();
+    let rows: Vec<String> = TABLE.lines().skip(1).map(|l| l.trim().to_string()).collect();
     let ours: Vec<String> = made
         .gcode()
         .lines()
-        .map(|l| {
-            l.split(' ')
-                .skip(1)
-                .map(|w| w[1..].replace(',', "."))
-                .collect::<Vec<_>>()
-                .join(",")
-        })
+        .map(|l| l.split(' ').skip(1).map(|w| w[1..].replace(',', ".")).collect::<Vec<_>>().join(","))
         .collect();
     assert_eq!(ours, rows);
 }
 
 #[test]
 fn figure_5_7() {
-    assert_eq!(
-        reference(&FIG_5_1.replacen("G01", "G00", 1)).gcode(),
-        FIG_5_7
-    );
+    assert_eq!(reference(&FIG_5_1.replacen("G01", "G00", 1)).gcode(), FIG_5_7);
 }
 
 #[test]
 fn joint_move_of_section_4_5_1() {
     let made = reference("G00 X50 Y50 C-60\n");
-    assert_eq!(
-        made.gcode()
-            .lines()
-            .nth(1)
-            .unwrap()
-            .rsplit_once(" F")
-            .unwrap()
-            .0,
-        "G01 X136,92 Y-93,84 Z-103,07"
-    );
+    assert_eq!(made.gcode().lines().nth(1).unwrap().rsplit_once(" F").unwrap().0, "G01 X136,92 Y-93,84 Z-103,07");
     assert_eq!(made.points.len(), 2);
 }
 
@@ -120,13 +76,7 @@ fn line_of_section_4_5_2() {
     assert_eq!(made.points.len() - 1, 29);
     let (a, b) = (&made.points[0].pose, &made.points[1].pose);
     let step: Vec<f64> = (0..6)
-        .map(|i| {
-            if i < 3 {
-                b[i] - a[i]
-            } else {
-                (b[i] - a[i]).to_degrees()
-            }
-        })
+        .map(|i| if i < 3 { b[i] - a[i] } else { (b[i] - a[i]).to_degrees() })
         .map(|v| (v * 100.0).trunc() / 100.0)
         .collect();
     assert_eq!(step, [-1.72, 1.72, 0.0, 0.0, 0.0, 1.03]);
@@ -153,53 +103,17 @@ fn the_two_arcs_of_figure_4_8() {
 #[test]
 fn changed_input_changes_as_predicted() {
     // 82.46 mm at 500 mm/s take 0.1649 s: 17 intervals of 10 ms; the quarter circle takes 0.3142 s: 32.
-    let options = Options {
-        interval: 0.010,
-        ..Options::ufmg2008()
-    };
+    let options = Options { interval: 0.010, ..Options::ufmg2008() };
     let made = build(FIG_5_1, &arm(), &options).unwrap();
     assert_eq!(made.points.len(), 1 + 17 + 32);
-    assert_eq!(
-        made.gcode()
-            .lines()
-            .last()
-            .unwrap()
-            .rsplit_once(" F")
-            .unwrap()
-            .0,
-        "G01 X127,05 Y-91,91 Z-45,13"
-    );
+    assert_eq!(made.gcode().lines().last().unwrap().rsplit_once(" F").unwrap().0, "G01 X127,05 Y-91,91 Z-45,13");
     // Half the feed: 13.2 and 25.1 intervals.
     let slow = reference(&FIG_5_1.replace("F500", "F250"));
     assert_eq!(slow.points.len(), 1 + 14 + 26);
     // Four decimals keep the two of the figure.
-    let fine = build(
-        FIG_5_1,
-        &arm(),
-        &Options {
-            decimals: 4,
-            ..Options::ufmg2008()
-        },
-    )
-    .unwrap();
-    assert!(
-        fine.gcode()
-            .lines()
-            .nth(1)
-            .unwrap()
-            .starts_with("G01 X97,96")
-    );
-    assert_eq!(
-        fine.gcode()
-            .lines()
-            .nth(1)
-            .unwrap()
-            .split(' ')
-            .nth(1)
-            .unwrap()
-            .len(),
-        "X97,9657".len()
-    );
+    let fine = build(FIG_5_1, &arm(), &Options { decimals: 4, ..Options::ufmg2008() }).unwrap();
+    assert!(fine.gcode().lines().nth(1).unwrap().starts_with("G01 X97,96"));
+    assert_eq!(fine.gcode().lines().nth(1).unwrap().split(' ').nth(1).unwrap().len(), "X97,9657".len());
 }
 
 #[test]
@@ -208,17 +122,12 @@ fn output_reads_back() {
     let (commands, faults) = language::read(FileId(0), &file(&text));
     assert_eq!(faults, []);
     assert_eq!(commands.len(), 21);
-    assert_eq!(
-        commands[1].target[..3],
-        [Some(97.96), Some(-95.78), Some(-90.74)]
-    );
+    assert_eq!(commands[1].target[..3], [Some(97.96), Some(-95.78), Some(-90.74)]);
 }
 
 #[test]
 fn a_limit_stops_the_build_at_its_line() {
-    let text = gr_machine::source("ufmg/plano-3r")
-        .unwrap()
-        .replace("word = \"X\"", "word = \"X\"\nmax = 140");
+    let text = gr_machine::source("ufmg/plano-3r").unwrap().replace("word = \"X\"", "word = \"X\"\nmax = 140");
     let machine = gr_machine::parse(FileId(0), &text).unwrap();
     // The shoulder passes 140° in the line (142.38° at its end), so line 1 is to blame, and the arc starts above it.
     let found = slugs(build(FIG_5_1, &machine, &Options::default()));
@@ -230,27 +139,17 @@ fn a_limit_stops_the_build_at_its_line() {
 
 #[test]
 fn joint_speed_is_checked() {
-    let fast = Options {
-        joint_speed: Some(2.0),
-        ..Options::default()
-    };
+    let fast = Options { joint_speed: Some(2.0), ..Options::default() };
     let found = build(FIG_5_1, &arm(), &fast).expect_err("too fast");
     assert_eq!(found[0].code.def().slug, "robot/joint-speed");
-    assert!(
-        found[0].message.contains("114.5916°/s"),
-        "{}",
-        found[0].message
-    );
+    assert!(found[0].message.contains("114.5916°/s"), "{}", found[0].message);
     // The feed it proposes is one that works.
     assert!(build(&FIG_5_1.replace("F500", "F90"), &arm(), &fast).is_ok());
 }
 
 #[test]
 fn our_own_mode_keeps_the_feed() {
-    let options = Options {
-        joint_speed: Some(1.0),
-        ..Options::default()
-    };
+    let options = Options { joint_speed: Some(1.0), ..Options::default() };
     let made = build("G00 X50 Y50 C-60\n", &arm(), &options).unwrap();
     // The shoulder turns furthest, 46.92°, at 1 rad/s.
     let p = &made.points[1];
@@ -269,27 +168,17 @@ fn our_own_mode_keeps_the_feed() {
 
 #[test]
 fn long_arcs_and_full_circles() {
-    let circle = build(
-        "G01 X100 Y100 C0 F200\nG03 X100 Y100 I80 J100 K0\n",
-        &arm(),
-        &Options::default(),
-    )
-    .unwrap();
+    let circle = build("G01 X100 Y100 C0 F200\nG03 X100 Y100 I80 J100 K0\n", &arm(), &Options::default()).unwrap();
     let way = (100.0) + 40.0 * std::f64::consts::PI;
     assert!((circle.points.last().unwrap().time - way / 200.0).abs() < 1e-9);
-    let left = circle
-        .points
-        .iter()
-        .map(|p| p.pose[0])
-        .fold(f64::MAX, f64::min);
+    let left = circle.points.iter().map(|p| p.pose[0]).fold(f64::MAX, f64::min);
     assert!((left - 60.0).abs() < 0.2, "{left}");
 }
 
 #[test]
 fn rows_of_the_registry() {
-    let options = |row: &gr_spec::DiagnosticDef| {
-        row.options == Some("build --target joint-gcode --machine ufmg/plano-3r")
-    };
+    let options =
+        |row: &gr_spec::DiagnosticDef| row.options == Some("build --target joint-gcode --machine ufmg/plano-3r");
     let rows = gr_spec::Code::all().map(gr_spec::Code::def);
     let mut tried = 0;
     for row in rows.filter(|r| options(r) || matches!(r.slug, "ufmg/no-feed" | "ufmg/arc-plane")) {
@@ -302,18 +191,11 @@ fn rows_of_the_registry() {
             let file = file(row.bad.unwrap());
             let (commands, _) = language::read(FileId(0), &file);
             let faults = ufmg::lower(FileId(0), "", &commands, &arm()).1;
-            assert_eq!(
-                faults.iter().map(|d| d.code.def().code).collect::<Vec<_>>(),
-                [row.code]
-            );
+            assert_eq!(faults.iter().map(|d| d.code.def().code).collect::<Vec<_>>(), [row.code]);
             continue;
         }
         assert_eq!(found, [row.code]);
-        assert!(
-            build(row.good.unwrap(), &arm(), &Options::default()).is_ok(),
-            "{}",
-            row.code
-        );
+        assert!(build(row.good.unwrap(), &arm(), &Options::default()).is_ok(), "{}", row.code);
         tried += 1;
     }
     assert_eq!(tried, 4);

@@ -6,22 +6,12 @@ use gr_machine::Machine;
 use gr_text::{Diagnostic, FileId, code};
 
 /// Lowers a program that begins at the machine's start pose.
-pub fn lower(
-    file: FileId,
-    name: &str,
-    commands: &[Command],
-    machine: &Machine,
-) -> (Program, Vec<Diagnostic>) {
+pub fn lower(file: FileId, name: &str, commands: &[Command], machine: &Machine) -> (Program, Vec<Diagnostic>) {
     let mut axes = [0.0; 9];
     axes[..6].copy_from_slice(&machine.start.coordinates());
     let mut out = Builder::from_state(Pose::at(axes), State::default());
     out.file(file, name);
-    let mut lower = Lower {
-        out,
-        file,
-        feed: None,
-        faults: Vec::new(),
-    };
+    let mut lower = Lower { out, file, feed: None, faults: Vec::new() };
     for command in commands {
         lower.command(command);
     }
@@ -40,16 +30,11 @@ struct Lower {
 
 impl Lower {
     fn fault(&mut self, code: gr_text::Code, command: &Command, args: &[String]) {
-        self.faults
-            .push(Diagnostic::new(code, self.file, command.span, args));
+        self.faults.push(Diagnostic::new(code, self.file, command.span, args));
     }
 
     fn command(&mut self, c: &Command) {
-        let source = Source {
-            file: self.file,
-            line: c.line,
-            ..Source::default()
-        };
+        let source = Source { file: self.file, line: c.line, ..Source::default() };
         if let Some(f) = c.feed {
             self.feed(f, source);
         }
@@ -70,21 +55,9 @@ impl Lower {
     fn feed(&mut self, f: f64, source: Source) {
         if self.feed != Some(f) {
             if self.feed.is_none() {
-                self.out.push(
-                    Op::FeedMode {
-                        spindle: 0,
-                        mode: FeedMode::PerTime,
-                    },
-                    source,
-                );
+                self.out.push(Op::FeedMode { spindle: 0, mode: FeedMode::PerTime }, source);
             }
-            self.out.push(
-                Op::Feed {
-                    linear: f,
-                    angular: f.to_radians(),
-                },
-                source,
-            );
+            self.out.push(Op::Feed { linear: f, angular: f.to_radians() }, source);
         }
         self.feed = Some(f);
     }
@@ -116,20 +89,12 @@ impl Lower {
         let (from, to) = (spoke(start), spoke(end.xyz()));
         let (r0, r1) = (length(from), length(to));
         if r0 == 0.0 || (r0 - r1).abs() > RADIUS_TOLERANCE {
-            self.fault(
-                code::ARC_RADIUS_MISMATCH,
-                c,
-                &[format!("{r0:.4}"), format!("{r1:.4}")],
-            );
+            self.fault(code::ARC_RADIUS_MISMATCH, c, &[format!("{r0:.4}"), format!("{r1:.4}")]);
             return;
         }
         match plane(start, end.xyz(), c.center, from, to) {
             Some(plane) => {
-                let arc = Arc {
-                    plane,
-                    center: c.center,
-                    turns,
-                };
+                let arc = Arc { plane, center: c.center, turns };
                 self.out.push_to(Op::Arc(arc), end, source);
             }
             None => {
@@ -148,35 +113,18 @@ fn length(v: [f64; 3]) -> f64 {
 /// The plane of an arc. The thesis takes the normal from start × end and so loses the sense of rotation; here
 /// clockwise is seen from the side to which the normal's greatest-ranking component (Z, then Y, then X) points,
 /// which for the three main planes is the rule of every control.
-fn plane(
-    start: [f64; 3],
-    end: [f64; 3],
-    center: [f64; 3],
-    from: [f64; 3],
-    to: [f64; 3],
-) -> Option<ArcPlane> {
+fn plane(start: [f64; 3], end: [f64; 3], center: [f64; 3], from: [f64; 3], to: [f64; 3]) -> Option<ArcPlane> {
     for (axis, plane) in [(2, Plane::Xy), (1, Plane::Xz), (0, Plane::Yz)] {
         if start[axis] == end[axis] && start[axis] == center[axis] {
             return Some(ArcPlane::Work(plane));
         }
     }
-    let n = [
-        from[1] * to[2] - from[2] * to[1],
-        from[2] * to[0] - from[0] * to[2],
-        from[0] * to[1] - from[1] * to[0],
-    ];
+    let n = [from[1] * to[2] - from[2] * to[1], from[2] * to[0] - from[0] * to[2], from[0] * to[1] - from[1] * to[0]];
     let size = length(n);
     if size <= 1e-9 * length(from) * length(to) {
         return None;
     }
     let n = n.map(|v| v / size);
-    let leading = [2, 1, 0]
-        .into_iter()
-        .map(|i| n[i])
-        .find(|v| v.abs() > 1e-9)?;
-    Some(ArcPlane::Free(if leading < 0.0 {
-        n.map(|v| -v)
-    } else {
-        n
-    }))
+    let leading = [2, 1, 0].into_iter().map(|i| n[i]).find(|v| v.abs() > 1e-9)?;
+    Some(ArcPlane::Free(if leading < 0.0 { n.map(|v| -v) } else { n }))
 }

@@ -51,22 +51,12 @@ impl Projection {
             Show::Top => Projection::along(0, 1, "top"),
             Show::Front => Projection::along(0, 2, "front"),
             Show::Right => Projection::along(1, 2, "right"),
-            _ => Projection {
-                right: [s, s, 0.0],
-                up: [-t, t, 2.0 * t],
-                name: "isometric",
-                axes: None,
-            },
+            _ => Projection { right: [s, s, 0.0], up: [-t, t, 2.0 * t], name: "isometric", axes: None },
         }
     }
     fn along(right: usize, up: usize, name: &'static str) -> Projection {
         let unit = |i: usize| std::array::from_fn(|k| if k == i { 1.0 } else { 0.0 });
-        Projection {
-            right: unit(right),
-            up: unit(up),
-            name,
-            axes: Some((right, up)),
-        }
+        Projection { right: unit(right), up: unit(up), name, axes: Some((right, up)) }
     }
     fn project(&self, p: [f64; 3]) -> [f64; 2] {
         let dot = |a: [f64; 3]| a[0] * p[0] + a[1] * p[1] + a[2] * p[2];
@@ -88,33 +78,17 @@ struct Panel {
 impl Panel {
     fn fit(rect: [f32; 4], low: [f64; 2], high: [f64; 2]) -> Panel {
         let [left, top, right, bottom] = rect;
-        let room = [
-            f64::from(right - left).max(10.0),
-            f64::from(bottom - top).max(10.0),
-        ];
+        let room = [f64::from(right - left).max(10.0), f64::from(bottom - top).max(10.0)];
         let size = [high[0] - low[0], high[1] - low[1]];
         let largest = size[0].max(size[1]).max(1e-6);
-        let scale = (0..2)
-            .map(|i| room[i] / size[i].max(largest * 1e-3))
-            .fold(f64::INFINITY, f64::min)
-            * 0.94;
+        let scale = (0..2).map(|i| room[i] / size[i].max(largest * 1e-3)).fold(f64::INFINITY, f64::min) * 0.94;
         let middle = [(low[0] + high[0]) / 2.0, (low[1] + high[1]) / 2.0];
-        Panel {
-            left,
-            top,
-            right,
-            bottom,
-            scale,
-            middle,
-        }
+        Panel { left, top, right, bottom, scale, middle }
     }
     fn place(&self, p: [f64; 2]) -> [f32; 2] {
         let x = (p[0] - self.middle[0]) * self.scale;
         let y = (p[1] - self.middle[1]) * self.scale;
-        [
-            (self.left + self.right) / 2.0 + x as f32,
-            (self.top + self.bottom) / 2.0 - y as f32,
-        ]
+        [(self.left + self.right) / 2.0 + x as f32, (self.top + self.bottom) / 2.0 - y as f32]
     }
 }
 
@@ -126,23 +100,8 @@ pub fn draw(path: &Path, options: &Options, canvas: &mut dyn Canvas) {
         let split = (w * 0.54).round();
         let half = ((top + bottom) / 2.0).round();
         view(path, Show::Isometric, [8.0, top, split, bottom], canvas);
-        view(
-            path,
-            Show::Top,
-            [split + 10.0, top, w - 10.0, half + (bottom - half) * 0.2],
-            canvas,
-        );
-        view(
-            path,
-            Show::Front,
-            [
-                split + 10.0,
-                half + (bottom - half) * 0.2 + 8.0,
-                w - 10.0,
-                bottom,
-            ],
-            canvas,
-        );
+        view(path, Show::Top, [split + 10.0, top, w - 10.0, half + (bottom - half) * 0.2], canvas);
+        view(path, Show::Front, [split + 10.0, half + (bottom - half) * 0.2 + 8.0, w - 10.0, bottom], canvas);
     } else {
         view(path, options.show, [8.0, top, w - 10.0, bottom], canvas);
     }
@@ -153,22 +112,11 @@ fn heading(path: &Path, options: &Options, canvas: &mut dyn Canvas, width: f32) 
     canvas.text(&options.title, [14.0, 26.0], 17.0, Anchor::Start, TEXT);
     let size = path.extent.size();
     let seconds = path.totals.ns() / 1_000_000_000;
-    let time = format!(
-        "{}:{:02}:{:02}",
-        seconds / 3600,
-        seconds / 60 % 60,
-        seconds % 60
-    );
+    let time = format!("{}:{:02}:{:02}", seconds / 3600, seconds / 60 % 60, seconds % 60);
     let text = if path.is_empty() {
         "no motion".to_owned()
     } else {
-        format!(
-            "{} × {} × {} mm   {} moves   {time} h",
-            mm(size[0]),
-            mm(size[1]),
-            mm(size[2]),
-            path.totals.moves
-        )
+        format!("{} × {} × {} mm   {} moves   {time} h", mm(size[0]), mm(size[1]), mm(size[2]), path.totals.moves)
     };
     canvas.text(&text, [14.0, 46.0], 12.0, Anchor::Start, TEXT);
     canvas.line([0.0, 55.0], [width, 55.0], 1.0, GRID);
@@ -196,13 +144,7 @@ fn view(path: &Path, show: Show, rect: [f32; 4], canvas: &mut dyn Canvas) {
     let projection = Projection::of(show);
     let [left, top, right, bottom] = rect;
     let indent = if projection.axes.is_some() { 66.0 } else { 6.0 };
-    canvas.text(
-        projection.name,
-        [left + indent, top + 14.0],
-        12.0,
-        Anchor::Start,
-        FRAME,
-    );
+    canvas.text(projection.name, [left + indent, top + 14.0], 12.0, Anchor::Start, FRAME);
     if path.is_empty() || path.extent.is_empty() {
         return;
     }
@@ -223,19 +165,10 @@ fn view(path: &Path, show: Show, rect: [f32; 4], canvas: &mut dyn Canvas) {
     scale_bar(
         &panel,
         right - 14.0,
-        if projection.axes.is_some() {
-            panel.bottom - 10.0
-        } else {
-            bottom - 10.0
-        },
+        if projection.axes.is_some() { panel.bottom - 10.0 } else { bottom - 10.0 },
         canvas,
     );
-    canvas.clip(
-        panel.left - 20.0,
-        panel.top - 12.0,
-        panel.right + 20.0,
-        panel.bottom + 20.0,
-    );
+    canvas.clip(panel.left - 20.0, panel.top - 12.0, panel.right + 20.0, panel.bottom + 20.0);
     for (class, points) in path.runs() {
         thinned(class, points, &projection, &panel, canvas);
     }
@@ -262,19 +195,12 @@ fn corners(path: &Path) -> impl Iterator<Item = [f64; 3]> {
 }
 
 /// Draws a run without the points that lie in the same spot of the picture.
-fn thinned(
-    class: Class,
-    points: &[[f32; 3]],
-    projection: &Projection,
-    panel: &Panel,
-    canvas: &mut dyn Canvas,
-) {
+fn thinned(class: Class, points: &[[f32; 3]], projection: &Projection, panel: &Panel, canvas: &mut dyn Canvas) {
     let mut last: Option<[f32; 2]> = None;
     let least = canvas.detail();
     let end = points.len().saturating_sub(1);
     let mut kept = points.iter().enumerate().filter_map(|(i, p)| {
-        let p =
-            panel.place(projection.project([f64::from(p[0]), f64::from(p[1]), f64::from(p[2])]));
+        let p = panel.place(projection.project([f64::from(p[0]), f64::from(p[1]), f64::from(p[2])]));
         let near = last.is_some_and(|q| (p[0] - q[0]).abs() < least && (p[1] - q[1]).abs() < least);
         if near && i != end {
             return None;
@@ -291,19 +217,12 @@ fn step(least: f64) -> f64 {
         return 1.0;
     }
     let power = libm::pow(10.0, libm::floor(libm::log10(least)));
-    [1.0, 2.0, 5.0, 10.0]
-        .into_iter()
-        .map(|f| f * power)
-        .find(|s| *s >= least * 0.999)
-        .unwrap_or(power * 10.0)
+    [1.0, 2.0, 5.0, 10.0].into_iter().map(|f| f * power).find(|s| *s >= least * 0.999).unwrap_or(power * 10.0)
 }
 
 /// Multiples of `step` in a range, as numbers and texts.
 fn marks(low: f64, high: f64, step: f64) -> Vec<(f64, String)> {
-    let (first, last) = (
-        libm::ceil(low / step - 1e-9),
-        libm::floor(high / step + 1e-9),
-    );
+    let (first, last) = (libm::ceil(low / step - 1e-9), libm::floor(high / step + 1e-9));
     let count = (last - first).clamp(-1.0, 200.0) as i64;
     let decimals = (-libm::floor(libm::log10(step))).clamp(0.0, 9.0) as usize;
     (0..=count)
@@ -317,18 +236,8 @@ fn marks(low: f64, high: f64, step: f64) -> Vec<(f64, String)> {
 
 /// A frame with a grid and numbers along the left and the lower side.
 fn ruled_frame(panel: &Panel, (across, up): (usize, usize), canvas: &mut dyn Canvas) {
-    let Panel {
-        left,
-        top,
-        right,
-        bottom,
-        scale,
-        middle,
-    } = *panel;
-    let half = [
-        f64::from(right - left) / 2.0 / scale,
-        f64::from(bottom - top) / 2.0 / scale,
-    ];
+    let Panel { left, top, right, bottom, scale, middle } = *panel;
+    let half = [f64::from(right - left) / 2.0 / scale, f64::from(bottom - top) / 2.0 / scale];
     for (v, text) in marks(middle[0] - half[0], middle[0] + half[0], step(64.0 / scale)) {
         let x = panel.place([v, middle[1]])[0];
         canvas.line([x, top], [x, bottom], 1.0, GRID);
@@ -345,56 +254,26 @@ fn ruled_frame(panel: &Panel, (across, up): (usize, usize), canvas: &mut dyn Can
     for i in 0..4 {
         canvas.line(corners[i], corners[(i + 1) % 4], 1.0, FRAME);
     }
-    canvas.text(
-        NAMES[across],
-        [right - 4.0, bottom + 31.0],
-        13.0,
-        Anchor::End,
-        AXES[across],
-    );
-    canvas.text(
-        NAMES[up],
-        [left - 8.0, top - 5.0],
-        13.0,
-        Anchor::End,
-        AXES[up],
-    );
+    canvas.text(NAMES[across], [right - 4.0, bottom + 31.0], 13.0, Anchor::End, AXES[across]);
+    canvas.text(NAMES[up], [left - 8.0, top - 5.0], 13.0, Anchor::End, AXES[up]);
 }
 
 /// The box around the path with numbers along three edges.
 fn box_with_numbers(path: &Path, projection: &Projection, panel: &Panel, canvas: &mut dyn Canvas) {
     let e = path.extent;
     let place = |p: [f64; 3]| panel.place(projection.project(p));
-    let corner = |n: usize| -> [f64; 3] {
-        std::array::from_fn(|i| if n >> i & 1 == 0 { e.min[i] } else { e.max[i] })
-    };
+    let corner = |n: usize| -> [f64; 3] { std::array::from_fn(|i| if n >> i & 1 == 0 { e.min[i] } else { e.max[i] }) };
     for n in 0..8usize {
         for axis in (0..3).filter(|axis| n >> axis & 1 == 0) {
-            canvas.line(
-                place(corner(n)),
-                place(corner(n | 1 << axis)),
-                1.0,
-                Ink([205, 209, 216]),
-            );
+            canvas.line(place(corner(n)), place(corner(n | 1 << axis)), 1.0, Ink([205, 209, 216]));
         }
     }
     // Lower front edge for X, lower right edge for Y, left edge for Z.
-    let edges = [
-        (0, [e.min[0], e.min[1], e.min[2]], [0.0, 1.0]),
-        (1, [e.max[0], e.min[1], e.min[2]], [1.0, 1.0]),
-    ];
+    let edges = [(0, [e.min[0], e.min[1], e.min[2]], [0.0, 1.0]), (1, [e.max[0], e.min[1], e.min[2]], [1.0, 1.0])];
     for (axis, from, away) in edges {
         numbers(axis, from, e.max[axis], away, &place, panel, canvas);
     }
-    numbers(
-        2,
-        [e.min[0], e.min[1], e.min[2]],
-        e.max[2],
-        [-1.0, 0.0],
-        &place,
-        panel,
-        canvas,
-    );
+    numbers(2, [e.min[0], e.min[1], e.min[2]], e.max[2], [-1.0, 0.0], &place, panel, canvas);
 }
 
 fn numbers(
@@ -421,10 +300,7 @@ fn numbers(
         } else {
             Anchor::End
         };
-        let at = [
-            x + away[0] * 8.0 - if axis == 0 { 4.0 } else { 0.0 },
-            y + away[1] * 13.0 + 4.0 * (1.0 - away[1]),
-        ];
+        let at = [x + away[0] * 8.0 - if axis == 0 { 4.0 } else { 0.0 }, y + away[1] * 13.0 + 4.0 * (1.0 - away[1])];
         canvas.text(&text, at, 11.0, anchor, AXES[axis]);
     }
 }
@@ -450,13 +326,7 @@ fn scale_bar(panel: &Panel, right: f32, y: f32, canvas: &mut dyn Canvas) {
         canvas.line([x, y - 4.0], [x, y + 4.0], 1.5, TEXT);
     }
     let text = format!("{} mm", mm(length));
-    canvas.text(
-        &text,
-        [(left + right) / 2.0, y - 7.0],
-        11.0,
-        Anchor::Middle,
-        TEXT,
-    );
+    canvas.text(&text, [(left + right) / 2.0, y - 7.0], 11.0, Anchor::Middle, TEXT);
 }
 
 /// A small cross at the work zero, where it is in view.

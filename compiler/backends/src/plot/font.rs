@@ -125,9 +125,7 @@ mod tests {
             for part in super::strokes(c).split(' ') {
                 for pair in part.as_bytes().chunks(2) {
                     assert!(
-                        pair.len() == 2
-                            && (b'0'..=b'4').contains(&pair[0])
-                            && (b'.'..=b'6').contains(&pair[1]),
+                        pair.len() == 2 && (b'0'..=b'4').contains(&pair[0]) && (b'.'..=b'6').contains(&pair[1]),
                         "{c}"
                     );
                 }

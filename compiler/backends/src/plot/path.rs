@@ -78,11 +78,7 @@ fn offsets(state: &State) -> ([f64; 9], [f64; 9], f64) {
 
 impl Common {
     fn new() -> Common {
-        Common {
-            first: None,
-            here: State::default(),
-            same: true,
-        }
+        Common { first: None, here: State::default(), same: true }
     }
     fn enter(&mut self, state: &State) {
         let mut state = *state;
@@ -105,12 +101,8 @@ impl Common {
 impl Path {
     /// Takes the points of a program.
     pub fn new(program: &Program, rapids: bool) -> Path {
-        let mut path = Path {
-            runs: Vec::new(),
-            points: Vec::new(),
-            extent: Extent::default(),
-            totals: Totals::default(),
-        };
+        let mut path =
+            Path { runs: Vec::new(), points: Vec::new(), extent: Extent::default(), totals: Totals::default() };
         let tolerance = rough_size(program) / 4000.0;
         let mut common = Common::new();
         let (mut fresh, mut known) = (true, Known::default());
@@ -135,28 +127,15 @@ impl Path {
         path
     }
 
-    fn add(
-        &mut self,
-        view: &View<'_, '_>,
-        from: &Pose,
-        class: Class,
-        common: &Common,
-        tolerance: f64,
-    ) {
+    fn add(&mut self, view: &View<'_, '_>, from: &Pose, class: Class, common: &Common, tolerance: f64) {
         let start = common.place(&from.axes);
-        let joined = self.runs.last().is_some_and(|r| r.0 == class)
-            && self.points.last() == Some(&single(start));
+        let joined = self.runs.last().is_some_and(|r| r.0 == class) && self.points.last() == Some(&single(start));
         if !joined {
-            self.runs
-                .push((class, u32::try_from(self.points.len()).unwrap_or(u32::MAX)));
+            self.runs.push((class, u32::try_from(self.points.len()).unwrap_or(u32::MAX)));
             self.points.push(single(start));
             self.extent.add(start);
         }
-        let op = if self.points.len() < MOST_POINTS {
-            view.op
-        } else {
-            Op::Linear
-        };
+        let op = if self.points.len() < MOST_POINTS { view.op } else { Op::Linear };
         flatten(&op, from, view.end, tolerance, |p| {
             let p = common.place(p);
             self.extent.add(p);
@@ -167,14 +146,8 @@ impl Path {
     /// Runs with their points.
     pub fn runs(&self) -> impl Iterator<Item = (Class, &[[f32; 3]])> {
         self.runs.iter().enumerate().map(|(i, (class, start))| {
-            let end = self
-                .runs
-                .get(i + 1)
-                .map_or(self.points.len(), |r| r.1 as usize);
-            (
-                *class,
-                self.points.get(*start as usize..end).unwrap_or_default(),
-            )
+            let end = self.runs.get(i + 1).map_or(self.points.len(), |r| r.1 as usize);
+            (*class, self.points.get(*start as usize..end).unwrap_or_default())
         })
     }
 
@@ -189,10 +162,7 @@ fn single(p: [f64; 3]) -> [f32; 3] {
 }
 
 fn moves_frame(op: &Op<'_>) -> bool {
-    matches!(
-        op,
-        Op::WorkOffset(..) | Op::LocalOffset(_) | Op::Rotation(_)
-    )
+    matches!(op, Op::WorkOffset(..) | Op::LocalOffset(_) | Op::Rotation(_))
 }
 
 /// Largest side of the box around the ends of all moves: what curves are thinned by.
@@ -207,9 +177,5 @@ fn rough_size(program: &Program) -> f64 {
         }
     }
     let size = extent.size().into_iter().fold(0.0, f64::max);
-    if size.is_finite() {
-        size.max(1e-3)
-    } else {
-        1.0
-    }
+    if size.is_finite() { size.max(1e-3) } else { 1.0 }
 }

@@ -85,14 +85,7 @@ impl Svg {
             let _ = writeln!(body, "<title>{}</title>", escape(title));
         }
         body.push_str("<rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\n");
-        Svg {
-            width,
-            height,
-            body,
-            seen: HashSet::default(),
-            paths: Default::default(),
-            clips: 0,
-        }
+        Svg { width, height, body, seen: HashSet::default(), paths: Default::default(), clips: 0 }
     }
 
     pub fn finish(self) -> String {
@@ -109,10 +102,7 @@ impl Svg {
         // Pixels of a picture of at most 8192: 14 bits and one to spare each.
         let cell = |v: f32| (v.round() as i32).clamp(0, 0x7fff) as u64;
         let (a, b) = (cell(q[0]) << 15 | cell(q[1]), cell(p[0]) << 15 | cell(p[1]));
-        if !self
-            .seen
-            .insert((class as u64) << 60 | a.min(b) << 30 | a.max(b))
-        {
+        if !self.seen.insert((class as u64) << 60 | a.min(b) << 30 | a.max(b)) {
             return false;
         }
         let out = &mut self.paths[class as usize];

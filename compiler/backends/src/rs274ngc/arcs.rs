@@ -40,11 +40,7 @@ impl Emitter<'_> {
         let parts = self.parts(&sweep, arc.turns);
         for k in 0..parts {
             let (from, to) = (k as f64 / parts as f64, (k + 1) as f64 / parts as f64);
-            let turns = if parts == 1 {
-                arc.turns
-            } else {
-                arc.turns.signum()
-            };
+            let turns = if parts == 1 { arc.turns } else { arc.turns.signum() };
             self.part(view, &sweep, plane, (from, to), turns, 0);
         }
     }
@@ -67,9 +63,7 @@ impl Emitter<'_> {
     fn arc_as_lines(&mut self, view: &View<'_, '_>, sweep: &Sweep, from: f64, to: f64) {
         let pieces = sweep.shape.pieces(self.options.arc_tolerance) as f64 * (to - from);
         let pieces = libm::ceil(pieces).max(1.0) as usize;
-        self.lines(pieces, view.state, view.source, &|share| {
-            sweep.at(from + (to - from) * share)
-        });
+        self.lines(pieces, view.state, view.source, &|share| sweep.at(from + (to - from) * share));
     }
 
     fn part(
@@ -82,23 +76,14 @@ impl Emitter<'_> {
         depth: u32,
     ) {
         let (start, end) = (sweep.at(from), sweep.at(to));
-        let meant = Meant {
-            sweep,
-            from,
-            to,
-            turns,
-            plane,
-        };
+        let meant = Meant { sweep, from, to, turns, plane };
         let found = match self.may_vanish(&meant, &end) {
             true => None,
             false => (0..=4).find_map(|extra| self.candidate(&meant, &end, extra, view.state)),
         };
         if let Some(c) = found {
             if c.extra > 0 {
-                let args = [
-                    (self.w.places + c.extra).to_string(),
-                    self.w.places.to_string(),
-                ];
+                let args = [(self.w.places + c.extra).to_string(), self.w.places.to_string()];
                 self.say(code::EMIT_ARC_DECIMALS, view.source, &args);
             }
             return self.write(view, &start, &end, plane, turns, &c);
@@ -109,14 +94,7 @@ impl Emitter<'_> {
             let parts = libm::ceil(angle / 2.5).clamp(2.0, 100_000.0);
             for k in 0..parts as usize {
                 let at = |k: usize| from + (to - from) * (k as f64 / parts);
-                self.part(
-                    view,
-                    sweep,
-                    plane,
-                    (at(k), at(k + 1)),
-                    turns.signum(),
-                    depth + 1,
-                );
+                self.part(view, sweep, plane, (at(k), at(k + 1)), turns.signum(), depth + 1);
             }
         } else {
             self.arc_as_lines(view, sweep, from, to);
@@ -128,22 +106,13 @@ impl Emitter<'_> {
     fn may_vanish(&self, meant: &Meant<'_>, end: &Pose) -> bool {
         let (f, s, _) = plane_axes(meant.plane);
         let said = [f, s].map(|i| self.w.axis(i, end.axes[i]).1);
-        let same = [f, s]
-            .into_iter()
-            .zip(said)
-            .all(|(i, v)| self.anchored[i] && self.at[i] == v);
+        let same = [f, s].into_iter().zip(said).all(|(i, v)| self.anchored[i] && self.at[i] == v);
         let gap = libm::hypot(said[0] - self.at[f], said[1] - self.at[s]);
         !same && gap < 20.0 * self.w.step() && meant.angle().abs() > 3.0
     }
 
     /// The arc written with `extra` more decimals in its centre or radius, if it reads back right.
-    fn candidate(
-        &self,
-        meant: &Meant<'_>,
-        end: &Pose,
-        extra: usize,
-        state: &State,
-    ) -> Option<Candidate> {
+    fn candidate(&self, meant: &Meant<'_>, end: &Pose, extra: usize, state: &State) -> Option<Candidate> {
         let (f, s, t) = plane_axes(meant.plane);
         let mut said_end = end.axes;
         for (i, v) in said_end.iter_mut().enumerate() {
@@ -152,44 +121,23 @@ impl Emitter<'_> {
         let center = meant.sweep.shape.center;
         let ways: [[f64; 2]; 2] = [
             [center[f], center[s]],
-            even_center(
-                [self.at[f], self.at[s]],
-                [said_end[f], said_end[s]],
-                [center[f], center[s]],
-            ),
+            even_center([self.at[f], self.at[s]], [said_end[f], said_end[s]], [center[f], center[s]]),
         ];
         ways.into_iter().find_map(|c| {
             let places = self.w.places + extra;
             let (words, said) = match self.options.arcs {
-                Arcs::R => self.radius_word(
-                    [self.at[f], self.at[s]],
-                    [said_end[f], said_end[s]],
-                    c,
-                    meant,
-                    places,
-                )?,
+                Arcs::R => self.radius_word([self.at[f], self.at[s]], [said_end[f], said_end[s]], c, meant, places)?,
                 _ => self.center_words((f, s), c, places),
             };
             let mut center = [0.0; 3];
             (center[f], center[s], center[t]) = (said[0], said[1], self.at[t]);
-            let candidate = Candidate {
-                words,
-                end: said_end,
-                center,
-                extra,
-            };
-            self.reads_back(meant, &candidate, state)
-                .then_some(candidate)
+            let candidate = Candidate { words, end: said_end, center, extra };
+            self.reads_back(meant, &candidate, state).then_some(candidate)
         })
     }
 
     /// I J K, and the centre they say.
-    fn center_words(
-        &self,
-        (f, s): (usize, usize),
-        center: [f64; 2],
-        places: usize,
-    ) -> (Vec<String>, [f64; 2]) {
+    fn center_words(&self, (f, s): (usize, usize), center: [f64; 2], places: usize) -> (Vec<String>, [f64; 2]) {
         let absolute = self.options.arcs == Arcs::IjkAbsolute;
         let mut said = [0.0; 2];
         let mut words = Vec::with_capacity(2);
@@ -225,29 +173,19 @@ impl Emitter<'_> {
         let height = libm::sqrt(square) / chord;
         // Left of the chord for the short way round counter-clockwise.
         let side = if (meant.turns > 0) != long { 1.0 } else { -1.0 };
-        let c = [
-            from[0] + 0.5 * dx - side * height * dy,
-            from[1] + 0.5 * dy + side * height * dx,
-        ];
+        let c = [from[0] + 0.5 * dx - side * height * dy, from[1] + 0.5 * dy + side * height * dx];
         Some((vec![format!("R{text}")], c))
     }
 
     /// Whether a control that reads the numbers goes where it should.
     fn reads_back(&self, meant: &Meant<'_>, c: &Candidate, _state: &State) -> bool {
-        let arc = Arc {
-            plane: ArcPlane::Work(meant.plane),
-            center: c.center,
-            turns: meant.turns,
-        };
+        let arc = Arc { plane: ArcPlane::Work(meant.plane), center: c.center, turns: meant.turns };
         let (start, end) = (Pose::at(self.at), Pose::at(c.end));
         let read = Sweep::new(&start, &end, &arc);
         let own = meant.sweep.mismatch();
         let off = read.mismatch();
         // A spiral that LinuxCNC took in the source it takes again, by its rule for the unit that is written.
-        let (small, radius) = (
-            0.00282 * if self.w.unit == 1.0 { 10.0 } else { 25.4 },
-            read.shape.radius,
-        );
+        let (small, radius) = (0.00282 * if self.w.unit == 1.0 { 10.0 } else { 25.4 }, read.shape.radius);
         let accepted = off <= small || (off <= 0.000_99 * radius && off <= 99.0 * small);
         let spiral = self.linuxcnc() && off <= own * 1.0001 + 1e-6 && accepted;
         if off > RADIUS_ROOM && !spiral {
@@ -265,25 +203,13 @@ impl Emitter<'_> {
         })
     }
 
-    fn write(
-        &mut self,
-        view: &View<'_, '_>,
-        start: &Pose,
-        end: &Pose,
-        plane: Plane,
-        turns: i32,
-        c: &Candidate,
-    ) {
+    fn write(&mut self, view: &View<'_, '_>, start: &Pose, end: &Pose, plane: Plane, turns: i32, c: &Candidate) {
         let (f, s, _) = plane_axes(plane);
         if plane != self.plane {
             self.w.block(plane_word(plane));
             self.plane = plane;
         }
-        let mut line = vec![if turns > 0 {
-            "G3".to_string()
-        } else {
-            "G2".to_string()
-        }];
+        let mut line = vec![if turns > 0 { "G3".to_string() } else { "G2".to_string() }];
         let words = self.axis_words(start, end, view.source, &[f, s]);
         let far = words.iter().find(|w| {
             let axis = AXES.iter().position(|a| w.starts_with(*a)).unwrap_or(0);

@@ -11,29 +11,17 @@ use gr_text::{Code, Diagnostic, Severity, code};
 const MOST_FAULTS: usize = 100;
 
 /// Writes a program. Errors are at the source lines that the language can't express.
-pub fn emit(
-    program: &Program,
-    options: &Options,
-    sources: &dyn Sources,
-) -> Result<Emitted, Vec<Diagnostic>> {
+pub fn emit(program: &Program, options: &Options, sources: &dyn Sources) -> Result<Emitted, Vec<Diagnostic>> {
     if let Some(mistake) = options.mistakes() {
         let (file, span) = sources.place(Source::default());
-        return Err(vec![Diagnostic::new(
-            code::EMIT_BAD_OPTION,
-            file,
-            span,
-            &[mistake],
-        )]);
+        return Err(vec![Diagnostic::new(code::EMIT_BAD_OPTION, file, span, &[mistake])]);
     }
     let mut emitter = Emitter::new(program, options, sources);
     emitter.run(program);
     if emitter.found.iter().any(|d| d.severity == Severity::Error) {
         Err(emitter.found)
     } else {
-        Ok(Emitted {
-            text: emitter.w.text,
-            notes: emitter.found,
-        })
+        Ok(Emitted { text: emitter.w.text, notes: emitter.found })
     }
 }
 
@@ -113,20 +101,12 @@ impl<'a> Emitter<'a> {
 
     /// The language has no way to say it.
     pub fn cannot(&mut self, what: &str, source: Source) {
-        self.say(
-            code::EMIT_NOT_EXPRESSIBLE,
-            source,
-            &[what.into(), self.options.language.title().into()],
-        );
+        self.say(code::EMIT_NOT_EXPRESSIBLE, source, &[what.into(), self.options.language.title().into()]);
     }
 
     /// Written as a comment: no effect on the machine.
     pub fn as_comment(&mut self, what: &str, source: Source) {
-        self.say(
-            code::EMIT_DROPPED_NOTE,
-            source,
-            &[what.into(), self.options.language.title().into()],
-        );
+        self.say(code::EMIT_DROPPED_NOTE, source, &[what.into(), self.options.language.title().into()]);
         self.w.comment(what);
     }
 
@@ -158,10 +138,7 @@ impl<'a> Emitter<'a> {
                 self.adrift |= units != self.units && self.frame.tool_offset != [0.0; 9];
                 self.units = units;
             }
-            if index < skip
-                || index < self.done_until
-                || (epilogue.start..epilogue.end).contains(&index)
-            {
+            if index < skip || index < self.done_until || (epilogue.start..epilogue.end).contains(&index) {
                 self.follow_silently(&view);
             } else if let Op::End = view.op {
                 self.end(index);
@@ -174,10 +151,7 @@ impl<'a> Emitter<'a> {
     }
 
     fn end(&mut self, index: usize) {
-        let before = index
-            .checked_sub(1)
-            .and_then(|i| self.program.get(i))
-            .map(|s| s.op);
+        let before = index.checked_sub(1).and_then(|i| self.program.get(i)).map(|s| s.op);
         let pallet = matches!(before, Some(Op::Stop(Stop::Pallet)));
         self.w.block(if pallet { "M30" } else { "M2" });
     }
@@ -190,9 +164,7 @@ impl<'a> Emitter<'a> {
     /// Keeps up with what a silent operation does to the frame.
     fn follow_silently(&mut self, view: &View<'_, '_>) {
         match view.op {
-            Op::WorkOffset(n, offset) if usize::from(n) < 10 => {
-                self.offsets[usize::from(n)] = offset
-            }
+            Op::WorkOffset(n, offset) if usize::from(n) < 10 => self.offsets[usize::from(n)] = offset,
             Op::Rotation(r) => self.rotations[usize::from(view.state.work.min(9))] = r,
             Op::Plane(p) if view.index < self.done_until => self.plane = p,
             _ => {}
@@ -229,16 +201,10 @@ impl<'a> Emitter<'a> {
         if self.options.comments && !name.is_empty() {
             self.w.comment(&name);
         }
-        let units = if self.options.units == Units::Inch {
-            "G20"
-        } else {
-            "G21"
-        };
+        let units = if self.options.units == Units::Inch { "G20" } else { "G21" };
         let plane = plane_word(self.plane);
         let rest = match self.options.language {
-            Language::Linuxcnc if self.options.arcs == super::Arcs::IjkAbsolute => {
-                "G40 G80 G90 G90.1 G94"
-            }
+            Language::Linuxcnc if self.options.arcs == super::Arcs::IjkAbsolute => "G40 G80 G90 G90.1 G94",
             Language::Linuxcnc => "G40 G80 G90 G91.1 G94",
             Language::FanucMill => "G40 G80 G90 G94",
             Language::Grbl => "G40 G80 G90 G91.1 G94",
@@ -305,18 +271,12 @@ impl<'a> Emitter<'a> {
             Note::Log if self.linuxcnc() => self.active_comment("LOG,", text),
             Note::LogOpen if self.linuxcnc() => self.active_comment("LOGOPEN,", text),
             Note::LogAppend if self.linuxcnc() => self.active_comment("LOGAPPEND,", text),
-            Note::Log | Note::LogOpen | Note::LogAppend => {
-                self.as_comment("a log statement", source)
-            }
+            Note::Log | Note::LogOpen | Note::LogAppend => self.as_comment("a log statement", source),
         }
     }
 
     fn active_comment(&mut self, head: &str, text: &str) {
-        let clean: String = text
-            .chars()
-            .filter(|c| !c.is_control() && *c != ')')
-            .take(200)
-            .collect();
+        let clean: String = text.chars().filter(|c| !c.is_control() && *c != ')').take(200).collect();
         self.w.bare(&format!("({head}{clean})"));
     }
 
@@ -327,9 +287,7 @@ impl<'a> Emitter<'a> {
             (Stop::Optional, _) => self.w.block("M1"),
             // The end with pallet change is M30.
             (Stop::Pallet, Some(Op::End)) => {}
-            (Stop::Pallet, Some(Op::Stop(Stop::Program)))
-                if self.options.language != Language::Grbl =>
-            {
+            (Stop::Pallet, Some(Op::Stop(Stop::Program))) if self.options.language != Language::Grbl => {
                 self.w.block("M60");
                 self.done_until = view.index + 2;
             }
@@ -351,11 +309,7 @@ pub(super) fn plane_word(plane: Plane) -> &'static str {
 
 /// How many leading operations only tell how the interpreter starts.
 fn prologue(program: &Program) -> usize {
-    program
-        .steps()
-        .take(8)
-        .position(|s| s.op == Op::Reset)
-        .map_or(0, |i| i + 1)
+    program.steps().take(8).position(|s| s.op == Op::Reset).map_or(0, |i| i + 1)
 }
 
 /// The operations around the end that M2 or M30 does by itself; the end itself is not among them.
@@ -373,10 +327,7 @@ fn epilogue(program: &Program) -> Epilogue {
         }
         start -= 1;
     }
-    Epilogue {
-        start,
-        end: end.index,
-    }
+    Epilogue { start, end: end.index }
 }
 
 #[derive(Clone, Copy)]
@@ -395,10 +346,7 @@ fn done_by_end(op: &Op<'_>) -> bool {
             | Op::FeedMode { .. }
             | Op::Feed { .. }
             | Op::Override(_, true)
-            | Op::SpindleTurn {
-                turn: Turn::Stop,
-                ..
-            }
+            | Op::SpindleTurn { turn: Turn::Stop, .. }
             | Op::SpindleMode { .. }
             | Op::Mist(false)
             | Op::Flood(false)

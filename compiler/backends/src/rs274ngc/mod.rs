@@ -126,20 +126,13 @@ impl Options {
     /// Decimals of coordinates.
     pub fn places(&self) -> usize {
         let usual = if self.units == Units::Inch { 5 } else { 4 };
-        let usual = if self.language == Language::Linuxcnc {
-            usual
-        } else {
-            usual - 1
-        };
+        let usual = if self.language == Language::Linuxcnc { usual } else { usual - 1 };
         self.decimals.unwrap_or(usual).min(12)
     }
     /// What does not go together.
     fn mistakes(&self) -> Option<String> {
         if self.arcs == Arcs::IjkAbsolute && self.language != Language::Linuxcnc {
-            return Some(format!(
-                "{} has no absolute arc centers",
-                self.language.title()
-            ));
+            return Some(format!("{} has no absolute arc centers", self.language.title()));
         }
         if !(self.arc_tolerance > 0.0) {
             return Some("the arc tolerance must be above zero".into());

@@ -37,13 +37,7 @@ impl Emitter<'_> {
 
     /// The axis words of a move. An axis that stands still has no word, so that where an unknown offset or an
     /// unknown position hides behind a number, the number is not written.
-    pub fn axis_words(
-        &mut self,
-        start: &Pose,
-        end: &Pose,
-        source: Source,
-        forced: &[usize],
-    ) -> Vec<String> {
+    pub fn axis_words(&mut self, start: &Pose, end: &Pose, source: Source, forced: &[usize]) -> Vec<String> {
         // XYZ words would put an upright tool where the program has a tilted one.
         if end.tool_axis.is_some_and(|a| !(a[2] > 1.0 - 1e-9)) {
             self.cannot("a tool that does not stand along Z", source);
@@ -110,9 +104,7 @@ impl Emitter<'_> {
             if words.g(530) {
                 return self.machine_move(view, "G0", &[]);
             }
-            let home = [(280, "G28"), (300, "G30")]
-                .into_iter()
-                .find(|(g, _)| words.g(*g));
+            let home = [(280, "G28"), (300, "G30")].into_iter().find(|(g, _)| words.g(*g));
             if let Some((_, code)) = home {
                 return self.home(view, code);
             }
@@ -126,19 +118,13 @@ impl Emitter<'_> {
         let goal = view.state.machine(&view.end.axes);
         let from = view.state.machine(&view.start.axes);
         let mut reached = self.frame.machine(&self.at);
-        let feed = if code == "G1" {
-            self.feed_words(view.state, view.start, view.end, view.source)
-        } else {
-            Vec::new()
-        };
+        let feed =
+            if code == "G1" { self.feed_words(view.state, view.start, view.end, view.source) } else { Vec::new() };
         let mut words = Vec::new();
         for i in 0..9 {
             // Rotation leaves rounding dust in an axis that stands still.
             let moves = (goal[i] - from[i]).abs() > 1e-9;
-            if moves
-                || forced.contains(&i)
-                || (self.words(view.source).is_some() && self.given(i, view.source))
-            {
+            if moves || forced.contains(&i) || (self.words(view.source).is_some() && self.given(i, view.source)) {
                 let (text, said) = self.w.axis(i, goal[i]);
                 reached[i] = said;
                 words.push(format!("{}{text}", AXES[i]));
@@ -172,11 +158,7 @@ impl Emitter<'_> {
         let named: Vec<usize> = (0..9).filter(|i| self.given(*i, view.source)).collect();
         let all = self.options.language == Language::FanucMill && named.is_empty();
         let axes = if all { vec![0, 1, 2] } else { named };
-        let through = if second.is_some() {
-            view.end
-        } else {
-            view.start
-        };
+        let through = if second.is_some() { view.end } else { view.start };
         let mut words = vec![code.to_string()];
         let all = axes.is_empty();
         for &i in &axes {
@@ -219,13 +201,7 @@ impl Emitter<'_> {
     }
 
     /// Straight pieces along a curve.
-    pub fn lines(
-        &mut self,
-        pieces: usize,
-        state: &State,
-        source: Source,
-        at: &dyn Fn(f64) -> Pose,
-    ) {
+    pub fn lines(&mut self, pieces: usize, state: &State, source: Source, at: &dyn Fn(f64) -> Pose) {
         let mut from = at(0.0);
         for k in 1..=pieces {
             let to = at(k as f64 / pieces as f64);
@@ -238,19 +214,14 @@ impl Emitter<'_> {
         if self.options.language == Language::Grbl {
             return self.cannot("threading (motion that follows the spindle)", view.source);
         }
-        let moved: Vec<usize> = (0..9)
-            .filter(|i| view.start.axes[*i] != view.end.axes[*i])
-            .collect();
+        let moved: Vec<usize> = (0..9).filter(|i| view.start.axes[*i] != view.end.axes[*i]).collect();
         let mut words = vec!["G33".to_string()];
         words.extend(self.axis_words(view.start, view.end, view.source, &moved));
         if words.len() == 1 {
             return;
         }
         let (pitch, _) = self.w.length(per_rev, self.w.places.max(6));
-        words.push(format!(
-            "{}{pitch}",
-            if self.linuxcnc() { 'K' } else { 'F' }
-        ));
+        words.push(format!("{}{pitch}", if self.linuxcnc() { 'K' } else { 'F' }));
         if !self.linuxcnc() {
             self.feed.clear();
         }
@@ -274,10 +245,7 @@ impl Emitter<'_> {
                 words.push(format!("{}{}", AXES[i], self.w.axis(i, bottom[i]).0));
             }
         }
-        words.push(format!(
-            "K{}",
-            self.w.length(sync.per_rev, self.w.places.max(6)).0
-        ));
+        words.push(format!("K{}", self.w.length(sync.per_rev, self.w.places.max(6)).0));
         if scale != 1.0 && scale != 0.0 {
             words.push(format!("I{}", self.w.number(scale, 6)));
         }
@@ -292,9 +260,7 @@ impl Emitter<'_> {
         if self.options.language == Language::FanucMill {
             return self.cannot("probing with an own error rule (G38)", view.source);
         }
-        let moved: Vec<usize> = (0..9)
-            .filter(|i| view.start.axes[*i] != view.end.axes[*i])
-            .collect();
+        let moved: Vec<usize> = (0..9).filter(|i| view.start.axes[*i] != view.end.axes[*i]).collect();
         let mut words = vec![format!("G38.{}", 2 + (kind & 3))];
         words.extend(self.axis_words(view.start, view.end, view.source, &moved));
         words.extend(self.feed_words(view.state, view.start, view.end, view.source));
@@ -307,20 +273,11 @@ impl Emitter<'_> {
     }
 
     /// The words that bring feed and feed mode to what the state says.
-    pub fn feed_words(
-        &mut self,
-        state: &State,
-        start: &Pose,
-        end: &Pose,
-        source: Source,
-    ) -> Vec<String> {
+    pub fn feed_words(&mut self, state: &State, start: &Pose, end: &Pose, source: Source) -> Vec<String> {
         let mut out = Vec::new();
         let mode = state.feed_mode;
         if mode != self.feed_mode {
-            if mode != FeedMode::PerTime
-                && self.options.language == Language::Grbl
-                && mode == FeedMode::PerRev
-            {
+            if mode != FeedMode::PerTime && self.options.language == Language::Grbl && mode == FeedMode::PerRev {
                 self.cannot("a feed per revolution", source);
                 return out;
             }
@@ -332,9 +289,7 @@ impl Emitter<'_> {
             self.feed_mode = mode;
             self.feed.clear();
         }
-        let straight = [0, 1, 2, 6, 7, 8]
-            .iter()
-            .any(|i| start.axes[*i] != end.axes[*i]);
+        let straight = [0, 1, 2, 6, 7, 8].iter().any(|i| start.axes[*i] != end.axes[*i]);
         let rotary = (3..6).any(|i| start.axes[i] != end.axes[i]) && !straight;
         let per = if mode == FeedMode::PerRev { 1.0 } else { 60.0 };
         let value = match (mode, rotary) {
@@ -369,11 +324,7 @@ impl Emitter<'_> {
         let offset = |a: [f64; 3], b: [f64; 2]| [a[0] - b[0], a[1] - b[1]];
         let words = self.axis_words(view.start, view.end, view.source, &[0, 1]);
         let to = [self.at[0], self.at[1]];
-        let mut line = vec![if order == 4 {
-            "G5".to_string()
-        } else {
-            "G5.1".to_string()
-        }];
+        let mut line = vec![if order == 4 { "G5".to_string() } else { "G5.1".to_string() }];
         line.extend(words);
         let mut pair = |letters: [char; 2], v: [f64; 2]| {
             for (letter, v) in letters.into_iter().zip(v) {
@@ -404,11 +355,7 @@ impl Emitter<'_> {
         }
         for p in points[3..].chunks_exact(3) {
             let ((x, said_x), (y, said_y)) = (self.w.axis(0, p[0]), self.w.axis(1, p[1]));
-            head.extend([
-                format!("X{x}"),
-                format!("Y{y}"),
-                format!("P{}", self.w.number(p[2], 9)),
-            ]);
+            head.extend([format!("X{x}"), format!("Y{y}"), format!("P{}", self.w.number(p[2], 9))]);
             self.w.block(&head.join(" "));
             head.clear();
             self.set(0, said_x);
@@ -422,9 +369,7 @@ impl Emitter<'_> {
         let mut from = *view.start;
         let mut poses = Vec::new();
         let tolerance = self.options.arc_tolerance;
-        gr_ir::geometry::flatten(&view.op, view.start, view.end, tolerance, |axes| {
-            poses.push(Pose::at(*axes))
-        });
+        gr_ir::geometry::flatten(&view.op, view.start, view.end, tolerance, |axes| poses.push(Pose::at(*axes)));
         for to in poses {
             self.straight(&from, &to, view.state, view.source);
             from = to;

@@ -6,9 +6,7 @@ use super::write::AXES;
 use gr_ir::{Axes, Op, Override, PathMode, Source, Turn, View};
 use gr_text::code;
 
-const OFFSETS: [&str; 10] = [
-    "", "G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3",
-];
+const OFFSETS: [&str; 10] = ["", "G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3"];
 
 impl Emitter<'_> {
     pub fn setting(&mut self, view: &View<'_, '_>) {
@@ -26,11 +24,7 @@ impl Emitter<'_> {
             Op::SpindleMode { spindle, surface } => self.spindle_mode(spindle, surface, view),
             Op::SpindleSpeed { spindle, speed } => self.spindle_speed(spindle, speed, view),
             Op::SpindleTurn { spindle, turn } => self.spindle_turn(spindle, turn, source),
-            Op::SpindleOrient {
-                spindle,
-                angle,
-                direction,
-            } => self.orient(spindle, angle, direction, view),
+            Op::SpindleOrient { spindle, angle, direction } => self.orient(spindle, angle, direction, view),
             Op::SpindleWait { .. } => self.cannot("waiting for spindle orientation alone", source),
             Op::Mist(on) => self.coolant(on, "M7", view),
             Op::Flood(on) => self.coolant(on, "M8", view),
@@ -46,36 +40,15 @@ impl Emitter<'_> {
                 };
                 self.machine_io(&format!("M{code} P{index}"), "a digital output", source);
             }
-            Op::AnalogOut {
-                index,
-                value,
-                synced,
-            } => {
+            Op::AnalogOut { index, value, synced } => {
                 let value = self.w.number(value, 9);
                 let code = if synced { 67 } else { 68 };
-                self.machine_io(
-                    &format!("M{code} E{index} Q{value}"),
-                    "an analog output",
-                    source,
-                );
+                self.machine_io(&format!("M{code} E{index} Q{value}"), "an analog output", source);
             }
-            Op::InputWait {
-                index,
-                digital,
-                wait,
-                timeout,
-            } => {
+            Op::InputWait { index, digital, wait, timeout } => {
                 let letter = if digital { 'P' } else { 'E' };
-                let limit = if wait == 0 {
-                    String::new()
-                } else {
-                    format!(" Q{}", self.w.number(timeout, 6))
-                };
-                self.machine_io(
-                    &format!("M66 {letter}{index} L{wait}{limit}"),
-                    "reading an input",
-                    source,
-                );
+                let limit = if wait == 0 { String::new() } else { format!(" Q{}", self.w.number(timeout, 6)) };
+                self.machine_io(&format!("M66 {letter}{index} L{wait}{limit}"), "reading an input", source);
             }
             Op::UserM { code, p, q } => self.user_code(code, p, q, source),
             _ => {}
@@ -83,11 +56,7 @@ impl Emitter<'_> {
     }
 
     fn machine_io(&mut self, block: &str, what: &str, source: Source) {
-        if self.linuxcnc() {
-            self.w.block(block)
-        } else {
-            self.cannot(what, source)
-        }
+        if self.linuxcnc() { self.w.block(block) } else { self.cannot(what, source) }
     }
 
     fn user_code(&mut self, code: i32, p: f64, q: f64, source: Source) {
@@ -105,9 +74,7 @@ impl Emitter<'_> {
     fn changed(&self, new: &Axes, old: &Axes) -> Vec<String> {
         let places = self.w.places.max(9);
         let differs = (0..9).filter(|i| new[*i] != old[*i]);
-        differs
-            .map(|i| format!("{}{}", AXES[i], self.w.axis_fine(i, new[i], places).0))
-            .collect()
+        differs.map(|i| format!("{}{}", AXES[i], self.w.axis_fine(i, new[i], places).0)).collect()
     }
 
     fn work_offset(&mut self, n: u8, offset: &Axes, view: &View<'_, '_>) {
@@ -123,17 +90,9 @@ impl Emitter<'_> {
         }
         if !words.is_empty() {
             let block = format!("G10 L2 P{index} {}", words.join(" "));
-            self.say(
-                code::EMIT_OFFSET_NOT_CARRIED,
-                view.source,
-                &[OFFSETS[index].into(), block.clone()],
-            );
+            self.say(code::EMIT_OFFSET_NOT_CARRIED, view.source, &[OFFSETS[index].into(), block.clone()]);
             let fanuc = self.options.language == Language::FanucMill;
-            self.w.block(&if fanuc {
-                block.replacen("G10", "G90 G10", 1)
-            } else {
-                block
-            });
+            self.w.block(&if fanuc { block.replacen("G10", "G90 G10", 1) } else { block });
         }
         self.offsets[index] = *offset;
         self.motion_unsure();
@@ -160,9 +119,7 @@ impl Emitter<'_> {
         self.move_frame(view.state);
         // Where the source says so it is said again: the control may know more than the simulation.
         let asked = [920, 921, 922, 923, 520].into_iter();
-        let asked = self
-            .words(view.source)
-            .is_some_and(|w| asked.clone().any(|g| w.g(g)));
+        let asked = self.words(view.source).is_some_and(|w| asked.clone().any(|g| w.g(g)));
         if *offset == old && !asked {
             return;
         }
@@ -215,10 +172,7 @@ impl Emitter<'_> {
             (Some(n), Language::Linuxcnc | Language::FanucMill) => format!("G43 H{n}"),
             (_, Language::Linuxcnc) => format!("G43.1 {}", self.changed_all(offset)),
             (_, Language::Grbl) if (0..9).all(|i| i == 2 || offset[i] == 0.0) => {
-                format!(
-                    "G43.1 Z{}",
-                    self.w.axis_fine(2, offset[2], self.w.places.max(9)).0
-                )
+                format!("G43.1 Z{}", self.w.axis_fine(2, offset[2], self.w.places.max(9)).0)
             }
             _ => {
                 self.cannot("a tool offset that is no tool's length", view.source);
@@ -232,22 +186,14 @@ impl Emitter<'_> {
 
     fn changed_all(&self, offset: &Axes) -> String {
         let words = self.changed(offset, &self.frame.tool_offset);
-        if words.is_empty() {
-            "Z0".into()
-        } else {
-            words.join(" ")
-        }
+        if words.is_empty() { "Z0".into() } else { words.join(" ") }
     }
 
     /// The tool whose offset this is, the one in the spindle first.
     fn tool_with(&self, offset: &Axes, in_spindle: i32) -> Option<i32> {
-        let same =
-            |(n, o): &&(i32, Axes)| *n > 0 && (0..9).all(|i| (o[i] - offset[i]).abs() < 1e-9);
+        let same = |(n, o): &&(i32, Axes)| *n > 0 && (0..9).all(|i| (o[i] - offset[i]).abs() < 1e-9);
         let all = || self.tools.iter().filter(same);
-        all()
-            .find(|(n, _)| *n == in_spindle)
-            .or_else(|| all().next())
-            .map(|(n, _)| *n)
+        all().find(|(n, _)| *n == in_spindle).or_else(|| all().next()).map(|(n, _)| *n)
     }
 
     fn tool_change(&mut self, view: &View<'_, '_>) {
@@ -261,35 +207,18 @@ impl Emitter<'_> {
     }
 
     fn tool_entry(&mut self, view: &View<'_, '_>) {
-        let Op::ToolEntry {
-            tool,
-            offset,
-            diameter,
-            front,
-            back,
-            orientation,
-            ..
-        } = view.op
-        else {
+        let Op::ToolEntry { tool, offset, diameter, front, back, orientation, .. } = view.op else {
             return;
         };
         if !self.linuxcnc() {
             return self.cannot("writing the tool table (G10 L1)", view.source);
         }
         let places = self.w.places.max(9);
-        let old = self
-            .tools
-            .iter()
-            .find(|(n, _)| *n == tool)
-            .map_or([0.0; 9], |t| t.1);
+        let old = self.tools.iter().find(|(n, _)| *n == tool).map_or([0.0; 9], |t| t.1);
         let mut words = self.changed(&offset, &old);
         words.push(format!("R{}", self.w.length(0.5 * diameter, places).0));
         if front != 0.0 || back != 0.0 {
-            words.push(format!(
-                "I{} J{}",
-                self.w.number(front.to_degrees(), 9),
-                self.w.number(back.to_degrees(), 9)
-            ));
+            words.push(format!("I{} J{}", self.w.number(front.to_degrees(), 9), self.w.number(back.to_degrees(), 9)));
         }
         if orientation != 0 {
             words.push(format!("Q{orientation}"));
@@ -322,17 +251,11 @@ impl Emitter<'_> {
             Some(Op::SpindleSpeed { spindle: s, speed }) if s == spindle => Some(speed),
             _ => None,
         };
-        let speed = next
-            .map(|speed| format!(" S{}", self.speed_text(speed, surface.is_some())))
-            .unwrap_or_default();
+        let speed = next.map(|speed| format!(" S{}", self.speed_text(speed, surface.is_some()))).unwrap_or_default();
         match surface {
             Some(limit) => {
                 // A limit beyond any spindle stands for none.
-                let limit = if limit < 1e9 {
-                    format!(" D{}", self.w.number(limit, 6))
-                } else {
-                    String::new()
-                };
+                let limit = if limit < 1e9 { format!(" D{}", self.w.number(limit, 6)) } else { String::new() };
                 self.w.block(&format!("G96{limit}{speed}{which}"));
             }
             None if self.linuxcnc() => self.w.block(&format!("G97{speed}{which}")),
@@ -346,11 +269,7 @@ impl Emitter<'_> {
     /// rpm, or m/min or feet/min of surface speed as the length unit says.
     fn speed_text(&self, speed: f64, surface: bool) -> String {
         let per_minute = if self.w.unit == 1.0 { 1000.0 } else { 304.8 };
-        let value = if surface {
-            speed * 60.0 / per_minute
-        } else {
-            speed
-        };
+        let value = if surface { speed * 60.0 / per_minute } else { speed };
         self.w.number(value, 6)
     }
 
@@ -360,11 +279,7 @@ impl Emitter<'_> {
             return;
         };
         let text = self.speed_text(speed, surface);
-        let text = if self.linuxcnc() {
-            text
-        } else {
-            text.trim_end_matches('.').to_string()
-        };
+        let text = if self.linuxcnc() { text } else { text.trim_end_matches('.').to_string() };
         self.w.block(&format!("S{text}{which}"));
     }
 
@@ -419,9 +334,7 @@ impl Emitter<'_> {
 
     fn path_mode(&mut self, mode: PathMode, view: &View<'_, '_>) {
         let source = view.source;
-        let asked = self
-            .words(source)
-            .is_none_or(|w| [610, 611, 640].into_iter().any(|g| w.g(g)));
+        let asked = self.words(source).is_none_or(|w| [610, 611, 640].into_iter().any(|g| w.g(g)));
         if !asked && !self.linuxcnc() {
             // LinuxCNC's cycles switch to exact path by themselves; elsewhere that is the cycle's own affair.
             return;
@@ -464,10 +377,7 @@ impl Emitter<'_> {
             && p > 0.0
         {
             let places = self.w.places.max(9);
-            let (p, q) = (
-                self.w.length(p, places).0,
-                self.w.length(tolerance, places).0,
-            );
+            let (p, q) = (self.w.length(p, places).0, self.w.length(tolerance, places).0);
             self.w.block(&format!("G64 P{p} Q{q}"));
         }
     }
@@ -476,17 +386,11 @@ impl Emitter<'_> {
         let state = i32::from(on);
         let (block, name) = match which {
             Override::Feed => (format!("M50 P{state}"), "the feed override switch"),
-            Override::Speed(n) if n > 0 => {
-                (format!("M51 P{state} ${n}"), "the speed override switch")
-            }
+            Override::Speed(n) if n > 0 => (format!("M51 P{state} ${n}"), "the speed override switch"),
             Override::Speed(_) => (format!("M51 P{state}"), "the speed override switch"),
             Override::Adaptive => (format!("M52 P{state}"), "adaptive feed"),
             Override::FeedHold => (format!("M53 P{state}"), "the feed hold switch"),
         };
-        if self.linuxcnc() {
-            self.w.block(&block)
-        } else {
-            self.as_comment(name, source)
-        }
+        if self.linuxcnc() { self.w.block(&block) } else { self.as_comment(name, source) }
     }
 }

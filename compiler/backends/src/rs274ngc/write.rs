@@ -16,11 +16,7 @@ pub(super) struct Writer {
 
 impl Writer {
     pub fn new(options: &Options) -> Writer {
-        let unit = if options.units == Units::Inch {
-            25.4
-        } else {
-            1.0
-        };
+        let unit = if options.units == Units::Inch { 25.4 } else { 1.0 };
         Writer {
             text: String::new(),
             unit,
@@ -95,23 +91,9 @@ impl Writer {
 
     pub fn axis_fine(&self, axis: usize, value: f64, places: usize) -> (String, f64) {
         let rotary = (3..6).contains(&axis);
-        let text = self.number(
-            if rotary {
-                value.to_degrees()
-            } else {
-                value / self.unit
-            },
-            places,
-        );
+        let text = self.number(if rotary { value.to_degrees() } else { value / self.unit }, places);
         let said = text.parse::<f64>().unwrap_or(0.0);
-        (
-            text,
-            if rotary {
-                said * (std::f64::consts::PI / 180.0)
-            } else {
-                said * self.unit
-            },
-        )
+        (text, if rotary { said * (std::f64::consts::PI / 180.0) } else { said * self.unit })
     }
 
     /// A length (mm).
@@ -129,11 +111,7 @@ impl Writer {
         let clean: String = text.chars().map(|c| self.comment_char(c)).collect();
         let mut rest = clean.trim();
         while !rest.is_empty() {
-            let mut cut = rest.len().min(if self.language == Language::Linuxcnc {
-                200
-            } else {
-                60
-            });
+            let mut cut = rest.len().min(if self.language == Language::Linuxcnc { 200 } else { 60 });
             while !rest.is_char_boundary(cut) {
                 cut -= 1;
             }

@@ -2,8 +2,7 @@
 //! corner, the other must have a corner or pass within tolerance.
 
 use super::{
-    Aspect, Axes, Conditions, Diff, Event, Op, Program, Spot, Tolerance, compare_conditions,
-    distance, place, turned,
+    Aspect, Axes, Conditions, Diff, Event, Op, Program, Spot, Tolerance, compare_conditions, distance, place, turned,
 };
 use crate::Cursor;
 use crate::geometry::flatten;
@@ -32,14 +31,7 @@ impl<'p> Chain<'p> {
         let cursor = program.cursor();
         let here = place(cursor.state(), &cursor.pose().axes, tolerance);
         let (ready, conditions) = (std::collections::VecDeque::new(), None);
-        let mut chain = Chain {
-            cursor,
-            ready,
-            conditions,
-            here,
-            spot: None,
-            head: Piece::End,
-        };
+        let mut chain = Chain { cursor, ready, conditions, here, spot: None, head: Piece::End };
         chain.pull(tolerance);
         chain
     }
@@ -67,9 +59,7 @@ impl<'p> Chain<'p> {
                 self.conditions = Some(Conditions::of(&view));
                 let (state, ready) = (view.state, &mut self.ready);
                 let chord = (tolerance.length / 4.0).max(1e-8);
-                flatten(&view.op, view.start, view.end, chord, |p| {
-                    ready.push_back(place(state, p, tolerance))
-                });
+                flatten(&view.op, view.start, view.end, chord, |p| ready.push_back(place(state, p, tolerance)));
             }
         }
     }
@@ -141,11 +131,7 @@ fn side_by_side<'p>(
         return true;
     }
     let (left, right) = (reach(&p.here, to), reach(&q.here, other));
-    let (short, long, corner, end) = if left <= right {
-        (p, q, to, other)
-    } else {
-        (q, p, other, to)
-    };
+    let (short, long, corner, end) = if left <= right { (p, q, to, other) } else { (q, p, other, to) };
     let share = nearest(&long.here, end, corner);
     let there = between(&long.here, end, share);
     let gap = distance(&there, corner);
@@ -170,11 +156,7 @@ fn nearest(from: &Axes, to: &Axes, p: &Axes) -> f64 {
         along += d * (p[i] - from[i]);
         all += d * d;
     }
-    if all > 0.0 {
-        (along / all).clamp(0.0, 1.0)
-    } else {
-        0.0
-    }
+    if all > 0.0 { (along / all).clamp(0.0, 1.0) } else { 0.0 }
 }
 
 fn between(a: &Axes, b: &Axes, share: f64) -> Axes {

@@ -2,9 +2,7 @@
 //! pushes, `decode` takes, in the same order.
 
 use super::{Builder, Cursor};
-use crate::{
-    ArcPlane, FeedMode, Marker, Note, Op, Override, PathMode, Plane, Stop, Sync, Turn, Units,
-};
+use crate::{ArcPlane, FeedMode, Marker, Note, Op, Override, PathMode, Plane, Stop, Sync, Turn, Units};
 
 pub(super) const LINEAR: u8 = 1;
 /// Kinds up to here carry an end pose.
@@ -160,11 +158,7 @@ impl Builder {
                 self.int(i32::from(surface.is_some()));
                 self.program.values.extend(surface);
             }
-            Op::SpindleSpeed { spindle, speed: v }
-            | Op::SpindleWait {
-                spindle,
-                timeout: v,
-            } => {
+            Op::SpindleSpeed { spindle, speed: v } | Op::SpindleWait { spindle, timeout: v } => {
                 self.int(spindle);
                 self.values(&[v]);
             }
@@ -172,25 +166,13 @@ impl Builder {
                 self.int(spindle);
                 self.int(turn as i32);
             }
-            Op::SpindleOrient {
-                spindle,
-                angle,
-                direction,
-            } => {
+            Op::SpindleOrient { spindle, angle, direction } => {
                 self.int(spindle);
                 self.int(direction);
                 self.values(&[angle]);
             }
             Op::ToolPrepare(n) | Op::ToolChange(n) | Op::ToolNumber(n) => self.int(n),
-            Op::ToolEntry {
-                pocket,
-                tool,
-                offset,
-                diameter,
-                front,
-                back,
-                orientation,
-            } => {
+            Op::ToolEntry { pocket, tool, offset, diameter, front, back, orientation } => {
                 self.int(pocket);
                 self.int(tool);
                 self.int(orientation);
@@ -221,21 +203,12 @@ impl Builder {
                 self.int(index);
                 self.int(i32::from(on) | i32::from(synced) << 1);
             }
-            Op::AnalogOut {
-                index,
-                value,
-                synced,
-            } => {
+            Op::AnalogOut { index, value, synced } => {
                 self.int(index);
                 self.int(i32::from(synced));
                 self.values(&[value]);
             }
-            Op::InputWait {
-                index,
-                digital,
-                wait,
-                timeout,
-            } => {
+            Op::InputWait { index, digital, wait, timeout } => {
                 self.int(index);
                 self.int(i32::from(digital));
                 self.int(wait);
@@ -275,41 +248,21 @@ impl<'p> Cursor<'p> {
             4 => {
                 let order = u32::try_from(self.int()?).ok()?;
                 let count = usize::try_from(self.int()?).ok()?;
-                Op::Nurbs {
-                    order,
-                    points: self.slice(count.checked_mul(3)?)?,
-                }
+                Op::Nurbs { order, points: self.slice(count.checked_mul(3)?)? }
             }
             5 => Op::Probe(u8::try_from(self.int()?).ok()?),
-            6 => Op::RigidTap {
-                bottom: self.three()?,
-                scale: self.value()?,
-            },
+            6 => Op::RigidTap { bottom: self.three()?, scale: self.value()? },
             7 => Op::Dwell(self.value()?),
             8 => {
                 let (spindle, velocity) = (self.int()?, self.flag()?);
-                Op::SyncStart(Sync {
-                    spindle,
-                    per_rev: self.value()?,
-                    velocity,
-                })
+                Op::SyncStart(Sync { spindle, per_rev: self.value()?, velocity })
             }
             9 => Op::SyncStop,
             10 => Op::ProbeMode(self.flag()?),
-            11 => Op::Units(if self.int()? == 1 {
-                Units::Inch
-            } else {
-                Units::Mm
-            }),
+            11 => Op::Units(if self.int()? == 1 { Units::Inch } else { Units::Mm }),
             12 => Op::Plane(plane(self.int()?)),
-            13 => Op::FeedMode {
-                spindle: self.int()?,
-                mode: self.feed_mode()?,
-            },
-            14 => Op::Feed {
-                linear: self.value()?,
-                angular: self.value()?,
-            },
+            13 => Op::FeedMode { spindle: self.int()?, mode: self.feed_mode()? },
+            14 => Op::Feed { linear: self.value()?, angular: self.value()? },
             15 => Op::FeedReferenceXyz,
             16 => Op::PathMode(match self.int()? {
                 0 => PathMode::ExactStop,
@@ -325,31 +278,15 @@ impl<'p> Cursor<'p> {
         Some(match kind {
             18 => {
                 let (spindle, limited) = (self.int()?, self.flag()?);
-                Op::SpindleMode {
-                    spindle,
-                    surface: if limited { Some(self.value()?) } else { None },
-                }
+                Op::SpindleMode { spindle, surface: if limited { Some(self.value()?) } else { None } }
             }
-            19 => Op::SpindleSpeed {
-                spindle: self.int()?,
-                speed: self.value()?,
-            },
-            20 => Op::SpindleTurn {
-                spindle: self.int()?,
-                turn: turn(self.int()?),
-            },
+            19 => Op::SpindleSpeed { spindle: self.int()?, speed: self.value()? },
+            20 => Op::SpindleTurn { spindle: self.int()?, turn: turn(self.int()?) },
             21 => {
                 let (spindle, direction) = (self.int()?, self.int()?);
-                Op::SpindleOrient {
-                    spindle,
-                    angle: self.value()?,
-                    direction,
-                }
+                Op::SpindleOrient { spindle, angle: self.value()?, direction }
             }
-            22 => Op::SpindleWait {
-                spindle: self.int()?,
-                timeout: self.value()?,
-            },
+            22 => Op::SpindleWait { spindle: self.int()?, timeout: self.value()? },
             23 => Op::Mist(self.flag()?),
             24 => Op::Flood(self.flag()?),
             25 => Op::ToolPrepare(self.int()?),
@@ -361,15 +298,7 @@ impl<'p> Cursor<'p> {
                 let (pocket, tool, orientation) = (self.int()?, self.int()?, self.int()?);
                 let offset = self.nine()?;
                 let [diameter, front, back] = self.three()?;
-                Op::ToolEntry {
-                    pocket,
-                    tool,
-                    offset,
-                    diameter,
-                    front,
-                    back,
-                    orientation,
-                }
+                Op::ToolEntry { pocket, tool, offset, diameter, front, back, orientation }
             }
             31 => Op::ToolOffset(self.nine()?),
             32 => Op::WorkOffset(u8::try_from(self.int()?).ok()?, self.nine()?),
@@ -392,37 +321,20 @@ impl<'p> Cursor<'p> {
             }
             36 => {
                 let (index, bits) = (self.int()?, self.int()?);
-                Op::DigitalOut {
-                    index,
-                    on: bits & 1 != 0,
-                    synced: bits & 2 != 0,
-                }
+                Op::DigitalOut { index, on: bits & 1 != 0, synced: bits & 2 != 0 }
             }
             37 => {
                 let (index, synced) = (self.int()?, self.flag()?);
-                Op::AnalogOut {
-                    index,
-                    value: self.value()?,
-                    synced,
-                }
+                Op::AnalogOut { index, value: self.value()?, synced }
             }
             38 => {
                 let (index, digital, wait) = (self.int()?, self.flag()?, self.int()?);
-                Op::InputWait {
-                    index,
-                    digital,
-                    wait,
-                    timeout: self.value()?,
-                }
+                Op::InputWait { index, digital, wait, timeout: self.value()? }
             }
             39 => Op::RunTime(self.str()?),
             40 => Op::Note(self.note()?, self.str()?),
             41 => Op::LogClose,
-            42 => Op::UserM {
-                code: self.int()?,
-                p: self.value()?,
-                q: self.value()?,
-            },
+            42 => Op::UserM { code: self.int()?, p: self.value()?, q: self.value()? },
             43 => Op::Stop(match self.int()? {
                 0 => Stop::Program,
                 1 => Stop::Optional,
@@ -434,11 +346,7 @@ impl<'p> Cursor<'p> {
             47 => Op::End,
             48 => {
                 let (kind, code) = (self.int()?, self.int()?);
-                Op::Begin {
-                    marker: marker(kind),
-                    code,
-                    text: self.str()?,
-                }
+                Op::Begin { marker: marker(kind), code, text: self.str()? }
             }
             49 => Op::Close(marker(self.int()?)),
             _ => return None,

@@ -1,8 +1,8 @@
 use super::{AXIS_NAMES, HEADER, print};
 use crate::op::{Arc, ArcPlane, Pose, Source};
 use crate::{
-    Axes, Builder, FeedMode, FileId, FrameId, Marker, Note, Op, Override, PathMode, Plane, Program,
-    State, Stop, Sync, Turn, Units,
+    Axes, Builder, FeedMode, FileId, FrameId, Marker, Note, Op, Override, PathMode, Plane, Program, State, Stop, Sync,
+    Turn, Units,
 };
 
 /// What is wrong with a text, and in which line (from 1).
@@ -34,18 +34,12 @@ pub fn parse(text: &str) -> Result<Program, ParseError> {
         Some((_, first)) if first.trim() == HEADER => {}
         other => {
             let line = other.map_or(1, |(n, _)| n + 1);
-            return Err(ParseError {
-                line,
-                message: format!("the text begins with `{HEADER}`"),
-            });
+            return Err(ParseError { line, message: format!("the text begins with `{HEADER}`") });
         }
     }
     let mut builder = Builder::new();
     for (number, line) in lines {
-        read_line(&mut builder, line).map_err(|message| ParseError {
-            line: number + 1,
-            message,
-        })?;
+        read_line(&mut builder, line).map_err(|message| ParseError { line: number + 1, message })?;
     }
     Ok(builder.finish())
 }
@@ -76,26 +70,14 @@ fn read_frame(builder: &mut Builder, fields: &mut Fields<'_>) -> Res<()> {
     let (file, line) = place(fields.need("at")?)?;
     let pass = fields.int_field("pass")?;
     let name = fields.text()?.into();
-    builder.frame(
-        id,
-        &gr_canon::CallFrame {
-            parent,
-            file,
-            line,
-            name,
-            pass,
-        },
-    );
+    builder.frame(id, &gr_canon::CallFrame { parent, file, line, name, pass });
     Ok(())
 }
 
 fn place(text: &str) -> Res<(FileId, u32)> {
     let (file, line) = text.split_once(':').ok_or("a place is file:line")?;
     let line: u64 = number(line)?;
-    let line = line
-        .checked_sub(1)
-        .and_then(|l| u32::try_from(l).ok())
-        .ok_or("lines count from 1")?;
+    let line = line.checked_sub(1).and_then(|l| u32::try_from(l).ok()).ok_or("lines count from 1")?;
     Ok((FileId(number(file)?), line))
 }
 
@@ -114,10 +96,7 @@ fn read_op(builder: &mut Builder, f: &mut Fields<'_>) -> Res<()> {
             if points.len() % 3 != 0 {
                 return Err("points are triples: x, y, weight".into());
             }
-            Op::Nurbs {
-                order,
-                points: &points,
-            }
+            Op::Nurbs { order, points: &points }
         }
         "probe" => Op::Probe(f.int_field("kind")?),
         "comment" | "message" | "log" | "log-open" | "log-append" => {
@@ -133,11 +112,7 @@ fn read_op(builder: &mut Builder, f: &mut Fields<'_>) -> Res<()> {
             let marker = marker(f.bare()?)?;
             let code = f.int_field("code")?;
             text = f.text()?;
-            Op::Begin {
-                marker,
-                code,
-                text: &text,
-            }
+            Op::Begin { marker, code, text: &text }
         }
         _ => plain_op(f)?,
     };
@@ -148,10 +123,7 @@ fn read_op(builder: &mut Builder, f: &mut Fields<'_>) -> Res<()> {
 
 fn plain_op(f: &mut Fields<'_>) -> Res<Op<'static>> {
     Ok(match f.head {
-        "rigid-tap" => Op::RigidTap {
-            bottom: f.array("bottom")?,
-            scale: f.num("scale")?,
-        },
+        "rigid-tap" => Op::RigidTap { bottom: f.array("bottom")?, scale: f.num("scale")? },
         "dwell" => Op::Dwell(f.number()?),
         "sync-start" => Op::SyncStart(Sync {
             spindle: f.int_field("spindle")?,
@@ -168,15 +140,9 @@ fn plain_op(f: &mut Fields<'_>) -> Res<Op<'static>> {
                 ("per-rev", FeedMode::PerRev),
                 ("inverse", FeedMode::Inverse),
             ])?;
-            Op::FeedMode {
-                spindle: f.int_field("spindle")?,
-                mode,
-            }
+            Op::FeedMode { spindle: f.int_field("spindle")?, mode }
         }
-        "feed" => Op::Feed {
-            linear: f.number()?,
-            angular: f.num("angular")?,
-        },
+        "feed" => Op::Feed { linear: f.number()?, angular: f.num("angular")? },
         "feed-reference" => f.choice(&[("xyz", Op::FeedReferenceXyz)])?,
         "path" => match f.bare()? {
             "exact-stop" => Op::PathMode(PathMode::ExactStop),
@@ -193,11 +159,9 @@ fn plain_op(f: &mut Fields<'_>) -> Res<Op<'static>> {
         "reset" => Op::Reset,
         "end" => Op::End,
         "close" => Op::Close(marker(f.bare()?)?),
-        "stop" => Op::Stop(f.choice(&[
-            ("program", Stop::Program),
-            ("optional", Stop::Optional),
-            ("pallet", Stop::Pallet),
-        ])?),
+        "stop" => {
+            Op::Stop(f.choice(&[("program", Stop::Program), ("optional", Stop::Optional), ("pallet", Stop::Pallet)])?)
+        }
         head if head.starts_with("spindle-") => spindle_op(f)?,
         head if head.starts_with("tool-") => tool_op(f)?,
         _ => rest_op(f)?,
@@ -209,28 +173,15 @@ fn spindle_op(f: &mut Fields<'_>) -> Res<Op<'static>> {
     Ok(match f.head {
         "spindle-mode" => {
             let surface = f.choice(&[("rpm", false), ("surface", true)])?;
-            Op::SpindleMode {
-                spindle,
-                surface: if surface { Some(f.num("limit")?) } else { None },
-            }
+            Op::SpindleMode { spindle, surface: if surface { Some(f.num("limit")?) } else { None } }
         }
-        "spindle-speed" => Op::SpindleSpeed {
-            spindle,
-            speed: f.num("speed")?,
-        },
+        "spindle-speed" => Op::SpindleSpeed { spindle, speed: f.num("speed")? },
         "spindle-turn" => {
             let turn = f.choice(&[("cw", Turn::Cw), ("ccw", Turn::Ccw), ("stop", Turn::Stop)])?;
             Op::SpindleTurn { spindle, turn }
         }
-        "spindle-orient" => Op::SpindleOrient {
-            spindle,
-            angle: f.num("angle")?,
-            direction: f.int_field("direction")?,
-        },
-        "spindle-wait" => Op::SpindleWait {
-            spindle,
-            timeout: f.num("timeout")?,
-        },
+        "spindle-orient" => Op::SpindleOrient { spindle, angle: f.num("angle")?, direction: f.int_field("direction")? },
+        "spindle-wait" => Op::SpindleWait { spindle, timeout: f.num("timeout")? },
         other => return Err(format!("unknown operation `{other}`")),
     })
 }
@@ -270,75 +221,43 @@ fn rest_op(f: &mut Fields<'_>) -> Res<Op<'static>> {
             };
             Op::Override(which, f.on_off()?)
         }
-        "digital-out" => Op::DigitalOut {
-            index: f.int()?,
-            on: f.on_off()?,
-            synced: f.flag("synced"),
-        },
-        "analog-out" => Op::AnalogOut {
-            index: f.int()?,
-            value: f.num("value")?,
-            synced: f.flag("synced"),
-        },
+        "digital-out" => Op::DigitalOut { index: f.int()?, on: f.on_off()?, synced: f.flag("synced") },
+        "analog-out" => Op::AnalogOut { index: f.int()?, value: f.num("value")?, synced: f.flag("synced") },
         "input-wait" => Op::InputWait {
             index: f.int()?,
             digital: f.choice(&[("digital", true), ("analog", false)])?,
             wait: f.int_field("wait")?,
             timeout: f.num("timeout")?,
         },
-        "user-m" => Op::UserM {
-            code: f.int()?,
-            p: f.num("p")?,
-            q: f.num("q")?,
-        },
+        "user-m" => Op::UserM { code: f.int()?, p: f.num("p")?, q: f.num("q")? },
         "indexer" => Op::IndexerLock(f.int()?, f.choice(&[("lock", true), ("unlock", false)])?),
         other => return Err(format!("unknown operation `{other}`")),
     })
 }
 
 fn plane(name: &str) -> Res<Plane> {
-    [
-        Plane::Xy,
-        Plane::Yz,
-        Plane::Xz,
-        Plane::Uv,
-        Plane::Vw,
-        Plane::Uw,
-    ]
-    .into_iter()
-    .find(|p| print::plane_name(*p) == name)
-    .ok_or_else(|| format!("unknown plane `{name}`"))
+    [Plane::Xy, Plane::Yz, Plane::Xz, Plane::Uv, Plane::Vw, Plane::Uw]
+        .into_iter()
+        .find(|p| print::plane_name(*p) == name)
+        .ok_or_else(|| format!("unknown plane `{name}`"))
 }
 
 fn marker(name: &str) -> Res<Marker> {
-    [
-        Marker::Tool,
-        Marker::Cycle,
-        Marker::Workingstep,
-        Marker::Feature,
-        Marker::Tolerance,
-    ]
-    .into_iter()
-    .find(|m| print::marker_name(*m) == name)
-    .ok_or_else(|| format!("unknown marker `{name}`"))
+    [Marker::Tool, Marker::Cycle, Marker::Workingstep, Marker::Feature, Marker::Tolerance]
+        .into_iter()
+        .find(|m| print::marker_name(*m) == name)
+        .ok_or_else(|| format!("unknown marker `{name}`"))
 }
 
 fn note(name: &str) -> Res<Note> {
-    [
-        Note::Comment,
-        Note::Message,
-        Note::Log,
-        Note::LogOpen,
-        Note::LogAppend,
-    ]
-    .into_iter()
-    .find(|n| print::note_name(*n) == name)
-    .ok_or_else(|| format!("unknown note `{name}`"))
+    [Note::Comment, Note::Message, Note::Log, Note::LogOpen, Note::LogAppend]
+        .into_iter()
+        .find(|n| print::note_name(*n) == name)
+        .ok_or_else(|| format!("unknown note `{name}`"))
 }
 
 fn number<T: std::str::FromStr>(text: &str) -> Res<T> {
-    text.parse()
-        .map_err(|_| format!("`{text}` is not a number that fits here"))
+    text.parse().map_err(|_| format!("`{text}` is not a number that fits here"))
 }
 
 /// One line taken apart: the head, bare words and numbers, `key=value` fields, at most one quoted text.
@@ -355,13 +274,7 @@ impl<'a> Fields<'a> {
         let line = line.trim();
         let (head, mut rest) = line.split_once(' ').unwrap_or((line, ""));
         let (bare, keyed) = (std::collections::VecDeque::new(), Vec::new());
-        let mut fields = Fields {
-            head,
-            bare,
-            keyed,
-            text: None,
-            source: None,
-        };
+        let mut fields = Fields { head, bare, keyed, text: None, source: None };
         loop {
             rest = rest.trim_start();
             if let Some(quoted) = rest.strip_prefix('"') {
@@ -409,17 +322,13 @@ impl<'a> Fields<'a> {
             return Err(format!("`{}` has no text", self.head));
         }
         match self.source {
-            Some(_) if matches!(self.head, "file" | "frame" | "start") => {
-                Err(format!("`{}` has no place", self.head))
-            }
+            Some(_) if matches!(self.head, "file" | "frame" | "start") => Err(format!("`{}` has no place", self.head)),
             _ => Ok(()),
         }
     }
 
     fn bare(&mut self) -> Res<&'a str> {
-        self.bare
-            .pop_front()
-            .ok_or_else(|| format!("`{}` is incomplete", self.head))
+        self.bare.pop_front().ok_or_else(|| format!("`{}` is incomplete", self.head))
     }
     fn int<T: std::str::FromStr>(&mut self) -> Res<T> {
         number(self.bare()?)
@@ -429,13 +338,10 @@ impl<'a> Fields<'a> {
     }
     fn choice<T: Copy>(&mut self, of: &[(&str, T)]) -> Res<T> {
         let word = self.bare()?;
-        of.iter()
-            .find(|(name, _)| *name == word)
-            .map(|(_, v)| *v)
-            .ok_or_else(|| {
-                let names: Vec<&str> = of.iter().map(|(n, _)| *n).collect();
-                format!("`{word}` stands where one of {} belongs", names.join(", "))
-            })
+        of.iter().find(|(name, _)| *name == word).map(|(_, v)| *v).ok_or_else(|| {
+            let names: Vec<&str> = of.iter().map(|(n, _)| *n).collect();
+            format!("`{word}` stands where one of {} belongs", names.join(", "))
+        })
     }
     fn on_off(&mut self) -> Res<bool> {
         self.choice(&[("on", true), ("off", false)])
@@ -448,17 +354,14 @@ impl<'a> Fields<'a> {
         found
     }
     fn text(&mut self) -> Res<String> {
-        self.text
-            .take()
-            .ok_or_else(|| format!("`{}` needs a text in quotes", self.head))
+        self.text.take().ok_or_else(|| format!("`{}` needs a text in quotes", self.head))
     }
     fn take(&mut self, key: &str) -> Option<&'a str> {
         let at = self.keyed.iter().position(|(k, _)| *k == key)?;
         Some(self.keyed.remove(at).1)
     }
     fn need(&mut self, key: &str) -> Res<&'a str> {
-        self.take(key)
-            .ok_or_else(|| format!("`{}` needs `{key}=`", self.head))
+        self.take(key).ok_or_else(|| format!("`{}` needs `{key}=`", self.head))
     }
     fn int_field<T: std::str::FromStr>(&mut self, key: &str) -> Res<T> {
         number(self.need(key)?)
@@ -503,22 +406,14 @@ impl<'a> Fields<'a> {
         let turns = self.int_field("turns")?;
         if name == "free" {
             let center = self.array("center")?;
-            return Ok(Arc {
-                plane: ArcPlane::Free(self.array("normal")?),
-                center,
-                turns,
-            });
+            return Ok(Arc { plane: ArcPlane::Free(self.array("normal")?), center, turns });
         }
         let plane = plane(name)?;
         let [first, second] = self.array("center")?;
         let axes = crate::state::plane_axes(plane);
         let mut center = start.xyz();
         (center[axes.0], center[axes.1]) = (first, second);
-        Ok(Arc {
-            plane: ArcPlane::Work(plane),
-            center,
-            turns,
-        })
+        Ok(Arc { plane: ArcPlane::Work(plane), center, turns })
     }
     fn source(&mut self) -> Res<Source> {
         let Some(text) = self.source else {
@@ -526,11 +421,7 @@ impl<'a> Fields<'a> {
         };
         let (at, frame) = text.split_once('/').unwrap_or((text, "0"));
         let (file, line) = place(at)?;
-        Ok(Source {
-            file,
-            line,
-            frame: FrameId(number(frame)?),
-        })
+        Ok(Source { file, line, frame: FrameId(number(frame)?) })
     }
 }
 
@@ -538,11 +429,7 @@ fn escape(chars: &mut std::str::CharIndices<'_>) -> Res<char> {
     match chars.next().map(|(_, c)| c) {
         Some(c @ ('"' | '\\')) => Ok(c),
         Some('u') => {
-            let digits: String = chars
-                .map(|(_, c)| c)
-                .skip_while(|c| *c == '{')
-                .take_while(|c| *c != '}')
-                .collect();
+            let digits: String = chars.map(|(_, c)| c).skip_while(|c| *c == '{').take_while(|c| *c != '}').collect();
             let code = u32::from_str_radix(&digits, 16).map_err(|_| "\\u{…} holds a hex number")?;
             char::from_u32(code).ok_or_else(|| "\\u{…} is no character".into())
         }

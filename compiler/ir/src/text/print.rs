@@ -1,8 +1,6 @@
 use super::{AXIS_NAMES, HEADER};
 use crate::op::{Arc, ArcPlane, Pose, Source};
-use crate::{
-    Axes, FeedMode, Marker, Note, Op, Override, PathMode, Plane, Program, Stop, Turn, Units,
-};
+use crate::{Axes, FeedMode, Marker, Note, Op, Override, PathMode, Plane, Program, Stop, Turn, Units};
 use std::fmt::Write as _;
 
 /// The whole program as text; `sources` adds where each operation comes from.
@@ -14,11 +12,7 @@ pub fn print(program: &Program, sources: bool) -> String {
 }
 
 /// Writes the program as text.
-pub fn write(
-    program: &Program,
-    sources: bool,
-    out: &mut dyn std::io::Write,
-) -> std::io::Result<()> {
+pub fn write(program: &Program, sources: bool, out: &mut dyn std::io::Write) -> std::io::Result<()> {
     let mut line = Line::default();
     write_header(program, &mut line);
     let mut cursor = program.cursor();
@@ -53,13 +47,7 @@ fn write_header(program: &Program, line: &mut Line) {
     }
     for frame in program.frames.iter() {
         line.word("frame").bare(frame.id.0);
-        let _ = write!(
-            line.0,
-            " parent={} at={}:{}",
-            frame.parent.0,
-            frame.file.0,
-            u64::from(frame.line) + 1
-        );
+        let _ = write!(line.0, " parent={} at={}:{}", frame.parent.0, frame.file.0, u64::from(frame.line) + 1);
         line.field("pass", frame.pass);
         line.text(program.frames.name(frame));
         line.end();
@@ -172,16 +160,11 @@ impl Line {
             Op::Rapid => self.word("rapid").pose(start, end),
             Op::Linear => self.word("linear").pose(start, end),
             Op::Arc(arc) => self.arc(arc).pose(start, end),
-            Op::Nurbs { order, points } => self
-                .word("nurbs")
-                .field("order", order)
-                .nums("points", points)
-                .pose(start, end),
+            Op::Nurbs { order, points } => {
+                self.word("nurbs").field("order", order).nums("points", points).pose(start, end)
+            }
             Op::Probe(kind) => self.word("probe").field("kind", kind).pose(start, end),
-            Op::RigidTap { bottom, scale } => self
-                .word("rigid-tap")
-                .nums("bottom", bottom)
-                .num("scale", *scale),
+            Op::RigidTap { bottom, scale } => self.word("rigid-tap").nums("bottom", bottom).num("scale", *scale),
             Op::Dwell(seconds) => self.word("dwell").bare_number(*seconds),
             Op::SyncStart(s) => self
                 .word("sync-start")
@@ -190,19 +173,12 @@ impl Line {
                 .flag(s.velocity, "velocity"),
             Op::SyncStop => self.word("sync-stop"),
             Op::ProbeMode(on) => self.word("probe-mode").bare(on_off(*on)),
-            Op::Units(units) => {
-                self.word("units")
-                    .bare(if *units == Units::Inch { "inch" } else { "mm" })
-            }
+            Op::Units(units) => self.word("units").bare(if *units == Units::Inch { "inch" } else { "mm" }),
             Op::Plane(plane) => self.word("plane").bare(plane_name(*plane)),
-            Op::FeedMode { spindle, mode } => self
-                .word("feed-mode")
-                .bare(feed_mode_name(*mode))
-                .field("spindle", spindle),
-            Op::Feed { linear, angular } => self
-                .word("feed")
-                .bare_number(*linear)
-                .num("angular", *angular),
+            Op::FeedMode { spindle, mode } => {
+                self.word("feed-mode").bare(feed_mode_name(*mode)).field("spindle", spindle)
+            }
+            Op::Feed { linear, angular } => self.word("feed").bare_number(*linear).num("angular", *angular),
             Op::FeedReferenceXyz => self.word("feed-reference xyz"),
             Op::PathMode(PathMode::ExactStop) => self.word("path exact-stop"),
             Op::PathMode(PathMode::ExactPath) => self.word("path exact-path"),
@@ -216,9 +192,7 @@ impl Line {
         match arc.plane {
             ArcPlane::Work(plane) => {
                 let (first, second, _) = crate::state::plane_axes(plane);
-                self.word("arc")
-                    .bare(plane_name(plane))
-                    .field("turns", arc.turns);
+                self.word("arc").bare(plane_name(plane)).field("turns", arc.turns);
                 self.nums("center", &[arc.center[first], arc.center[second]])
             }
             ArcPlane::Free(normal) => {
@@ -237,27 +211,12 @@ impl Line {
                     None => self.bare("rpm"),
                 }
             }
-            Op::SpindleSpeed { spindle, speed } => self
-                .word("spindle-speed")
-                .bare(spindle)
-                .num("speed", *speed),
-            Op::SpindleTurn { spindle, turn } => self
-                .word("spindle-turn")
-                .bare(spindle)
-                .bare(turn_name(*turn)),
-            Op::SpindleOrient {
-                spindle,
-                angle,
-                direction,
-            } => self
-                .word("spindle-orient")
-                .bare(spindle)
-                .num("angle", *angle)
-                .field("direction", direction),
-            Op::SpindleWait { spindle, timeout } => self
-                .word("spindle-wait")
-                .bare(spindle)
-                .num("timeout", *timeout),
+            Op::SpindleSpeed { spindle, speed } => self.word("spindle-speed").bare(spindle).num("speed", *speed),
+            Op::SpindleTurn { spindle, turn } => self.word("spindle-turn").bare(spindle).bare(turn_name(*turn)),
+            Op::SpindleOrient { spindle, angle, direction } => {
+                self.word("spindle-orient").bare(spindle).num("angle", *angle).field("direction", direction)
+            }
+            Op::SpindleWait { spindle, timeout } => self.word("spindle-wait").bare(spindle).num("timeout", *timeout),
             Op::Mist(on) => self.word("mist").bare(on_off(*on)),
             Op::Flood(on) => self.word("flood").bare(on_off(*on)),
             Op::ToolPrepare(n) => self.word("tool-prepare").bare(n),
@@ -265,21 +224,10 @@ impl Line {
             Op::ToolChange(pocket) => self.word("tool-change").field("pocket", pocket),
             Op::ToolNumber(n) => self.word("tool-number").bare(n),
             Op::ToolReload => self.word("tool-reload"),
-            Op::ToolEntry {
-                pocket,
-                tool,
-                offset,
-                diameter,
-                front,
-                back,
-                orientation,
-            } => {
+            Op::ToolEntry { pocket, tool, offset, diameter, front, back, orientation } => {
                 self.word("tool-entry").bare(tool).field("pocket", pocket);
-                self.num("diameter", *diameter)
-                    .num("front", *front)
-                    .num("back", *back);
-                self.field("orientation", orientation)
-                    .axes(&[0.0; 9], offset)
+                self.num("diameter", *diameter).num("front", *front).num("back", *back);
+                self.field("orientation", orientation).axes(&[0.0; 9], offset)
             }
             Op::ToolOffset(axes) => self.word("tool-offset").axes(&[0.0; 9], axes),
             Op::WorkOffset(n, axes) => self.word("work-offset").bare(n).axes(&[0.0; 9], axes),
@@ -301,26 +249,13 @@ impl Line {
                 };
                 self.bare(on_off(*on))
             }
-            Op::DigitalOut { index, on, synced } => self
-                .word("digital-out")
-                .bare(index)
-                .bare(on_off(*on))
-                .flag(*synced, "synced"),
-            Op::AnalogOut {
-                index,
-                value,
-                synced,
-            } => self
-                .word("analog-out")
-                .bare(index)
-                .num("value", *value)
-                .flag(*synced, "synced"),
-            Op::InputWait {
-                index,
-                digital,
-                wait,
-                timeout,
-            } => self
+            Op::DigitalOut { index, on, synced } => {
+                self.word("digital-out").bare(index).bare(on_off(*on)).flag(*synced, "synced")
+            }
+            Op::AnalogOut { index, value, synced } => {
+                self.word("analog-out").bare(index).num("value", *value).flag(*synced, "synced")
+            }
+            Op::InputWait { index, digital, wait, timeout } => self
                 .word("input-wait")
                 .bare(index)
                 .bare(if *digital { "digital" } else { "analog" })
@@ -333,16 +268,10 @@ impl Line {
             Op::Stop(stop) => self.word("stop").bare(stop_name(*stop)),
             Op::Finish => self.word("finish"),
             Op::Reset => self.word("reset"),
-            Op::IndexerLock(axis, on) => {
-                self.word("indexer")
-                    .bare(axis)
-                    .bare(if *on { "lock" } else { "unlock" })
+            Op::IndexerLock(axis, on) => self.word("indexer").bare(axis).bare(if *on { "lock" } else { "unlock" }),
+            Op::Begin { marker, code, text } => {
+                self.word("begin").bare(marker_name(*marker)).field("code", code).text(text)
             }
-            Op::Begin { marker, code, text } => self
-                .word("begin")
-                .bare(marker_name(*marker))
-                .field("code", code)
-                .text(text),
             Op::Close(marker) => self.word("close").bare(marker_name(*marker)),
             _ => self.word("end"),
         }
