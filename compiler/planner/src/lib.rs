@@ -15,7 +15,7 @@ pub mod stepnc;
 pub mod table;
 
 use gr_text::{Diagnostic, FileId};
-pub use plan::{Options, Planned, plan};
+pub use plan::{Loaded, Options, Planned, plan};
 pub use process::{Process, Tool, Units};
 
 /// Reads the process of a file. Faults of syntax and schema are not told here.

@@ -20,6 +20,37 @@ pub struct Options {
     pub name: String,
     /// Greatest distance of a rough wall or a scallop from the true surface, mm; none: the part's tolerance, or 0.05.
     pub tolerance: Option<f64>,
+    /// Tools of the control that take the place of the file's own numbers; none: numbers from 1.
+    pub tools: Vec<Loaded>,
+}
+
+/// The tool of the control that a tool of the file is.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Loaded {
+    /// Number as [`crate::process`] gives it.
+    pub tool: u32,
+    /// Number in the control's tool table.
+    pub number: u32,
+    /// Length in that table, mm; none: as the file says.
+    pub length: Option<f64>,
+}
+
+fn load(tool: &mut Tool, loaded: &[Loaded]) {
+    if let Some(l) = loaded.iter().find(|l| l.tool == tool.number) {
+        tool.number = l.number;
+        tool.length = l.length.or(tool.length);
+    }
+}
+
+fn load_all(elements: &mut [Element], loaded: &[Loaded]) {
+    for element in elements {
+        match element {
+            Element::Plan(p) => load_all(&mut p.elements, loaded),
+            Element::Step(s) => load(&mut s.operation.tool, loaded),
+            Element::Function(Function { kind: FunctionKind::LoadTool(t), .. }) => load(t, loaded),
+            _ => {}
+        }
+    }
 }
 
 /// A planned program.
@@ -35,8 +66,10 @@ pub struct Planned {
 
 /// Plans a file. Faults of syntax and schema are not told here; with an error there is no program.
 pub fn plan(text: &[u8], file: FileId, options: &Options) -> (Option<Planned>, Vec<Diagnostic>) {
-    let (process, tools, mut out) = crate::process(text, file, options.units);
-    let Some(process) = process else { return (None, out) };
+    let (process, mut tools, mut out) = crate::process(text, file, options.units);
+    let Some(mut process) = process else { return (None, out) };
+    load_all(&mut process.elements, &options.tools);
+    tools.iter_mut().for_each(|t| load(t, &options.tools));
     let lines = LineIndex::new(text);
     let tilted = process.steps().iter().any(|s| {
         let axis = |t: &Toolpath| matches!(t.path, PathKind::Location { axis: Some(_), .. });

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use gr_ir::geometry::ArcShape;
-use gr_ir::{FeedMode, Marker, Note, Op, Program, State, Stop, Turn, View};
+use gr_ir::{FeedMode, Marker, Note, Op, Program, Source, State, Stop, Turn, View};
 use gr_text::{Diagnostic, FileId, Span, code};
 
 /// What can be chosen.
@@ -28,7 +28,19 @@ pub struct Options {
 /// # Errors
 /// What STEP-NC cannot say, unless losses are allowed.
 pub fn write(program: &Program, options: &Options) -> Result<(String, Vec<Diagnostic>), Vec<Diagnostic>> {
-    let mut w = Writer::new(program, options);
+    write_at(program, options, &|source| (source.file, Span::default()))
+}
+
+/// The same; findings are at the places that `place` gives.
+///
+/// # Errors
+/// As [`write`].
+pub fn write_at(
+    program: &Program,
+    options: &Options,
+    place: &dyn Fn(Source) -> (FileId, Span),
+) -> Result<(String, Vec<Diagnostic>), Vec<Diagnostic>> {
+    let mut w = Writer::new(program, options, place);
     let mut cursor = program.cursor();
     while let Some(view) = cursor.next() {
         w.op(&view);
@@ -76,7 +88,7 @@ enum Element {
 
 struct Writer<'a> {
     options: &'a Options,
-    program: &'a Program,
+    place: &'a dyn Fn(Source) -> (FileId, Span),
     out: Vec<Diagnostic>,
     data: Vec<String>,
     plan: Vec<usize>,
@@ -92,7 +104,7 @@ struct Writer<'a> {
 }
 
 impl<'a> Writer<'a> {
-    fn new(program: &'a Program, options: &'a Options) -> Writer<'a> {
+    fn new(program: &'a Program, options: &'a Options, place: &'a dyn Fn(Source) -> (FileId, Span)) -> Writer<'a> {
         let mut highest = 0.0f64;
         for s in program.steps() {
             if s.op.moves() {
@@ -101,7 +113,7 @@ impl<'a> Writer<'a> {
         }
         let mut w = Writer {
             options,
-            program,
+            place,
             out: Vec::new(),
             data: Vec::new(),
             plan: Vec::new(),
@@ -140,12 +152,8 @@ impl<'a> Writer<'a> {
 
     fn cannot(&mut self, what: &str, view: &View<'_, '_>) {
         let code = if self.options.lossy { code::STEPNC_LEFT_OUT } else { code::STEPNC_NO_COUNTERPART };
-        let line = view.source.line + 1;
-        let what = match self.program.file_name(view.source.file) {
-            Some(name) => format!("{what} ({name}:{line})"),
-            None => format!("{what} (line {line})"),
-        };
-        let d = Diagnostic::new(code, FileId(view.source.file.0), Span::new(0, 0), &[what]);
+        let (file, span) = (self.place)(view.source);
+        let d = Diagnostic::new(code, file, span, &[what.to_string()]);
         if !self.out.contains(&d) {
             self.out.push(d);
         }

@@ -4,7 +4,8 @@
 //! begins with a layer at depth 0, makes circles of forty chords, ignores allowances and setups, and starts and
 //! ends every workingstep at one point of the security plane: all of that is repeated here.
 
-use gr_text::{Diagnostic, FileId, code};
+use gr_ir::{Builder, Marker, Op, Program, Source};
+use gr_text::{Diagnostic, FileId, LineIndex, code};
 
 use crate::frame::{Frame, scale};
 use crate::process::*;
@@ -62,6 +63,38 @@ pub fn points(process: &Process, file: FileId) -> Result<Vec<Point>, Vec<Diagnos
         }
     }
     if faults.is_empty() { Ok(out) } else { Err(faults) }
+}
+
+/// The points as motion: one operation each, rapid where nothing is cut. Tools are changed as the system did,
+/// with every workingstep that needs another one; spindle and coolant it left to the robot.
+pub fn program(points: &[Point], process: &Process, lines: &LineIndex, file: FileId, name: &str) -> Program {
+    let mut b = Builder::new();
+    b.file(file, name);
+    b.push(Op::Units(gr_ir::Units::Mm), Source { file, ..Source::default() });
+    let mut tool = None;
+    for step in process.steps() {
+        let source = Source { file, line: lines.position(step.origin.span.start).0, ..Source::default() };
+        let code = i32::try_from(step.origin.id).unwrap_or(i32::MAX);
+        b.push(Op::Begin { marker: Marker::Workingstep, code, text: &step.name }, source);
+        if tool.replace(step.operation.tool.number) != Some(step.operation.tool.number) {
+            let number = i32::try_from(step.operation.tool.number).unwrap_or(i32::MAX);
+            for op in [Op::ToolPrepare(number), Op::ToolChangeStart, Op::ToolChange(number)] {
+                b.push(op, source);
+            }
+        }
+        if let Some(feed) = step.operation.technology.feed {
+            b.push(Op::Feed { linear: feed, angular: feed.to_radians() }, source);
+        }
+        for p in points.iter().filter(|p| p.step == step.origin.id) {
+            let mut pose = *b.pose();
+            pose.axes[..3].copy_from_slice(&p.at.map(|c| c + 0.0));
+            pose.tool_axis = Some(scale(p.axis, -1.0).map(|c| c + 0.0));
+            b.push_to(if p.kind == Kind::Cut { Op::Linear } else { Op::Rapid }, &pose, source);
+        }
+        b.push(Op::Close(Marker::Workingstep), source);
+    }
+    b.push(Op::End, Source { file, ..Source::default() });
+    b.finish()
 }
 
 fn workingstep(step: &Workingstep, out: &mut Vec<Point>) -> Result<(), String> {
