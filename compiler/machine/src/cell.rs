@@ -37,6 +37,12 @@ pub struct Cell {
     pub joint_speed: Option<f64>,
     /// Corner zones.
     pub zones: Zones,
+    /// How exactly joints and geometry are made; none = not said.
+    pub accuracy: Option<crate::Accuracy>,
+    /// What yields under force; none = not said.
+    pub stiffness: Option<crate::Stiffness>,
+    /// Identified deviations of the geometry; none = only the nominal geometry is known.
+    pub as_built: Option<crate::AsBuilt>,
 }
 
 /// A tool.

@@ -34,6 +34,14 @@ pub struct FiveAxis {
 }
 
 impl FiveAxis {
+    /// Its rotary axes.
+    pub fn rotary(&self) -> [Rotary; 2] {
+        self.rotary
+    }
+    /// From the crossing of the head's axes to the spindle nose, mm.
+    pub fn pivot(&self) -> f64 {
+        self.pivot
+    }
     /// With two rotary axes, the one nearer to the bed first, and the distance from the crossing of the head's axes
     /// to the spindle nose, mm.
     pub fn new(rotary: [Rotary; 2], pivot: f64) -> FiveAxis {

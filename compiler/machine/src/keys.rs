@@ -73,6 +73,9 @@ pub(crate) static ROOT: &[Key] = &[
     key("zone", Table(ZONE), "Corner zones, mm."),
     key("controller", Table(CONTROLLER), "Limits of the controller's files."),
     key("io", Map(SIGNAL), "What M3 M4 M5 S M6 M7 M8 M9 M62 … M68 do."),
+    key("accuracy", Table(ACCURACY), "How exactly joints and geometry are made."),
+    key("stiffness", Table(STIFFNESS), "What yields under force."),
+    key("as_built", Table(AS_BUILT), "Deviations of the geometry that have been measured or identified."),
     key("reference", Table(REFERENCE), "Laid over the file in the reference mode: the model of the publication."),
 ];
 
@@ -209,6 +212,45 @@ static SIGNAL: &[Key] = &[
     key("routine", Text, "Routine that is called."),
     key("wait", Text, "Input that is waited for."),
     key("seconds", Number, "Time of the wait, s."),
+];
+
+static ACCURACY: &[Key] = &[
+    must("source", Text, "Where the numbers come from."),
+    key("joints", Numbers(0), "Error of each joint, plus or minus, mm or degrees."),
+    key("grade", Whole, "Grade of ISO 286-1 of every length of the geometry: 1 to 18."),
+    key("parameter", Tables(TOLERANCE), "Tolerances of single parameters; they go before the grade."),
+];
+
+static TOLERANCE: &[Key] = &[
+    must("name", Text, "Name of the parameter: `gcc-robot machine show` lists them."),
+    must("tolerance", Number, "Plus or minus, mm or degrees."),
+];
+
+static STIFFNESS: &[Key] = &[
+    must("source", Text, "Where the numbers come from."),
+    key("modulus", Number, "Modulus of elasticity of bars and screws, N/mm²."),
+    must("member", Tables(MEMBER), "Springs between base and tool; those of one joint are in series."),
+];
+
+static MEMBER: &[Key] = &[
+    must("joint", Text, "Joint along or about which it yields."),
+    must("name", Text, "For people: `rod`, `nut`, `gear`."),
+    key("stiffness", Number, "N/mm for a sliding joint, N·mm/rad for a turning one."),
+    key("outer", Number, "Diameter of a bar or screw, mm."),
+    key("inner", Number, "Its bore, mm; else solid."),
+    key("length", Number, "Length of a bar, mm."),
+    key("shorter_by", Number, "A screw whose free length is the joint value less this, mm."),
+    key("between", Numbers(2), "A screw held at both ends, its nut at the joint value: the ends, mm."),
+];
+
+static AS_BUILT: &[Key] = &[
+    must("source", Text, "Who measured it, how and when."),
+    must("parameter", Tables(DEVIATION), "Parameters that differ from their nominal values."),
+];
+
+static DEVIATION: &[Key] = &[
+    must("name", Text, "Name of the parameter: `gcc-robot machine show` lists them."),
+    must("deviation", Number, "Actual less nominal, mm or degrees."),
 ];
 
 static REFERENCE: &[Key] = &[

@@ -14,6 +14,8 @@
 //! | `planar`, `cartesian`, `scara`, `opw`, `ur`, `five_axis`, `prp`, `tricept`, `serial` | one kind of kinematics each |
 //! | `cell` | tools, frames, signals: what surrounds the joints |
 //! | `differential` | Jacobian, manipulability, condition |
+//! | `parameters` | the geometry as named numbers, and the machine with other numbers |
+//! | `quality` | accuracy, stiffness, identified geometry, as the file says them |
 //! | `mobility` | degrees of freedom of a mechanism from its structure |
 //! | `identify` | OPW lengths of a chain of joint frames |
 //! | `urdf` | machine files made from URDF |
@@ -33,8 +35,10 @@ mod library;
 pub mod math;
 mod mobility;
 mod opw;
+mod parameters;
 mod planar;
 mod prp;
+mod quality;
 mod scara;
 mod schema;
 mod serial;
@@ -52,8 +56,10 @@ pub use kinematics::{Control, Kinematics, KinematicsError, Pose, Solution, Viola
 pub use library::{builtin, is_path, list, reference, source, suggestion};
 pub use mobility::{Mobility, mobility};
 pub use opw::{Eight, Opw};
+pub use parameters::{Parameter, ParameterKind, parameter_columns};
 pub use planar::Planar3r;
 pub use prp::{SphericalAxis, TwoLegs, TwoLegsShape};
+pub use quality::{Accuracy, AsBuilt, Member, Spring, Stiffness};
 pub use scara::Scara;
 pub use schema::{parse, parse_reference};
 pub use serial::{DhRow, Link, Serial};

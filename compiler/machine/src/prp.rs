@@ -1,6 +1,8 @@
 use crate::kinematics::{Control, Kinematics, KinematicsError, Pose, Solution, Violation, checked};
 use crate::math::{Frame, V3, dot, norm, rot_z, solve};
 
+mod errors;
+
 /// Parallel machine 2UPS+PRP: two legs between base and platform, a driven column that carries a turning telescopic
 /// arm (E. E. R. Gojtan, EPUSP 2009, chapter 5). Joints: the two leg lengths and the height of the column. The tool
 /// can be put anywhere in x y z; its turn about z follows from the position.

@@ -15,6 +15,10 @@ impl Scara {
     pub fn new(links: [f64; 2], height: f64) -> Scara {
         Scara { links, height }
     }
+    /// The two links and the height of the tool at stroke 0, mm.
+    pub fn lengths(&self) -> [f64; 3] {
+        [self.links[0], self.links[1], self.height]
+    }
 }
 
 /// How far the tool axis may lean from straight down, by rounding.

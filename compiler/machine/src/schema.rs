@@ -13,6 +13,8 @@ use crate::{
 use gr_text::{Diagnostic, FileId, Span, code};
 use std::ops::Range;
 
+mod quality;
+
 /// Reads a machine file. Every fault found is in the list.
 pub fn parse(file: FileId, text: &str) -> Result<Machine, Vec<Diagnostic>> {
     parse_as(file, text, false)
@@ -193,6 +195,7 @@ impl Check {
         if start.is_none() {
             default_start(&mut machine);
         }
+        self.quality(raw, &mut machine);
         machine
     }
 
@@ -513,6 +516,7 @@ impl Check {
             rapid_speed: number("speed", "rapid"),
             joint_speed: number("speed", "joint"),
             zones: Zones { default: number("zone", "default"), max: number("zone", "max") },
+            ..Cell::default()
         }
     }
 

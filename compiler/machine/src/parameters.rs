@@ -1,0 +1,314 @@
+//! The geometry of a machine as a list of named numbers, and the machine with other numbers: what a tolerance, an
+//! identification or a sensitivity speaks of.
+
+use crate::kinematics::{Control, Kinematics, KinematicsError, Pose, Solution, Violation};
+use crate::math::{Frame, V3, add, cross, norm, scale};
+use crate::{Carrier, Chain, JointKind, Machine, Opw, ParallelWrist, Planar3r, Scara, Serial, Tricept, TwoLegs};
+
+/// A number of the geometry.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Parameter {
+    /// Its name in machine files and reports: `a2`, `ls1x`, `J3.zero`.
+    pub name: String,
+    /// Its nominal value, mm or rad.
+    pub nominal: f64,
+    /// A length or an angle.
+    pub kind: ParameterKind,
+}
+
+/// What a parameter measures.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum ParameterKind {
+    /// mm
+    Length,
+    /// rad
+    Angle,
+}
+
+use ParameterKind::{Angle, Length};
+
+/// Names of the twelve lengths of [`TwoLegs`], in the order of [`Machine::parameters`].
+const TWO_LEGS: [&str; 12] =
+    ["ls1x", "ls1y", "ls1z", "ls2x", "ls2y", "ls2z", "lu1x", "lu1y", "lu1z", "lu2x", "lu2y", "lu2z"];
+
+impl Machine {
+    /// The numbers its geometry is made of: those of the kinematics, then the zero of every joint.
+    pub fn parameters(&self) -> Vec<Parameter> {
+        let mut out = Vec::new();
+        let mut push = |name: &str, nominal: f64, kind| out.push(Parameter { name: name.to_string(), nominal, kind });
+        let mut list = |names: &[&str], values: &[f64]| names.iter().zip(values).for_each(|(n, v)| push(n, *v, Length));
+        match &self.chain {
+            Chain::Planar3r(l) => list(&["l1", "l2", "l3"], l),
+            Chain::Scara(k) => list(&["l1", "l2", "height"], &k.lengths()),
+            Chain::Opw(k) => list(&["a1", "a2", "b", "c1", "c2", "c3", "c4"], &k.lengths()),
+            Chain::ParallelWrist(k) => list(&["d1", "a2", "a3", "d4", "d5", "d6"], &k.lengths()),
+            Chain::TwoLegs(k) => {
+                let values: Vec<f64> = k.shape.platform.iter().chain(&k.shape.base).flatten().copied().collect();
+                list(&TWO_LEGS, &values);
+                // The thesis has no more parameters: zeros of the joints are its joint errors.
+                return out;
+            }
+            Chain::Tricept(k) => {
+                let s = &k.shape;
+                let names = ["base_radius", "platform_radius", "wrist_offset", "flange_offset"];
+                list(&names, &[s.base_radius, s.platform_radius, s.wrist_offset, s.flange_offset]);
+            }
+            Chain::Cartesian => {
+                let sliding = self.joints.iter().take_while(|j| j.kind == JointKind::Prismatic).count();
+                for (name, axes) in [("square-xy", 2), ("square-xz", 3), ("square-yz", 3)] {
+                    if sliding >= axes {
+                        push(name, 0.0, Angle);
+                    }
+                }
+            }
+            Chain::FiveAxis(k) => {
+                push("pivot", k.pivot(), Length);
+                for (i, r) in k.rotary().iter().enumerate() {
+                    if r.on == Carrier::Table {
+                        for (axis, v) in ["x", "y", "z"].iter().zip(r.point) {
+                            push(&format!("rotary{}.{axis}", i + 1), v, Length);
+                        }
+                    }
+                    for side in ["a", "b"] {
+                        push(&format!("rotary{}.tilt-{side}", i + 1), 0.0, Angle);
+                    }
+                }
+            }
+            Chain::Serial(k) => {
+                for (j, link) in self.joints.iter().zip(k.links()) {
+                    for (axis, v) in ["x", "y", "z"].iter().zip(link.origin.position) {
+                        push(&format!("{}.{axis}", j.name), v, Length);
+                    }
+                    for axis in ["a", "b", "c"] {
+                        push(&format!("{}.{axis}", j.name), 0.0, Angle);
+                    }
+                }
+            }
+            Chain::Incomplete { .. } => return out,
+        }
+        for j in &self.joints {
+            let kind = if j.kind == JointKind::Revolute { Angle } else { Length };
+            push(&format!("{}.zero", j.name), 0.0, kind);
+        }
+        out
+    }
+
+    /// The kinematics with deviations (mm, rad) of the [`Machine::parameters`], in their order; missing ones are 0.
+    pub fn deviated(&self, deviations: &[f64]) -> Box<dyn Kinematics> {
+        let mut rest = deviations.iter().copied();
+        let mut next = || rest.next().unwrap_or(0.0);
+        let inner: Box<dyn Kinematics> = match &self.chain {
+            Chain::Planar3r(l) => Box::new(Planar3r::new(l.map(|v| v + next()))),
+            Chain::Scara(k) => {
+                let [l1, l2, height] = k.lengths().map(|v| v + next());
+                Box::new(Scara::new([l1, l2], height))
+            }
+            Chain::Opw(k) => Box::new(Opw::new(k.lengths().map(|v| v + next()), k.offsets(), k.signs())),
+            Chain::ParallelWrist(k) => Box::new(ParallelWrist::new(k.lengths().map(|v| v + next()))),
+            Chain::TwoLegs(k) => {
+                let mut shape = k.shape.clone();
+                for point in shape.platform.iter_mut().chain(&mut shape.base) {
+                    *point = point.map(|v| v + next());
+                }
+                return Box::new(TwoLegs { shape });
+            }
+            Chain::Tricept(k) => {
+                let mut shape = k.shape;
+                for v in [
+                    &mut shape.base_radius,
+                    &mut shape.platform_radius,
+                    &mut shape.wrist_offset,
+                    &mut shape.flange_offset,
+                ] {
+                    *v += next();
+                }
+                Box::new(Tricept { shape, reference: k.reference })
+            }
+            Chain::Cartesian => {
+                let sliding = self.joints.iter().take_while(|j| j.kind == JointKind::Prismatic).count();
+                let mut skew = [0.0; 3];
+                for (s, axes) in skew.iter_mut().zip([2, 3, 3]) {
+                    if sliding >= axes {
+                        *s = next();
+                    }
+                }
+                Box::new(Skewed { inner: self.kinematics(), skew })
+            }
+            Chain::FiveAxis(k) => {
+                let mut rotary = k.rotary();
+                let pivot = k.pivot() + next();
+                for r in &mut rotary {
+                    if r.on == Carrier::Table {
+                        r.point = r.point.map(|v| v + next());
+                    }
+                    r.axis = tilted(r.axis, next(), next());
+                }
+                Box::new(crate::FiveAxis::new(rotary, pivot))
+            }
+            Chain::Serial(k) => {
+                let links = k.links().iter().map(|l| {
+                    let shift = [next(), next(), next()];
+                    let turn = [next(), next(), next()];
+                    let moved = Frame { position: add(l.origin.position, shift), turn: l.origin.turn };
+                    crate::Link { origin: moved.then(&Frame::new([0.0; 3], turn)), ..l.clone() }
+                });
+                Box::new(Serial::new(links.collect(), *k.tip()))
+            }
+            Chain::Incomplete { .. } => return self.kinematics(),
+        };
+        let zeros = self.joints.iter().map(|_| next()).collect();
+        Box::new(Shifted { inner, zeros })
+    }
+}
+
+/// A direction leaned by two small turns about the directions square to it.
+fn tilted(axis: V3, a: f64, b: f64) -> V3 {
+    let helper = if axis[2].abs() < 0.9 { [0.0, 0.0, 1.0] } else { [1.0, 0.0, 0.0] };
+    let u = cross(helper, axis);
+    let u = scale(u, 1.0 / norm(u));
+    let v = cross(axis, u);
+    let leaned = add(axis, add(scale(u, a), scale(v, b)));
+    scale(leaned, 1.0 / norm(leaned))
+}
+
+/// Joints whose zero is not where it should be: the machine stands at value + zero.
+struct Shifted {
+    inner: Box<dyn Kinematics>,
+    zeros: Vec<f64>,
+}
+
+impl Shifted {
+    fn shifted(&self, joints: &[f64], sign: f64) -> Vec<f64> {
+        joints.iter().zip(&self.zeros).map(|(q, z)| q + sign * z).collect()
+    }
+}
+
+impl Kinematics for Shifted {
+    fn joint_count(&self) -> usize {
+        self.inner.joint_count()
+    }
+    fn control(&self) -> Control {
+        self.inner.control()
+    }
+    fn forward(&self, joints: &[f64]) -> Result<Pose, KinematicsError> {
+        self.inner.forward(&self.shifted(joints, 1.0))
+    }
+    fn forward_frame(&self, joints: &[f64]) -> Result<Frame, KinematicsError> {
+        self.inner.forward_frame(&self.shifted(joints, 1.0))
+    }
+    fn inverse(&self, pose: &Pose) -> Result<Vec<Solution>, KinematicsError> {
+        let mut all = self.inner.inverse(pose)?;
+        all.iter_mut().for_each(|s| s.joints = self.shifted(&s.joints, -1.0));
+        Ok(all)
+    }
+    fn inverse_frame(&self, frame: &Frame) -> Result<Vec<Solution>, KinematicsError> {
+        let mut all = self.inner.inverse_frame(frame)?;
+        all.iter_mut().for_each(|s| s.joints = self.shifted(&s.joints, -1.0));
+        Ok(all)
+    }
+    fn violations(&self, joints: &[f64]) -> Vec<Violation> {
+        self.inner.violations(&self.shifted(joints, 1.0))
+    }
+}
+
+/// Linear axes that don't stand square: Y leans towards X by the first angle, Z towards X and Y by the others.
+struct Skewed {
+    inner: Box<dyn Kinematics>,
+    skew: [f64; 3],
+}
+
+impl Skewed {
+    fn skewed(&self, [x, y, z]: V3) -> V3 {
+        let [xy, xz, yz] = self.skew;
+        [x + xy * y + xz * z, y + yz * z, z]
+    }
+    fn straightened(&self, [x, y, z]: V3) -> V3 {
+        let [xy, xz, yz] = self.skew;
+        let y = y - yz * z;
+        [x - xy * y - xz * z, y, z]
+    }
+}
+
+impl Kinematics for Skewed {
+    fn joint_count(&self) -> usize {
+        self.inner.joint_count()
+    }
+    fn control(&self) -> Control {
+        self.inner.control()
+    }
+    fn forward(&self, joints: &[f64]) -> Result<Pose, KinematicsError> {
+        let pose = self.inner.forward(joints)?;
+        Ok(Pose { position: self.skewed(pose.position), ..pose })
+    }
+    fn forward_frame(&self, joints: &[f64]) -> Result<Frame, KinematicsError> {
+        let frame = self.inner.forward_frame(joints)?;
+        Ok(Frame { position: self.skewed(frame.position), ..frame })
+    }
+    fn inverse(&self, pose: &Pose) -> Result<Vec<Solution>, KinematicsError> {
+        self.inner.inverse(&Pose { position: self.straightened(pose.position), ..*pose })
+    }
+    fn inverse_frame(&self, frame: &Frame) -> Result<Vec<Solution>, KinematicsError> {
+        self.inner.inverse_frame(&Frame { position: self.straightened(frame.position), ..*frame })
+    }
+    fn violations(&self, joints: &[f64]) -> Vec<Violation> {
+        self.inner.violations(joints)
+    }
+}
+
+/// Movement of the tool (mm, then rad) per unit of each of the [`Machine::parameters`] with the joints held, one
+/// column each; central differences, exact for [`TwoLegs`].
+pub fn parameter_columns(machine: &Machine, joints: &[f64]) -> Result<Vec<[f64; 6]>, KinematicsError> {
+    let parameters = machine.parameters();
+    if let Chain::TwoLegs(k) = &machine.chain {
+        let &[h1, h2, h3] = crate::kinematics::checked(joints, 3)? else { return Err(KinematicsError::NotFinite) };
+        return k.parameter_columns([h1, h2, h3]).ok_or(KinematicsError::Singular);
+    }
+    if let Chain::Tricept(_) = machine.chain {
+        return by_inverse(machine, &parameters, joints);
+    }
+    let mut deviations = vec![0.0; parameters.len()];
+    let mut out = Vec::with_capacity(parameters.len());
+    for (i, p) in parameters.iter().enumerate() {
+        let h = if p.kind == Length { 1e-4 * p.nominal.abs().max(10.0) } else { 1e-6 };
+        deviations[i] = h;
+        let plus = machine.deviated(&deviations).forward_frame(joints)?;
+        deviations[i] = -h;
+        let minus = machine.deviated(&deviations).forward_frame(joints)?;
+        deviations[i] = 0.0;
+        out.push(crate::differential::rate(&plus, &minus, 2.0 * h));
+    }
+    Ok(out)
+}
+
+
+/// The same where the forward solution is a search: what the joints would have to change at the same pose, times what
+/// the joints move the tool.
+fn by_inverse(
+    machine: &Machine,
+    parameters: &[Parameter],
+    joints: &[f64],
+) -> Result<Vec<[f64; 6]>, KinematicsError> {
+    let columns = crate::differential::velocity(machine, joints)?;
+    let here = machine.kinematics().forward_frame(joints)?;
+    let near = |deviations: &[f64]| -> Result<Vec<f64>, KinematicsError> {
+        let far = |q: &Vec<f64>| q.iter().zip(joints).map(|(a, b)| (a - b) * (a - b)).sum::<f64>();
+        let all = machine.deviated(deviations).inverse_frame(&here)?.into_iter().map(|s| s.joints);
+        all.min_by(|a, b| far(a).total_cmp(&far(b))).ok_or(KinematicsError::NoAssembly)
+    };
+    let mut deviations = vec![0.0; parameters.len()];
+    let mut out = Vec::with_capacity(parameters.len());
+    for (i, p) in parameters.iter().enumerate() {
+        let h = if p.kind == Length { 1e-4 * p.nominal.abs().max(10.0) } else { 1e-6 };
+        deviations[i] = h;
+        let plus = near(&deviations)?;
+        deviations[i] = -h;
+        let minus = near(&deviations)?;
+        deviations[i] = 0.0;
+        let mut moved = [0.0; 6];
+        for (column, (p, m)) in columns.iter().zip(plus.iter().zip(&minus)) {
+            (0..6).for_each(|k| moved[k] -= column[k] * (p - m) / (2.0 * h));
+        }
+        out.push(moved);
+    }
+    Ok(out)
+}
