@@ -8,9 +8,14 @@ mod html;
 mod path;
 mod raster;
 mod svg;
+pub mod trace;
 
 use gr_ir::Program;
+pub use html::page as preview_page;
 pub use path::Class;
+pub use trace::Trace;
+
+use crate::sheet::ToolRow;
 
 /// What the picture shows.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Default)]
@@ -41,11 +46,23 @@ pub struct Options {
     pub title: String,
     /// Draw rapids.
     pub rapids: bool,
+    /// Page: the program, shown beside the path; may be empty.
+    pub text: String,
+    /// Page: tools for the marks of their changes.
+    pub tools: Vec<ToolRow>,
 }
 
 impl Default for Options {
     fn default() -> Options {
-        Options { show: Show::All, width: 1400, height: 900, title: String::new(), rapids: true }
+        Options {
+            show: Show::All,
+            width: 1400,
+            height: 900,
+            title: String::new(),
+            rapids: true,
+            text: String::new(),
+            tools: Vec::new(),
+        }
     }
 }
 
@@ -65,10 +82,11 @@ pub fn svg(program: &Program, options: &Options) -> String {
     canvas.finish()
 }
 
-/// A page of its own, with the path inside: turn, zoom, hide.
+/// A page of its own, with the path inside: turn, zoom, play, measure, hide; the program stands beside it.
 pub fn html(program: &Program, options: &Options) -> String {
-    let path = path::Path::new(program, true);
-    html::page(&path, &options.title)
+    let trace = Trace::new(program, &trace::TraceOptions { tools: options.tools.clone(), ..trace::TraceOptions::default() });
+    let text = (!options.text.is_empty()).then_some(options.text.as_str());
+    html::page(&options.title, Some(trace.json(&options.title)), text)
 }
 
 fn limit(pixels: u32) -> u32 {

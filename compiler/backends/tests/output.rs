@@ -167,7 +167,7 @@ fn svg_and_html_are_whole() {
         assert!(svg.contains(&format!("<path class=\"{class}\"")), "{class}");
     }
     let page = plot::html(&part(), &options);
-    assert!(!page.contains("@@") && page.contains("a&lt;b&gt;.ngc") && page.contains("names:[\"rapid\""));
+    assert!(!page.contains("@@") && page.contains("a&lt;b&gt;.ngc") && page.contains("\"count\":"));
 }
 
 #[test]
@@ -176,6 +176,23 @@ fn an_empty_program_gives_an_empty_picture() {
     let empty = Program::default();
     assert!(plot::png(&empty, &options).is_ok());
     assert!(plot::svg(&empty, &options).contains("no motion"));
-    assert!(plot::html(&empty, &options).contains("runs:[]"));
+    assert!(plot::html(&empty, &options).contains("\"count\":0"));
     assert!(sheet::sheet(&empty, &sheet::Options::default()).text().contains("Time     0:00:00"));
+}
+
+#[test]
+fn a_trace_says_where_each_point_comes_from() {
+    let trace = plot::Trace::new(&part(), &plot::trace::TraceOptions::default());
+    let n = trace.positions.len();
+    assert!(n > 4 && [trace.kinds.len(), trace.lines.len(), trace.times.len(), trace.feeds.len()] == [n; 4]);
+    assert_eq!(trace.kinds[0], plot::trace::JUMP);
+    assert!(trace.times.windows(2).all(|t| t[0] <= t[1]), "time goes on");
+    assert!((f64::from(trace.times[n - 1]) - trace.totals.seconds()).abs() < 1e-3);
+    assert!(trace.kinds.iter().zip(&trace.feeds).all(|(k, f)| *k != 0 || *f == 0.0), "rapids have no feed");
+}
+
+#[test]
+fn data_cannot_end_its_element() {
+    let page = plot::html(&part(), &plot::Options { text: "(</script>)".into(), ..Default::default() });
+    assert!(page.contains("(\\u003c/script>)") && page.matches("</script>").count() == 2);
 }

@@ -30,7 +30,8 @@ pub struct PreviewParams {
     pub most_points: Option<u32>,
 }
 
-/// The tool path. Point `i` is joined to point `i - 1`, unless its kind is [`JUMP`].
+/// The tool path. Point `i` is joined to point `i - 1`, unless its kind is [`JUMP`]. Its arrays are those of
+/// `gr_backends::plot::Trace`, which makes them of motion for the pages of `gcc-robot preview`.
 #[derive(Serialize, Clone, Debug, Default, PartialEq)]
 #[serde(rename_all = "camelCase")]
 pub struct Preview {

@@ -38,7 +38,7 @@ impl Class {
             Class::Other => [158, 54, 160],
         }
     }
-    fn of(op: &Op<'_>) -> Option<Class> {
+    pub(super) fn of(op: &Op<'_>) -> Option<Class> {
         Some(match op {
             Op::Rapid => Class::Rapid,
             Op::Linear => Class::Feed,
@@ -66,7 +66,7 @@ pub struct Path {
 
 /// Positions in the work frame the program moves in first, without tool offsets, so that moves under other
 /// offsets stand where they belong.
-struct Common {
+pub(super) struct Common {
     first: Option<State>,
     here: State,
     same: bool,
@@ -77,17 +77,17 @@ fn offsets(state: &State) -> ([f64; 9], [f64; 9], f64) {
 }
 
 impl Common {
-    fn new() -> Common {
+    pub(super) fn new() -> Common {
         Common { first: None, here: State::default(), same: true }
     }
-    fn enter(&mut self, state: &State) {
+    pub(super) fn enter(&mut self, state: &State) {
         let mut state = *state;
         state.tool_offset = [0.0; 9];
         let first = self.first.get_or_insert(state);
         self.same = offsets(first) == offsets(&state);
         self.here = state;
     }
-    fn place(&self, axes: &[f64; 9]) -> [f64; 3] {
+    pub(super) fn place(&self, axes: &[f64; 9]) -> [f64; 3] {
         match &self.first {
             Some(first) if !self.same => {
                 let p = first.work_frame(&self.here.machine(axes));
@@ -157,16 +157,16 @@ impl Path {
     }
 }
 
-fn single(p: [f64; 3]) -> [f32; 3] {
+pub(super) fn single(p: [f64; 3]) -> [f32; 3] {
     p.map(|v| v as f32)
 }
 
-fn moves_frame(op: &Op<'_>) -> bool {
+pub(super) fn moves_frame(op: &Op<'_>) -> bool {
     matches!(op, Op::WorkOffset(..) | Op::LocalOffset(_) | Op::Rotation(_))
 }
 
 /// Largest side of the box around the ends of all moves: what curves are thinned by.
-fn rough_size(program: &Program) -> f64 {
+pub(super) fn rough_size(program: &Program) -> f64 {
     let mut extent = Extent::default();
     let mut cursor = program.cursor();
     while let Some(view) = cursor.next() {

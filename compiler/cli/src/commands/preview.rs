@@ -64,5 +64,5 @@ fn options(args: &PreviewArgs) -> Options {
         ViewArg::Front => Show::Front,
         ViewArg::Right => Show::Right,
     };
-    Options { show, width: args.width, height: args.height, title: stem(&args.file), rapids: !args.no_rapids }
+    Options { show, width: args.width, height: args.height, title: stem(&args.file), rapids: !args.no_rapids, ..Options::default() }
 }

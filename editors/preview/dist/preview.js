@@ -1,0 +1,182 @@
+"use strict";(()=>{var E={iso:[-Math.PI/4,.6155],top:[0,Math.PI/2],front:[0,0],right:[Math.PI/2,0]},N=class{turn=E.iso[0];tilt=E.iso[1];target=[0,0,0];scale=4;width=1;height=1;radius=100;basis(){let[t,e,n,i]=[Math.cos(this.turn),Math.sin(this.turn),Math.sin(this.tilt),Math.cos(this.tilt)];return[[t,e,0],[-e*n,t*n,i],[e*i,-t*i,n]]}fit(t){let[e,n]=t??[[-50,-50,-50],[50,50,50]];this.target=[0,1,2].map(a=>(e[a]+n[a])/2);let i=[0,1,2].map(a=>n[a]-e[a]);this.radius=Math.max(Math.hypot(...i)/2,.001);let[s,o]=this.basis(),l=a=>Math.max(a.reduce((h,c,p)=>h+Math.abs(c)*i[p],0),this.radius/50);this.scale=.86*Math.min(this.width/l(s),this.height/l(o))}look(t,e){[this.turn,this.tilt]=E[t]??E.iso,this.fit(e)}orbit(t,e){this.turn-=t*.008,this.tilt=Math.max(-Math.PI/2,Math.min(Math.PI/2,this.tilt+e*.008))}pan(t,e){let[n,i]=this.basis();for(let s=0;s<3;s++)this.target[s]+=(-t*n[s]+e*i[s])/this.scale}zoom(t,e,n){let i=this.scale,s=.02*Math.min(this.width,this.height)/this.radius;this.scale=Math.max(s,Math.min(1e5,i*t));let o=this.scale/i;this.pan(e-e*o,n-n*o)}project(t,e,n){let[i,s,o]=this.basis(),l=[t-this.target[0],e-this.target[1],n-this.target[2]],a=h=>h[0]*l[0]+h[1]*l[1]+h[2]*l[2];return[this.width/2+this.scale*a(i),this.height/2-this.scale*a(s),a(o)]}matrix(){let[t,e,n]=this.basis(),i=4*this.radius+Math.hypot(...this.target),s=[t.map(l=>l*2*this.scale/this.width),e.map(l=>l*2*this.scale/this.height),n.map(l=>-l/i)],o=new Float32Array(16);return s.forEach((l,a)=>{for(let h=0;h<3;h++)o[4*h+a]=l[h];o[12+a]=-l.reduce((h,c,p)=>h+c*this.target[p],0)}),o[15]=1,o}};var K=["rapid","feed","arc","probe, tap"];function X(r){let t=atob(r),e=new Uint8Array(t.length);for(let n=0;n<t.length;n++)e[n]=t.charCodeAt(n);return e}function P(r){return new Float32Array(X(r).buffer)}function J(r){let{machine:t,...e}=r;return{...e,machine:t&&{...t},positions:P(r.positions),kinds:X(r.kinds),lines:new Uint32Array(X(r.lines).buffer),times:P(r.times),feeds:P(r.feeds),joints:t?P(t.values):new Float32Array}}function ct(){return{uri:"",count:0,tools:[],bounds:null,cut:null,stock:null,seconds:0,rapidSeconds:0,cutLength:0,rapidLength:0,truncated:!1,machine:null,positions:new Float32Array,kinds:new Uint8Array,lines:new Uint32Array,times:new Float32Array,feeds:new Float32Array,joints:new Float32Array}}function k(r,t){let e=0,n=r.count-1;for(;e<n;){let i=e+n+1>>1;r.times[i]<=t?e=i:n=i-1}return Math.max(e,0)}function ut(r,t){let e=[];for(let n=0;n<r.count;n++)r.lines[n]===t&&n>0&&r.kinds[n]!==255&&e.push(n);return e}function mt(r,t){return r.tools.findLast(e=>e.point<=t)}var d=(r,t,e)=>[r/255,t/255,e/255],B={background:d(255,255,255),kinds:[d(226,119,38),d(24,92,190),d(15,146,106),d(158,54,160)],faint:d(216,220,228),mark:d(214,20,60),stock:d(150,140,120),axes:[d(200,40,40),d(30,130,50),d(40,70,200)],tool:d(40,44,52),measure:d(90,40,160),text:"#282c34"},dt={background:d(30,32,38),kinds:[d(240,150,70),d(97,160,255),d(70,205,150),d(220,120,220)],faint:d(66,70,80),mark:d(255,90,120),stock:d(140,130,110),axes:[d(235,90,90),d(90,200,110),d(110,140,255)],tool:d(230,230,235),measure:d(200,160,255),text:"#d7dae0"};function g(r){return`rgb(${r.map(t=>Math.round(t*255)).join(" ")})`}var Z=64;function Q(r){let t=[{name:"feed",unit:"mm/min",value:i=>r.feeds[i],limits:[null,null]}],e=r.machine;if(!e||r.joints.length===0)return t;let n=e.joints.length;return e.joints.forEach((i,s)=>{t.push({name:i,unit:e.units[s],value:o=>r.joints[o*n+s],limits:e.limits[s]??[null,null]}),t.push({name:`${i} speed`,unit:`${e.units[s]}/s`,value:o=>xt(r,o,s,n),limits:[null,null]})}),t}function xt(r,t,e,n){let i=t>0?r.times[t]-r.times[t-1]:0;return i>1e-6?(r.joints[t*n+e]-r.joints[(t-1)*n+e])/i:Number.NaN}function yt(r,t,e){let n=new Float64Array(e).fill(Number.POSITIVE_INFINITY),i=new Float64Array(e).fill(Number.NEGATIVE_INFINITY),s=(e-1)/Math.max(r.times[r.count-1]??0,1e-6);for(let o=0;o<r.count;o++){let l=Math.min(e-1,Math.max(0,Math.round(r.times[o]*s))),a=t.value(o);a<n[l]&&(n[l]=a),a>i[l]&&(i[l]=a)}return{low:n,high:i}}var I=class{constructor(t){this.canvas=t}picture=null;key="";draw(t,e,n,i){let s=devicePixelRatio||1,o=Math.max(2,Math.round(this.canvas.clientWidth*s)),l=Math.max(2,Math.round(this.canvas.clientHeight*s)),a=`${e.name} ${o} ${l} ${n.text}`;(this.key!==a||!this.picture)&&(this.picture=this.paint(t,e,n,o,l,s),this.key=a),this.canvas.width=o,this.canvas.height=l;let h=this.canvas.getContext("2d");if(!h)return;h.drawImage(this.picture,0,0);let c=Math.max(t.times[t.count-1]??0,1e-6),p=Z*s+i/c*(o-(Z+8)*s);h.fillStyle=g(n.mark),h.fillRect(Math.round(p),0,s,l);let x=t.count?e.value(k(t,i)):Number.NaN;h.font=`${12*s}px sans-serif`,h.textAlign=p>o/2?"right":"left",h.fillText(Number.isFinite(x)?`${+x.toFixed(2)} ${e.unit}`:"",p+(p>o/2?-6:6)*s,13*s)}forget(){this.picture=null}paint(t,e,n,i,s,o){let l=document.createElement("canvas");l.width=i,l.height=s;let a=l.getContext("2d");if(!a||t.count===0)return l;let h=Z*o,c=Math.max(2,Math.floor(i-h-8*o)),{low:p,high:x}=yt(t,e,c),[f,b]=[Number.POSITIVE_INFINITY,Number.NEGATIVE_INFINITY];for(let u=0;u<c;u++)p[u]<f&&(f=p[u]),x[u]>b&&(b=x[u]);b>f||([f,b]=Number.isFinite(f)?[f-1,b+1]:[0,1]);let v=u=>s-6*o-(u-f)/(b-f)*(s-24*o);a.fillStyle=n.text,a.font=`${11*o}px sans-serif`,a.textAlign="right",a.fillText(String(+b.toPrecision(5)),h-4*o,v(b)+4*o),a.fillText(String(+f.toPrecision(5)),h-4*o,v(f)),a.strokeStyle=g(n.mark),a.setLineDash([4,4]);for(let u of e.limits)u===null||u<f||u>b||(a.beginPath(),a.moveTo(h,v(u)),a.lineTo(h+c,v(u)),a.stroke());a.setLineDash([]),a.strokeStyle=g(n.kinds[1]),a.lineWidth=o,a.beginPath();let M=!1;for(let u=0;u<c;u++)p[u]>x[u]||(M?a.lineTo(h+u,v(p[u])):a.moveTo(h+u,v(p[u])),a.lineTo(h+u,v(x[u])),M=!0);return a.stroke(),l}};var wt=60;function Et(r){let t=10**Math.floor(Math.log10(r));return[1,2,5,10].map(e=>e*t).find(e=>e>=r*.999)??10*t}var _=class{constructor(t){this.canvas=t}draw(t,e,n,i){let s=devicePixelRatio||1,{width:o,height:l}=e;this.canvas.width=Math.round(o*s),this.canvas.height=Math.round(l*s);let a=this.canvas.getContext("2d");if(a){a.scale(s,s),a.font="bold 12px sans-serif",a.textAlign="center",a.textBaseline="middle";for(let h of[0,1,2]){let c=[0,0,0];c[h]=i.axis*1.12;let[p,x]=e.project(...c);a.fillStyle=g(n.axes[h]),a.fillText("XYZ"[h],p,x)}this.tools(a,t,e,n,i.until);for(let h of i.points)this.ring(a,e.project(...h),g(n.measure),5);i.tool&&this.cone(a,e.project(...i.tool),g(n.mark)),this.scale(a,e,n)}}tools(t,e,n,i,s){t.font="11px sans-serif",t.textAlign="left";for(let o of e.tools.slice(0,wt)){if(o.point>=e.count||o.point>=s)continue;let l=[0,1,2].map(p=>e.positions[3*o.point+p]),[a,h]=n.project(...l);t.fillStyle=g(i.tool),t.beginPath(),t.moveTo(a,h-5),t.lineTo(a+4,h),t.lineTo(a,h+5),t.lineTo(a-4,h),t.fill();let c=o.diameter?` ⌀${+o.diameter.toFixed(3)}`:"";t.fillText(`T${o.number}${c}`,a+8,h-8)}}ring(t,[e,n],i,s){t.strokeStyle=i,t.lineWidth=2,t.beginPath(),t.arc(e,n,s,0,2*Math.PI),t.stroke()}cone(t,[e,n],i){t.fillStyle=i,t.beginPath(),t.moveTo(e,n),t.lineTo(e-6,n-16),t.lineTo(e+6,n-16),t.fill()}scale(t,e,n){let i=Et(80/e.scale),s=e.width-16,o=e.height-14;t.strokeStyle=t.fillStyle=n.text,t.lineWidth=2,t.beginPath(),t.moveTo(s-i*e.scale,o),t.lineTo(s,o),t.stroke(),t.textAlign="right",t.fillText(`${+i.toPrecision(6)} mm`,s,o-10)}};var U=class{element=document.createElement("div");space=document.createElement("div");window=document.createElement("div");lines=[];marked=-1;constructor(t){this.element.className="listing",this.element.tabIndex=0,this.window.className="window",this.space.append(this.window),this.element.append(this.space),this.element.addEventListener("scroll",()=>this.draw()),this.window.addEventListener("click",e=>{let n=e.target.closest("[data-line]")?.dataset.line;n&&t(Number(n))}),new ResizeObserver(()=>this.draw()).observe(this.element)}show(t){this.lines=t.split(/\r\n|\n|\r/),this.space.style.height=`${Math.min(this.lines.length*18,8e6)}px`,this.draw()}mark(t,e){if(this.marked=t,e){let n=t*18*this.ratio(),i=this.element.scrollTop;(n<i||n>i+this.element.clientHeight-18)&&(this.element.scrollTop=n-this.element.clientHeight/2)}this.draw()}ratio(){return Math.min(1,8e6/Math.max(this.lines.length*18,1))}draw(){let t=this.element.scrollTop,e=Math.ceil(this.element.clientHeight/18)+1,n=Math.max(0,this.lines.length-e+2),i=Math.min(Math.floor(t/(18*this.ratio())),n);this.window.style.transform=`translateY(${t}px)`;let s=[];for(let o=i;o<Math.min(i+e,this.lines.length);o++){let l=document.createElement("div");l.dataset.line=String(o),l.className=o===this.marked?"row marked":"row";let a=document.createElement("i");a.textContent=String(o+1),l.append(a,this.lines[o]),s.push(l)}this.window.replaceChildren(...s)}};function pt(r,t,e,n,i,s,o){let{positions:l,kinds:a}=r,[h,c,p]=t.basis(),[x,f,b]=t.target,v=t.scale,M=e-t.width/2,u=t.height/2-n,et=null,R=i*i,nt=Number.NEGATIVE_INFINITY,[F,S,V]=[0,0,0],vt=Math.min(r.count,o);for(let y=0;y<vt;y++){let W=l[3*y]-x,O=l[3*y+1]-f,Y=l[3*y+2]-b,it=v*(h[0]*W+h[1]*O+h[2]*Y)-M,st=v*(c[0]*W+c[1]*O+c[2]*Y)-u,rt=p[0]*W+p[1]*O+p[2]*Y;if(y>0&&a[y]!==255&&s&1<<a[y]){let C=it-F,L=st-S,ot=C*C+L*L,A=ot>0?Math.max(0,Math.min(1,-(F*C+S*L)/ot)):0,at=F+A*C,lt=S+A*L,z=at*at+lt*lt,ht=V+A*(rt-V);if(z<R-.25||z<R+.25&&ht>nt){R=Math.min(R,z),nt=ht;let j=q=>l[3*(y-1)+q]+A*(l[3*y+q]-l[3*(y-1)+q]);et={point:y,share:A,place:[j(0),j(1),j(2)]}}}F=it,S=st,V=rt}return et}var H=1e5;function tt(r,t,e,n){let{positions:i,kinds:s,count:o}=r,l=t*t,a=0,h=0;for(let c=0;c<o;c++){let p=()=>{let f=i[3*c]-i[3*h],b=i[3*c+1]-i[3*h+1],v=i[3*c+2]-i[3*h+2];return f*f+b*b+v*v<=l};if(c===0||c+1===o||s[c]===255||s[c+1]===255||e&&s[c]!==s[c+1]||!p()){if(n){if(a===n.length)return a+1;n[a]=c}a++,h=c}}return a}function At(r){if(!r.bounds)return 1;let[t,e]=r.bounds;return Math.max(...e.map((n,i)=>n-t[i]),.001)}function ft(r,t=H){if(r.count<=t)return null;let e=At(r);for(let n of[!0,!1]){let i=e/10,s=e/1e5;if(tt(r,i,n,null)>t)continue;for(let a=0;a<8;a++){let h=Math.sqrt(i*s);tt(r,h,n,null)>t?s=h:i=h}let o=new Uint32Array(t),l=tt(r,i,n,o);return o.slice(0,l)}return kt(r,t)}function kt(r,t){let e=Math.ceil(r.count/t),n=new Uint32Array(Math.floor(r.count/e));for(let i=0;i<n.length;i++)n[i]=i*e;return n}var Tt=`#version 300 es
+layout(location = 0) in vec3 place;
+layout(location = 1) in uint kind;
+uniform mat4 view;
+uniform vec2 shift;
+uniform vec3 colors[8];
+uniform uint shown;
+uniform vec4 only;
+flat out vec4 color;
+void main() {
+  vec4 p = view * vec4(place, 1.0);
+  gl_Position = vec4(p.xy + shift, clamp(p.z, -1.0, 1.0), 1.0);
+  bool hidden = kind > 7u || (shown & (1u << kind)) == 0u;
+  color = only.a > 0.0 ? vec4(only.rgb, kind > 7u ? 0.0 : 1.0) : vec4(colors[min(kind, 7u)], hidden ? 0.0 : 1.0);
+}`,Mt=`#version 300 es
+precision mediump float;
+flat in vec4 color;
+out vec4 paint;
+void main() {
+  if (color.a < 0.5) discard;
+  paint = color;
+}`;function bt(r,t,e){let n=r.createShader(t);if(!n)throw new Error("the graphics context is lost");if(r.shaderSource(n,e),r.compileShader(n),!r.getShaderParameter(n,r.COMPILE_STATUS))throw new Error(r.getShaderInfoLog(n)??"shader");return n}var T=class{constructor(t){this.canvas=t;let e=t.getContext("webgl2",{antialias:!1,depth:!1,powerPreference:"high-performance"});if(!e)throw new Error("this browser has no WebGL 2");this.gl=e;let n=e.getExtension("WEBGL_debug_renderer_info");this.device=String(n?e.getParameter(n.UNMASKED_RENDERER_WEBGL):e.getParameter(e.RENDERER));let i=/swiftshader|llvmpipe|software/i.test(this.device);this.samples=i?0:Math.min(4,e.getParameter(e.MAX_SAMPLES));let s=e.createProgram();e.attachShader(s,bt(e,e.VERTEX_SHADER,Tt)),e.attachShader(s,bt(e,e.FRAGMENT_SHADER,Mt)),e.linkProgram(s),e.useProgram(s);for(let o of["view","shift","colors","shown","only"])this.uniforms[o]=e.getUniformLocation(s,o);this.path=e.createVertexArray(),this.extra=e.createVertexArray(),this.places=e.createBuffer(),this.kinds=e.createBuffer(),this.reduced=e.createBuffer(),this.marks=e.createBuffer(),this.extraPlaces=e.createBuffer(),this.target=e.createFramebuffer(),this.paint=e.createRenderbuffer(),this.depth=e.createRenderbuffer(),this.attributes(this.path,this.places,this.kinds),this.attributes(this.extra,this.extraPlaces,null)}gl;device;drawn={segments:0,whole:!0};uniforms={};path;extra;places;kinds;reduced;marks;extraPlaces;target;paint;depth;samples;size=[0,0];count=0;chosen=null;waiting=0;step=H;attributes(t,e,n){let i=this.gl;i.bindVertexArray(t),i.bindBuffer(i.ARRAY_BUFFER,e),i.enableVertexAttribArray(0),i.vertexAttribPointer(0,3,i.FLOAT,!1,0,0),n&&(i.bindBuffer(i.ARRAY_BUFFER,n),i.enableVertexAttribArray(1),i.vertexAttribIPointer(1,1,i.UNSIGNED_BYTE,0,0))}load(t){let e=this.gl;this.stop(),this.count=t.count,this.chosen=ft(t),e.bindBuffer(e.ARRAY_BUFFER,this.places),e.bufferData(e.ARRAY_BUFFER,t.positions,e.STATIC_DRAW),e.bindBuffer(e.ARRAY_BUFFER,this.kinds),e.bufferData(e.ARRAY_BUFFER,t.kinds,e.STATIC_DRAW),e.bindVertexArray(this.path),e.bindBuffer(e.ELEMENT_ARRAY_BUFFER,this.reduced),e.bufferData(e.ELEMENT_ARRAY_BUFFER,this.chosen??new Uint32Array,e.STATIC_DRAW)}resize(t,e){if(this.size[0]===t&&this.size[1]===e)return;let n=this.gl;this.size=[t,e],this.canvas.width=t,this.canvas.height=e,n.bindRenderbuffer(n.RENDERBUFFER,this.paint),n.renderbufferStorageMultisample(n.RENDERBUFFER,this.samples,n.RGBA8,t,e),n.bindRenderbuffer(n.RENDERBUFFER,this.depth),n.renderbufferStorageMultisample(n.RENDERBUFFER,this.samples,n.DEPTH_COMPONENT24,t,e),n.bindFramebuffer(n.FRAMEBUFFER,this.target),n.framebufferRenderbuffer(n.FRAMEBUFFER,n.COLOR_ATTACHMENT0,n.RENDERBUFFER,this.paint),n.framebufferRenderbuffer(n.FRAMEBUFFER,n.DEPTH_ATTACHMENT,n.RENDERBUFFER,this.depth)}stop(){cancelAnimationFrame(this.waiting),this.waiting=0}quick(t){return this.stop(),this.begin(t),this.chosen?this.thin(t,this.chosen):this.strip(t,0,this.count),this.finish(t,this.chosen?this.chosen.length-1:this.count-1,!this.chosen),!this.chosen}whole(t,e){this.stop(),this.begin(t);let n=0,i=0,s=o=>{i&&o-i<20?this.step=Math.min(this.step*2,4e6):i&&o-i>120&&(this.step=Math.max(this.step/2,H/2)),i=o,this.gl.bindFramebuffer(this.gl.FRAMEBUFFER,this.target);let l=Math.min(this.count,n+Math.floor(this.step));this.strip(t,n,l),n=l,n<this.count?(this.gl.flush(),this.waiting=requestAnimationFrame(s)):(this.waiting=0,this.finish(t,this.count-1,!0),e())};this.waiting=requestAnimationFrame(s)}begin(t){let e=this.gl;e.bindFramebuffer(e.FRAMEBUFFER,this.target),e.viewport(0,0,this.size[0],this.size[1]),e.clearColor(...t.background,1),e.clear(e.COLOR_BUFFER_BIT|e.DEPTH_BUFFER_BIT),e.enable(e.DEPTH_TEST),e.depthFunc(e.LEQUAL),e.uniformMatrix4fv(this.uniforms.view,!1,t.matrix),e.uniform2f(this.uniforms.shift,0,0),e.uniform1ui(this.uniforms.shown,t.shown),e.uniform4f(this.uniforms.only,0,0,0,0),e.uniform3fv(this.uniforms.colors,t.colors.flat())}shade(t,e){let n=e?t.colors.map(()=>t.faint):t.colors;this.gl.uniform3fv(this.uniforms.colors,n.flat())}strip(t,e,n){let i=this.gl;i.bindVertexArray(this.path);let s=(l,a)=>{let h=Math.max(l-1,0);a-h>1&&i.drawArrays(i.LINE_STRIP,h,a-h)},o=Math.min(Math.max(t.until,e),n);this.shade(t,!1),s(e,o),o<n&&(this.shade(t,!0),s(o,n))}thin(t,e){let n=this.gl;n.bindVertexArray(this.path),n.bindBuffer(n.ELEMENT_ARRAY_BUFFER,this.reduced);let i=e.length;if(t.until<this.count)for(i=0;i<e.length&&e[i]<t.until;)i++;let s=(o,l)=>{let a=Math.max(o-1,0);l-a>1&&n.drawElements(n.LINE_STRIP,l-a,n.UNSIGNED_INT,4*a)};this.shade(t,!1),s(0,i),i<e.length&&(this.shade(t,!0),s(i,e.length))}finish(t,e,n){let i=this.gl;for(let l of t.extras)this.lines(l.places,l.color);this.mark(t),i.bindFramebuffer(i.READ_FRAMEBUFFER,this.target),i.bindFramebuffer(i.DRAW_FRAMEBUFFER,null);let[s,o]=this.size;i.blitFramebuffer(0,0,s,o,0,0,s,o,i.COLOR_BUFFER_BIT,i.NEAREST),this.drawn={segments:Math.max(e,0),whole:n}}lines(t,e){let n=this.gl;n.bindVertexArray(this.extra),n.bindBuffer(n.ARRAY_BUFFER,this.extraPlaces),n.bufferData(n.ARRAY_BUFFER,t,n.STREAM_DRAW),n.vertexAttribI4ui(1,0,0,0,0),n.uniform4f(this.uniforms.only,...e,1),n.drawArrays(n.LINES,0,t.length/3),n.uniform4f(this.uniforms.only,0,0,0,0)}mark(t){if(t.marked.length===0)return;let e=this.gl,n=new Uint32Array(2*t.marked.length);t.marked.forEach((i,s)=>{n[2*s]=i-1,n[2*s+1]=i}),e.bindVertexArray(this.path),e.bindBuffer(e.ELEMENT_ARRAY_BUFFER,this.marks),e.bufferData(e.ELEMENT_ARRAY_BUFFER,n,e.STREAM_DRAW),e.uniform4f(this.uniforms.only,...t.mark,1),e.disable(e.DEPTH_TEST);for(let[i,s]of[[0,0],[1,0],[-1,0],[0,1],[0,-1]])e.uniform2f(this.uniforms.shift,2*i/this.size[0],2*s/this.size[1]),e.drawElements(e.LINES,n.length,e.UNSIGNED_INT,0);e.uniform2f(this.uniforms.shift,0,0),e.uniform4f(this.uniforms.only,0,0,0,0),e.bindBuffer(e.ELEMENT_ARRAY_BUFFER,this.reduced)}};var gt=`:host {
+  display: grid;
+  grid-template: auto 1fr auto auto / 1fr auto;
+  height: 100%;
+  min-height: 0;
+  overflow: hidden;
+  font:
+    13px system-ui,
+    sans-serif;
+  color: var(--text);
+  background: var(--background);
+}
+.bar,
+.time {
+  display: flex;
+  flex-wrap: wrap;
+  align-items: center;
+  gap: 4px 10px;
+  padding: 5px 10px;
+}
+.bar {
+  grid-column: 1 / 3;
+}
+.bar b {
+  font-size: 14px;
+}
+.bar .facts {
+  opacity: 0.8;
+}
+.bar .warning {
+  color: var(--mark);
+}
+.view {
+  position: relative;
+  min-width: 0;
+  min-height: 0;
+  overflow: hidden;
+}
+.view canvas {
+  position: absolute;
+  inset: 0;
+  width: 100%;
+  height: 100%;
+  display: block;
+}
+.view canvas.labels {
+  pointer-events: none;
+}
+.view canvas.path {
+  cursor: grab;
+  touch-action: none;
+}
+.view.measuring canvas.path {
+  cursor: crosshair;
+}
+.note {
+  position: absolute;
+  left: 10px;
+  bottom: 8px;
+  max-width: calc(100% - 20px);
+  white-space: pre-line;
+  pointer-events: none;
+  background: color-mix(in srgb, var(--background) 85%, transparent);
+  padding: 2px 6px;
+  border-radius: 4px;
+}
+.note:empty {
+  display: none;
+}
+.legend {
+  display: flex;
+  gap: 10px;
+  flex-wrap: wrap;
+}
+.legend label {
+  display: inline-flex;
+  align-items: center;
+  gap: 4px;
+  white-space: nowrap;
+  cursor: pointer;
+}
+.legend i {
+  width: 18px;
+  height: 3px;
+}
+button,
+select {
+  font: inherit;
+  color: inherit;
+  background: color-mix(in srgb, var(--text) 8%, transparent);
+  border: 1px solid color-mix(in srgb, var(--text) 25%, transparent);
+  border-radius: 4px;
+  padding: 1px 7px;
+  cursor: pointer;
+}
+select option {
+  color: #222;
+  background: #fff;
+}
+button[aria-pressed="true"] {
+  background: color-mix(in srgb, var(--feed) 35%, transparent);
+}
+.time {
+  grid-column: 1 / 3;
+}
+.time input {
+  flex: 1;
+  min-width: 120px;
+  accent-color: var(--feed);
+}
+.time output {
+  min-width: 130px;
+  font-variant-numeric: tabular-nums;
+}
+.curve {
+  grid-column: 1 / 3;
+  height: 90px;
+  border-top: 1px solid color-mix(in srgb, var(--text) 20%, transparent);
+}
+.curve canvas {
+  width: 100%;
+  height: 100%;
+  display: block;
+  cursor: pointer;
+}
+.curve[hidden],
+.listing[hidden] {
+  display: none;
+}
+.listing {
+  width: min(34vw, 420px);
+  overflow: auto;
+  border-left: 1px solid color-mix(in srgb, var(--text) 20%, transparent);
+  font:
+    12px / 18px ui-monospace,
+    monospace;
+  outline: none;
+}
+.listing > div {
+  position: relative;
+}
+.listing .row {
+  white-space: pre;
+  height: 18px;
+  padding-right: 8px;
+  cursor: pointer;
+}
+.listing .row i {
+  display: inline-block;
+  min-width: 4.5em;
+  padding-right: 1em;
+  text-align: right;
+  opacity: 0.5;
+  font-style: normal;
+}
+.listing .row.marked {
+  background: color-mix(in srgb, var(--mark) 22%, transparent);
+}
+`;var Ft=150,St=8,Ct=[1,2,5,10,50,100,500];function m(r,t={}){return Object.assign(document.createElement(r),t)}function G(r){let t=e=>String(Math.floor(e)).padStart(2,"0");return`${Math.floor(r/3600)}:${t(r/60%60)}:${t(r%60)}`}var w=r=>String(+r.toFixed(3)),$=class extends HTMLElement{scene=ct();theme=B;chosenTheme=null;camera=new N;renderer=null;root=this.attachShadow({mode:"open"});view=m("div",{className:"view"});canvas=m("canvas",{className:"path"});labels=new _(m("canvas",{className:"labels"}));facts=m("span",{className:"facts"});warning=m("span",{className:"warning"});title_=m("b");legend=m("span",{className:"legend"});note=m("div",{className:"note"});slider=m("input",{type:"range",min:"0",max:"1000",value:"1000",ariaLabel:"time"});output=m("output");playing=m("button",{textContent:"▶",title:"play (space)",ariaLabel:"play"});speed=m("select",{title:"times real speed",ariaLabel:"speed"});curve=m("select",{title:"curve",ariaLabel:"curve"});curveBox=m("div",{className:"curve"});plot=new I(m("canvas"));measuring=m("button",{textContent:"measure",title:"distance between two points of the path"});listing=new U(t=>{this.line=t,this.chose(t)});shown=255;marked=new Uint32Array;markedLine=-1;seconds=Number.POSITIVE_INFINITY;player=0;queued=0;rest=0;points=[];frames=[];connectedCallback(){if(this.renderer)return;let t=new CSSStyleSheet;t.replaceSync(gt),this.root.adoptedStyleSheets=[t],this.build();try{this.renderer=new T(this.canvas)}catch(e){this.warning.textContent=`${e.message}: the tool path can't be drawn`}matchMedia("(prefers-color-scheme: dark)").addEventListener("change",()=>this.paintTheme()),new MutationObserver(()=>this.paintTheme()).observe(document.body,{attributeFilter:["class"]}),new ResizeObserver(()=>this.resize()).observe(this.view),this.canvas.addEventListener("webglcontextlost",e=>e.preventDefault()),this.canvas.addEventListener("webglcontextrestored",()=>{this.renderer=new T(this.canvas),this.renderer.load(this.scene),this.resize()}),this.paintTheme(),this.resize()}setScene(t){let e=this.scene.count===0;this.scene=t,this.points=[],this.pause(),this.renderer?.load(t),this.plot.forget(),e&&this.camera.fit(t.bounds),this.describe(),this.findMarked(),this.seconds=Math.min(this.seconds,this.end()),(e||this.seconds>=this.end())&&(this.seconds=this.end()),this.draw(!1)}setText(t){this.listing.element.hidden=!1,this.listing.show(t)}set heading(t){this.title_.textContent=t}set problem(t){this.warning.textContent=t}set line(t){this.markedLine=t,this.findMarked(),this.listing.mark(t,!0),this.draw(!1)}get line(){return this.markedLine}look(t){this.camera.look(t,this.scene.bounds),this.draw(!1)}orbit(t,e){this.camera.orbit(t,e),this.draw(!0)}project(t,e,n){let i=this.canvas.getBoundingClientRect(),[s,o]=this.camera.project(t,e,n);return[i.left+s,i.top+o]}statistics(){return{...this.renderer?.drawn??{segments:0,whole:!1},device:this.renderer?.device??"",points:this.scene.count,frames:[...this.frames],busy:this.rest!==0||this.queued!==0}}build(){let t=m("div",{className:"bar"}),e=m("span");for(let s of Object.keys(E)){let o=m("button",{textContent:s});o.onclick=()=>this.look(s),e.append(o," ")}let n=m("button",{textContent:"◐",title:"light or dark",ariaLabel:"light or dark"});n.onclick=()=>{this.chosenTheme=this.theme===B?"dark":"light",this.paintTheme()},this.measuring.onclick=()=>this.measure(this.measuring.ariaPressed!=="true"),t.append(this.title_,this.facts,e,this.measuring,n,this.legend,this.warning),this.view.append(this.canvas,this.labels.canvas,this.note),this.listing.element.hidden=!0;let i=m("div",{className:"time"});for(let s of Ct)this.speed.append(m("option",{value:String(s),textContent:`${s}×`}));this.speed.value="10",i.append(this.playing,this.slider,this.output,this.speed,this.curve),this.curveBox.append(this.plot.canvas),this.curveBox.hidden=!0,this.root.append(t,this.view,this.listing.element,i,this.curveBox),this.listen(),this.describe()}listen(){this.slider.oninput=()=>{this.pause(),this.goto(Number(this.slider.value)/1e3*this.end())},this.playing.onclick=()=>this.player?this.pause():this.play(),this.curve.onchange=()=>{this.curveBox.hidden=this.curve.value==="",this.drawCurve()},this.plot.canvas.onpointerdown=t=>this.gotoColumn(t.offsetX),this.plot.canvas.onpointermove=t=>{t.buttons&&this.gotoColumn(t.offsetX)},this.tabIndex=0,this.addEventListener("keydown",t=>this.key(t)),this.pointer()}gotoColumn(t){this.pause(),this.goto((t-64)/(this.plot.canvas.clientWidth-72)*this.end())}key(t){let e=t.composedPath()[0];if(e instanceof HTMLInputElement||e instanceof HTMLSelectElement)return;let n=Object.keys(E),i={ArrowLeft:[-20,0],ArrowRight:[20,0],ArrowUp:[0,-20],ArrowDown:[0,20]};if(t.key===" ")this.player?this.pause():this.play();else if(t.key==="Escape")this.measure(!1);else if(i[t.key])this.orbit(...i[t.key]);else if(n[Number(t.key)-1])this.look(n[Number(t.key)-1]);else return;t.preventDefault()}pointer(){let t=null,e=0,n=this.canvas;n.onpointerdown=i=>{t=[i.clientX,i.clientY],e=0,n.setPointerCapture(i.pointerId)},n.onpointermove=i=>{if(!t)return;let s=i.clientX-t[0],o=i.clientY-t[1];e+=Math.abs(s)+Math.abs(o),t=[i.clientX,i.clientY],i.shiftKey||i.buttons&6?this.camera.pan(s,o):this.camera.orbit(s,o),this.draw(!0)},n.onpointerup=i=>{t&&e<4&&i.button===0&&this.clicked(i.offsetX,i.offsetY),t=null},n.onwheel=i=>{i.preventDefault();let{width:s,height:o}=this.camera;this.camera.zoom(Math.exp(-i.deltaY*.0015),i.offsetX-s/2,i.offsetY-o/2),this.draw(!0)},n.ondblclick=()=>{this.camera.fit(this.scene.bounds),this.draw(!1)},n.oncontextmenu=i=>i.preventDefault()}clicked(t,e){let n=pt(this.scene,this.camera,t,e,St,this.shown,this.until());if(this.measuring.ariaPressed==="true"){if(!n)return;this.points=this.points.length===2?[n]:[...this.points,n],this.draw(!1);return}if(!n){this.line=-1;return}let i=this.scene.lines[n.point];this.line=i,this.tell(n),this.chose(i)}chose(t){this.dispatchEvent(new CustomEvent("choose",{detail:{line:t}}))}tell(t){let e=this.scene,n=mt(e,t.point),i=e.feeds[t.point];this.note.textContent=[`line ${e.lines[t.point]+1}: ${K[e.kinds[t.point]]??""} to ${this.place(t.point)}`,[i?`${w(i)} mm/min`:"",G(e.times[t.point]),n?`T${n.number}`:""].filter(Boolean).join(" · ")].join(`
+`)}place(t){return[0,1,2].map(e=>`${"XYZ"[e]}${w(this.scene.positions[3*t+e])}`).join(" ")}measure(t){this.measuring.ariaPressed=String(t),this.view.classList.toggle("measuring",t),this.points=[],this.note.textContent=t?"click two points of the path":"",this.draw(!1)}measured(){if(this.points.length<2)return;let[t,e]=this.points.map(i=>i.place),n=e.map((i,s)=>i-t[s]);this.note.textContent=`${w(Math.hypot(...n))} mm
+ΔX ${w(n[0])}  ΔY ${w(n[1])}  ΔZ ${w(n[2])}`}describe(){let t=this.scene,e=t.bounds?t.bounds[1].map((s,o)=>w(s-(t.bounds?.[0][o]??0))).join(" × "):"";this.facts.textContent=t.count?`${e} mm · ${G(t.seconds)} h · cut ${w(t.cutLength/1e3)} m · rapid ${w(t.rapidLength/1e3)} m`:"no moves",t.truncated&&(this.warning.textContent="the path is longer than what is shown"),this.drawLegend();let n=this.curve.value,i=Q(t).map(s=>m("option",{value:s.name,textContent:`${s.name}, ${s.unit}`}));this.curve.replaceChildren(m("option",{value:"",textContent:"no curve"}),...i),this.curve.value=i.some(s=>s.value===n)?n:"",this.curveBox.hidden=this.curve.value===""}drawLegend(){let t=new Set(this.scene.kinds),e=K.map((n,i)=>{if(!t.has(i))return"";let s=m("input",{type:"checkbox",checked:(this.shown&1<<i)!==0});s.onchange=()=>{this.shown^=1<<i,this.draw(!1)};let o=m("i");o.style.background=g(this.theme.kinds[i]);let l=m("label");return l.append(s,o,n),l});this.legend.replaceChildren(...e)}paintTheme(){let t=document.body.classList,e=t.contains("vscode-dark")||t.contains("vscode-high-contrast"),n=t.contains("vscode-light")||t.contains("vscode-high-contrast-light"),i=matchMedia("(prefers-color-scheme: dark)").matches,s=this.chosenTheme??(n?"light":e||i?"dark":"light");this.theme=s==="dark"?dt:B,this.style.setProperty("--background",g(this.theme.background)),this.style.setProperty("--text",this.theme.text),this.style.setProperty("--mark",g(this.theme.mark)),this.style.setProperty("--feed",g(this.theme.kinds[1])),this.plot.forget(),this.drawLegend(),this.draw(!1)}resize(){let{clientWidth:t,clientHeight:e}=this.view;if(!t||!e)return;let n=this.camera.width===1;this.camera.width=t,this.camera.height=e,n&&this.camera.fit(this.scene.bounds);let i=devicePixelRatio||1;this.renderer?.resize(Math.round(t*i),Math.round(e*i)),this.draw(!1)}end(){return this.scene.count?this.scene.times[this.scene.count-1]:0}until(){return this.seconds>=this.end()?this.scene.count:Math.min(this.scene.count,k(this.scene,this.seconds)+1)}goto(t){this.seconds=Math.max(0,Math.min(this.end(),t)),this.draw(!0)}play(){if(!this.scene.count)return;this.seconds>=this.end()&&(this.seconds=0),this.playing.textContent="❚❚";let t=performance.now(),e=n=>{let i=(n-t)/1e3*Number(this.speed.value);t=n,this.goto(this.seconds+i),this.player=this.seconds<this.end()?requestAnimationFrame(e):0,this.player||this.pause()};this.player=requestAnimationFrame(e)}pause(){cancelAnimationFrame(this.player),this.player=0,this.playing.textContent="▶"}toolPlace(){let t=this.scene;if(!t.count||this.seconds>=this.end())return null;let e=k(t,this.seconds),n=Math.min(e+1,t.count-1),i=t.times[n]-t.times[e],s=i>0?Math.min(1,(this.seconds-t.times[e])/i):0,o=l=>t.positions[3*e+l]+s*(t.positions[3*n+l]-t.positions[3*e+l]);return[o(0),o(1),o(2)]}findMarked(){this.marked=this.markedLine<0?new Uint32Array:Uint32Array.from(ut(this.scene,this.markedLine)),this.note.textContent="";let t=this.marked.at(-1);t!==void 0&&this.tell({point:t,share:1,place:[0,0,0]})}picture(){let t=this.axisLength(),n=[0,1,2].map(o=>{let l=new Float32Array(6);return l[3+o]=t,{places:l,color:this.theme.axes[o]}});this.scene.stock&&n.push({places:Lt(this.scene.stock),color:this.theme.stock});let[i,s]=this.points;return s&&n.push({places:Float32Array.from([...i.place,...s.place]),color:this.theme.measure}),{matrix:this.camera.matrix(),background:this.theme.background,colors:this.theme.kinds,shown:this.shown,until:this.until(),faint:this.theme.faint,marked:this.marked,mark:this.theme.mark,extras:n}}axisLength(){let t=this.scene.bounds;return t?Math.max(...t[1].map((e,n)=>e-t[0][n]),1)/8:10}draw(t){clearTimeout(this.rest),this.rest=0,this.queued||=requestAnimationFrame(e=>{this.queued=0,this.frames.push(e),this.frames.length>240&&this.frames.shift(),this.paint(t)})}paint(t){this.drawTime(),this.measured(),this.labels.draw(this.scene,this.camera,this.theme,{axis:this.axisLength(),tool:this.toolPlace(),points:this.points.map(n=>n.place),until:this.until()}),!(!this.renderer||this.renderer.quick(this.picture()))&&(this.rest=window.setTimeout(()=>{this.renderer?.whole(this.picture(),()=>{this.rest=0})},t?Ft:0))}drawTime(){this.slider.value=String(this.end()?this.seconds/this.end()*1e3:0),this.output.textContent=`${G(this.seconds)} / ${G(this.end())}`,this.drawCurve()}drawCurve(){let t=Q(this.scene).find(e=>e.name===this.curve.value);t&&this.plot.draw(this.scene,t,this.theme,this.seconds)}};function Lt([r,t]){let e=i=>[0,1,2].map(s=>i>>s&1?t[s]:r[s]),n=[];for(let i=0;i<8;i++)for(let s=0;s<3;s++)i>>s&1||n.push(...e(i),...e(i|1<<s));return Float32Array.from(n)}customElements.define("gcc-robot-preview",$);function Nt(){let r=document.querySelector("gcc-robot-preview");r&&(typeof acquireVsCodeApi=="function"?Pt(r,acquireVsCodeApi()):Bt(r))}function Pt(r,t){window.addEventListener("message",e=>{let n=e.data;n.title!==void 0&&(r.heading=n.title),n.problem!==void 0&&(r.problem=n.problem),n.scene&&r.setScene(n.scene),n.line!==void 0&&(r.line=n.line)}),r.addEventListener("choose",e=>{t.postMessage({choose:e.detail.line})}),t.postMessage({ready:!0})}function Bt(r){let t=document.querySelector('script[type="application/json"]')?.textContent,e=JSON.parse(t??"{}");r.heading=e.title??"",e.text!==void 0&&r.setText(e.text),e.path&&r.setScene(J(e.path)),e.served&&It(r)}function It(r){let t=async()=>{let n=await fetch("path");if(!n.ok)return;let i=await n.json();r.problem=i.problem??"",i.text!==void 0&&r.setText(i.text),i.path&&r.setScene(J(i.path))},e=new EventSource("events");e.onmessage=n=>{let i=JSON.parse(n.data);i.line!==void 0&&(r.line=i.line),i.changed&&t()},e.onopen=()=>{r.problem="",t()},e.onerror=()=>{r.problem="gcc-robot has ended; the picture is the last one"},r.addEventListener("choose",n=>{fetch("choose",{method:"POST",body:String(n.detail.line)})})}Nt();})();

@@ -1,0 +1,362 @@
+// The preview component in a headless Chromium: pages as `gcc-robot preview` writes and serves them.
+// GCC_ROBOT_BIN names the program; pictures go to GCC_ROBOT_SHOTS (default: target/test-data/editors).
+
+import assert from "node:assert/strict";
+import { execFileSync, spawn } from "node:child_process";
+import { mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
+import { get, request } from "node:http";
+import { tmpdir } from "node:os";
+import { dirname, join } from "node:path";
+import { createInterface } from "node:readline";
+import { after, before, test } from "node:test";
+import { fileURLToPath } from "node:url";
+import { browser, has, pixels, until } from "../../test/browser.mjs";
+
+const top = join(dirname(fileURLToPath(import.meta.url)), "../../..");
+const robot = process.env.GCC_ROBOT_BIN;
+const shots = process.env.GCC_ROBOT_SHOTS ?? join(top, "target/test-data/editors");
+const folder = mkdtempSync(join(tmpdir(), "preview-"));
+
+// Colours of the light theme.
+const RAPID = [226, 119, 38];
+const FEED = [24, 92, 190];
+const ARC = [15, 146, 106];
+const MARK = [214, 20, 60];
+
+let chrome;
+before(async () => {
+  assert.ok(robot, "GCC_ROBOT_BIN names the program");
+  mkdirSync(shots, { recursive: true });
+  chrome = await browser();
+});
+after(async () => {
+  await chrome?.close();
+  rmSync(folder, { recursive: true, force: true });
+});
+
+/** Writes a program, draws it, and opens the page. */
+async function open(name, program, options = {}) {
+  const source = join(folder, name);
+  writeFileSync(source, program);
+  const page = source.replace(/\.\w+$/, ".html");
+  execFileSync(robot, ["preview", source, "-o", page, "-q"], { stdio: ["ignore", "ignore", "pipe"] });
+  return show(`file://${page}`, options);
+}
+
+async function show(address, { theme = "light", width = 1280, height = 720 } = {}) {
+  const page = await chrome.newPage({ viewport: { width, height }, colorScheme: theme });
+  page.problems = [];
+  page.on("pageerror", (e) => page.problems.push(String(e)));
+  page.on("console", (m) => m.type() === "error" && page.problems.push(m.text()));
+  const begun = Date.now();
+  await page.goto(address);
+  await settled(page);
+  page.loaded = Date.now() - begun;
+  return page;
+}
+
+const settled = (page) =>
+  until(page, "the whole path", () => {
+    const s = document.querySelector("gcc-robot-preview")?.statistics();
+    return s && s.points > 0 && s.whole && !s.busy;
+  }, null, 60000);
+
+const statistics = (page) => page.evaluate(() => document.querySelector("gcc-robot-preview").statistics());
+const project = (page, place) => page.evaluate((p) => document.querySelector("gcc-robot-preview").project(...p), place);
+const look = async (page, view) => {
+  await page.evaluate((v) => document.querySelector("gcc-robot-preview").look(v), view);
+  await page.waitForTimeout(100);
+  await settled(page);
+};
+
+/** Colours around a place of the part. */
+async function colors(page, place, reach = 1) {
+  const [x, y] = await project(page, place);
+  return (await pixels(chrome, await page.screenshot())).near(x, y, reach);
+}
+
+// A square: three feed moves, an arc (centre 40 0, so it bulges to the right), a rapid home.
+const SQUARE = `G21 G90 G17 F600
+G0 X0 Y0 Z0
+G1 X40
+G3 X40 Y40 J20
+G1 X0
+G0 X0 Y0
+T3 M6
+G1 X-20
+M2
+`;
+
+test("each kind has its colour where its segment lies", async () => {
+  const page = await open("square.ngc", SQUARE);
+  await look(page, "top");
+  assert.ok(has(await colors(page, [20, 0, 0]), FEED), "line 3 is feed");
+  assert.ok(has(await colors(page, [60, 20, 0], 2), ARC), "line 4 is an arc");
+  assert.ok(has(await colors(page, [20, 40, 0]), FEED), "line 5 is feed");
+  assert.ok(has(await colors(page, [0, 20, 0]), RAPID), "line 6 is a rapid");
+  assert.ok(has(await colors(page, [20, 20, 0]), [255, 255, 255]), "the middle is empty");
+  assert.deepEqual(page.problems, []);
+  await page.close();
+});
+
+test("a click on a segment chooses its line, a line marks its segments", async () => {
+  const page = await open("choose.ngc", SQUARE);
+  await look(page, "top");
+  for (const [place, line] of [
+    [[20, 0, 0], 3],
+    [[60, 20, 0], 4],
+    [[20, 40, 0], 5],
+    [[0, 20, 0], 6],
+    [[-10, 0, 0], 8],
+  ]) {
+    const [x, y] = await project(page, place);
+    await page.mouse.click(x, y);
+    await settled(page);
+    const chosen = await page.evaluate(() => document.querySelector("gcc-robot-preview").line);
+    assert.equal(chosen + 1, line, `segment at ${place}`);
+    assert.ok(has(await colors(page, place), MARK), `line ${line} is marked`);
+    const row = await page.locator(".row.marked").textContent();
+    assert.equal(row, `${line}${SQUARE.split("\n")[line - 1]}`);
+  }
+  await page.locator(".row", { hasText: "G3 X40 Y40" }).click();
+  await settled(page);
+  assert.ok(has(await colors(page, [60, 20, 0], 2), MARK), "a click on the text marks the arc");
+  assert.ok(has(await colors(page, [20, 0, 0]), FEED), "and nothing else");
+  await page.close();
+});
+
+test("time: the path is drawn as far as it has come", async () => {
+  const page = await open("time.ngc", SQUARE);
+  await look(page, "top");
+  await page.locator('input[type="range"]').evaluate((slider) => {
+    slider.value = "250";
+    slider.dispatchEvent(new Event("input"));
+  });
+  await page.waitForTimeout(200);
+  assert.ok(has(await colors(page, [20, 0, 0]), FEED), "done");
+  assert.ok(has(await colors(page, [0, 20, 0]), [216, 220, 228]), "still to come: faint");
+  assert.match(await page.locator("output").textContent(), /^0:00:0\d \/ 0:00:\d\d$/);
+  await page.getByRole("button", { name: "play" }).click();
+  await page.waitForTimeout(300);
+  const later = await page.locator('input[type="range"]').inputValue();
+  assert.ok(Number(later) > 250, `playing moves on: ${later}`);
+  await page.close();
+});
+
+test("measuring tells the distance of two points", async () => {
+  const page = await open("measure.ngc", SQUARE);
+  await look(page, "top");
+  await page.getByRole("button", { name: "measure" }).click();
+  for (const place of [[10, 0, 0], [30, 40, 0]]) {
+    const [x, y] = await project(page, place);
+    await page.mouse.click(x, y);
+    await page.waitForTimeout(60);
+  }
+  const note = await page.locator(".note").textContent();
+  const [, length, dx, dy] = note.match(/([\d.]+) mm\nΔX ([-\d.]+) {2}ΔY ([-\d.]+)/).map(Number);
+  assert.ok(Math.abs(length - Math.hypot(20, 40)) < 0.3 && Math.abs(dx - 20) < 0.3 && Math.abs(dy - 40) < 0.3, note);
+  await page.close();
+});
+
+test("kinds are hidden, the theme is changed, a curve is shown", async () => {
+  const page = await open("hide.ngc", SQUARE);
+  await look(page, "top");
+  await page.getByLabel("rapid").uncheck();
+  await page.waitForTimeout(100);
+  assert.ok(!has(await colors(page, [0, 20, 0]), RAPID), "rapids are hidden");
+  await page.getByRole("button", { name: "light or dark" }).click();
+  await page.waitForTimeout(100);
+  assert.ok(has(await colors(page, [20, 20, 0]), [30, 32, 38]), "dark");
+  assert.ok(has(await colors(page, [20, 0, 0]), [97, 160, 255]), "feed in the dark theme");
+  await page.getByLabel("curve").selectOption("feed");
+  assert.ok(await page.locator(".curve canvas").isVisible());
+  await page.close();
+});
+
+test("the dark theme of the system is followed", async () => {
+  const page = await open("dark.ngc", SQUARE, { theme: "dark" });
+  await look(page, "top");
+  assert.ok(has(await colors(page, [20, 0, 0]), [97, 160, 255]));
+  await page.close();
+});
+
+test("the shipped part, for people to look at", async () => {
+  const program = readFileSync(join(top, "docs/examples/flange.ngc"));
+  const page = await open("flange.ngc", program);
+  await page.screenshot({ path: join(shots, "preview-flange.png") });
+  assert.match(await page.locator(".facts").textContent(), /mm · 0:\d\d:\d\d h · cut/);
+  assert.deepEqual(page.problems, []);
+  await page.close();
+});
+
+test("a page loads nothing and needs nothing", async () => {
+  const page = await chrome.newPage();
+  const asked = [];
+  page.on("request", (r) => asked.push(r.url()));
+  await page.goto(`file://${join(folder, "square.html")}`);
+  await settled(page);
+  assert.deepEqual(asked, [`file://${join(folder, "square.html")}`]);
+  await page.close();
+});
+
+test("text cannot break out of the page", async () => {
+  const page = await open("evil.ngc", `(</script><script>window.broken = 1</script>)\n${SQUARE}`);
+  assert.equal(await page.evaluate(() => window.broken), undefined);
+  assert.deepEqual(page.problems, []);
+  await page.close();
+});
+
+// A million short feed moves along a spiral, every tenth row a rapid.
+function million() {
+  const out = ["G21 G90 G17 F3000", "G0 X0 Y0 Z1"];
+  for (let i = 0; i < 1_000_000; i++) {
+    const a = i / 97;
+    const r = 10 + i / 9000;
+    out.push(`${i % 1000 === 0 ? "G0" : "G1"} X${(r * Math.cos(a)).toFixed(3)} Y${(r * Math.sin(a)).toFixed(3)} Z${(-i / 40000).toFixed(3)}`);
+  }
+  out.push("M2", "");
+  return out.join("\n");
+}
+
+test("a million segments: load, orbit, rest", { timeout: 240_000 }, async () => {
+  const page = await open("million.ngc", million());
+  const first = await statistics(page);
+  assert.ok(first.points >= 1_000_000 && first.segments >= 1_000_000, `${first.points} points`);
+
+  // Orbit by hand for two seconds; frames are those the component drew.
+  await page.mouse.move(500, 360);
+  await page.mouse.down();
+  const begun = await page.evaluate(() => performance.now());
+  let steps = 0;
+  while ((await page.evaluate(() => performance.now())) - begun < 2000) {
+    steps++;
+    await page.mouse.move(500 + (steps % 60) * 4, 360 + (steps % 7));
+  }
+  const moving = await statistics(page);
+  const end = await page.evaluate(() => performance.now());
+  const frames = moving.frames.filter((t) => t >= begun && t <= end).length;
+  const fps = frames / ((end - begun) / 1000);
+  assert.ok(!moving.whole && moving.segments <= 100_000, `${moving.segments} segments while moving`);
+  await page.mouse.up();
+  const rested = Date.now();
+  await settled(page);
+  const rest = Date.now() - rested;
+  const still = await statistics(page);
+  assert.ok(still.segments >= 1_000_000, "the whole path");
+
+  // The colour of a segment far down the file, and its line.
+  await look(page, "top");
+  const line = 600_002;
+  const i = line - 3;
+  const mid = [0, 1].map((d) => {
+    const at = (k) => (10 + k / 9000) * [Math.cos, Math.sin][d](k / 97);
+    return (at(i - 1) + at(i)) / 2;
+  });
+  await page.evaluate((l) => { document.querySelector("gcc-robot-preview").line = l; }, line - 1);
+  await page.waitForTimeout(100);
+  await settled(page);
+  assert.ok(has(await colors(page, [...mid, -i / 40000], 2), MARK), "the segment of a line is where it should be");
+  await page.screenshot({ path: join(shots, "preview-million.png") });
+  const told = `load ${page.loaded} ms; while moving ${moving.segments} segments at ${fps.toFixed(1)} frames/s; whole ${rest} ms after rest`;
+  writeFileSync(join(shots, "preview-million.txt"), `${told}\n${first.device}\n`);
+  console.log(`# 1 000 000 segments: ${told} (${first.device})`);
+  assert.ok(fps >= 15, `${fps} frames per second`);
+  assert.ok(rest <= 1200, `${rest} ms from rest to the whole path`);
+  await page.close();
+});
+
+// ── served ──────────────────────────────────────────────────────────────────────────────────────────
+
+/** Starts `gcc-robot preview --serve`; `heard` are the objects it writes. */
+async function serve(source, options = []) {
+  const child = spawn(robot, ["preview", source, "--serve", ...options], { stdio: ["pipe", "pipe", "inherit"] });
+  const heard = [];
+  const lines = createInterface({ input: child.stdout });
+  const first = new Promise((resolve, reject) => {
+    lines.on("line", (line) => {
+      heard.push(line.startsWith("{") ? JSON.parse(line) : { url: line.match(/http:\S+/)?.[0] });
+      resolve(heard[0].url);
+    });
+    child.on("exit", () => reject(new Error("ended")));
+  });
+  return { child, heard, url: await first, say: (o) => child.stdin.write(`${JSON.stringify(o)}\n`) };
+}
+
+const status = (url, options = {}) =>
+  new Promise((resolve, reject) => {
+    const ask = options.method ? request : get;
+    const r = ask(url, options, (answer) => {
+      answer.resume();
+      resolve(answer.statusCode);
+    });
+    r.on("error", reject);
+    if (options.method) r.end(options.body ?? "");
+  });
+
+test("served for an editor: cursor, choice and edits go both ways", async () => {
+  const source = join(folder, "served.ngc");
+  writeFileSync(source, SQUARE);
+  const server = await serve(source, ["--editor"]);
+  const page = await show(server.url);
+  await look(page, "top");
+  server.say({ line: 4 });
+  await until(page, "the cursor's line", () => document.querySelector("gcc-robot-preview").line === 3);
+  await settled(page);
+  assert.ok(has(await colors(page, [60, 20, 0], 2), MARK), "the cursor's segment is marked");
+
+  const [x, y] = await project(page, [0, 20, 0]);
+  await page.mouse.click(x, y);
+  while (!server.heard.some((m) => m.line === 6)) await page.waitForTimeout(20);
+
+  const sent = Date.now();
+  server.say({ text: SQUARE.replace("G1 X40", "G1 X40 Y0 Z-5") });
+  await until(page, "the edited text", () => [...document.querySelector("gcc-robot-preview").shadowRoot.querySelectorAll(".row")].some((r) => r.textContent.includes("Z-5")));
+  console.log(`# edit to picture: ${Date.now() - sent} ms`);
+  await settled(page);
+  assert.ok(has(await colors(page, [20, 0, 0]), FEED));
+  assert.deepEqual(page.problems, []);
+  await page.close();
+  server.child.stdin.end();
+  assert.equal(await new Promise((resolve) => server.child.on("exit", resolve)), 0, "it ends with its editor");
+});
+
+test("served: a changed file is drawn again, errors are told", async () => {
+  const source = join(folder, "watched.ngc");
+  writeFileSync(source, SQUARE);
+  const server = await serve(source);
+  const page = await show(server.url);
+  await look(page, "top");
+  assert.ok(!has(await colors(page, [20, 20, 0]), FEED));
+  writeFileSync(source, SQUARE.replace("G1 X40", "G1 X40 Y40"));
+  await page.waitForTimeout(1500);
+  await settled(page);
+  assert.ok(has(await colors(page, [20, 20, 0], 2), FEED), "the diagonal is there");
+  writeFileSync(source, SQUARE.replace("J20", "J19"));
+  await until(page, "the error", () => document.querySelector("gcc-robot-preview").shadowRoot.querySelector(".warning").textContent.includes("line 4"));
+  await page.close();
+  server.child.kill();
+});
+
+test("served: only with the token, only to this computer, only what belongs to it", async () => {
+  const source = join(folder, "guarded.ngc");
+  writeFileSync(source, SQUARE);
+  const server = await serve(source);
+  const url = new URL(server.url);
+  assert.equal(url.hostname, "127.0.0.1");
+  assert.match(url.pathname, /^\/[0-9a-f]{32,}\/$/);
+  const base = `http://${url.host}`;
+  assert.equal(await status(server.url), 200);
+  assert.equal(await status(`${server.url}path`), 200);
+  for (const path of ["/", "/path", "/0000/", `${url.pathname}../path`, `${url.pathname}%2e%2e/etc/passwd`, `${url.pathname}../../../../etc/passwd`, `${url.pathname}guarded.ngc`]) {
+    const [status_] = await new Promise((resolve) => {
+      const r = request({ host: url.hostname, port: url.port, path }, (a) => { a.resume(); resolve([a.statusCode]); });
+      r.end();
+    });
+    assert.ok(status_ === 404 || status_ === 403, `${path}: ${status_}`);
+  }
+  assert.equal(await status(server.url, { headers: { host: "evil.example" } }), 403, "a name that leads here from elsewhere");
+  assert.equal(await status(`${server.url}choose`, { method: "POST", body: "3", headers: { origin: "http://evil.example" } }), 403);
+  assert.equal(await status(`${base}${url.pathname}choose`, { method: "POST", body: "not a number" }), 400);
+  assert.equal(await status(server.url, { method: "DELETE" }), 405);
+  server.child.kill();
+});
