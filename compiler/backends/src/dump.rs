@@ -109,6 +109,8 @@ fn motion(line: &mut Json, op: &Op<'_>) {
             PathMode::Blend(t) => line.op("path").text("mode", "blend").num("tolerance", *t),
         },
         Op::MergeTolerance(t) => line.op("merge_tolerance").num("tolerance", *t),
+        Op::Planner(None) => line.op("planner").text("mode", "trapezoidal"),
+        Op::Planner(Some(corner)) => line.op("planner").text("mode", "smooth").num("corner", *corner),
         _ => machine(line, op),
     };
 }

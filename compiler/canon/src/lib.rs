@@ -225,6 +225,9 @@ pub struct Nurbs {
     pub points: Vec<[f64; 3]>,
     /// Plane; 2.9 has splines in XY only. XZ means Z, then X.
     pub plane: Plane,
+    /// Knots of a G6.2 curve (2.10), one for each line of the program: as many as points and order together. Empty:
+    /// clamped and uniform.
+    pub knots: Vec<f64>,
 }
 
 /// How execution came to a block; a node of a tree that the interpreter grows.

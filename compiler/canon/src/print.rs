@@ -283,7 +283,12 @@ fn arc(out: &mut Vec<u8>, call: &Call) {
 }
 
 fn nurbs(out: &mut Vec<u8>, n: &Nurbs, version: Version) {
-    out.extend_from_slice(if version == Version::V2_10 { b"NURBS_G5_FEED(".as_slice() } else { b"NURBS_FEED(" });
+    let name = match version {
+        Version::V2_10 if !n.knots.is_empty() => b"NURBS_G6_FEED(".as_slice(),
+        Version::V2_10 => b"NURBS_G5_FEED(",
+        Version::V2_9 => b"NURBS_FEED(",
+    };
+    out.extend_from_slice(name);
     push_int(out, n.points.len() as i64);
     out.extend_from_slice(b", ...)\n");
 }
@@ -448,7 +453,7 @@ mod tests {
         let calls = [
             Call::SetG5xOffset(1, p),
             Call::ArcFeed { first_end: 1.0, second_end: 2.0, first_axis: 3.0, second_axis: 4.0, rotation: -1, axis_end: -0.0, rest: [0.0; 6] },
-            Call::NurbsFeed(Box::new(Nurbs { order: 3, points: vec![[0.0; 3]; 4], plane: Plane::Xy })),
+            Call::NurbsFeed(Box::new(Nurbs { order: 3, points: vec![[0.0; 3]; 4], ..Nurbs::default() })),
             Call::SetMotionControlMode(PathMode::Continuous(0.1)),
             Call::StartSpeedFeedSynch(0, 1.5, false),
             Call::SetSpindleMode(0, 0.0),

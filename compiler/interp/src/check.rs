@@ -114,7 +114,7 @@ impl<S: Sink> Interp<'_, S> {
             if covets {
                 return Err(Fault::new(code::AXIS_TWO_USERS, rs274::RT_AXIS_TWO_CODES));
             }
-            let without = matches!(motion, 0 | 10 | 20 | 30 | 52 | 700) || roughing(motion);
+            let without = matches!(motion, 0 | 10 | 20 | 30 | 52 | 62 | 700) || roughing(motion);
             if !axes && !is_polar && !without && !self.is_user_g(motion) {
                 return Err(fault(code::AXIS_MISSING, rs274::RT_AXIS_MISSING_MOTION, &code_name(motion)).at(b'g'));
             }
@@ -188,7 +188,7 @@ impl<S: Sink> Interp<'_, S> {
                 Err(fault(code::CODE_SAME_GROUP, rs274::RT_G52_BETWEEN_G53, "G").at(b'g'))
             }
             53 => Ok(()),
-            _ if motion == 52 => Ok(()),
+            _ if motion == 52 || motion == 62 => Ok(()),
             530 => {
                 if b.motion != 0 && b.motion != 10 {
                     return Err(fault(code::MOTION_G53, rs274::RT_G53_MOTION, "needs G0 or G1").at(b'g'));
@@ -265,10 +265,11 @@ impl<S: Sink> Interp<'_, S> {
         let path = b.g(Group::PathControl) == 640;
         let user_m = b.user_m >= 0;
         let eighties = (810..=890).contains(&motion);
+        let new = self.setup.version == gr_canon::Version::V2_10;
         // 2.10 lets a peck drilling cycle say its clearance.
-        let peck = matches!(motion, 730 | 830) && self.setup.version == gr_canon::Version::V2_10;
+        let peck = matches!(motion, 730 | 830) && new;
         if b.has(b'd') && !(comp_on || motion == 700 || rough || css || peck) {
-            return unused(rs274::RT_D_UNUSED, b'd');
+            return unused(if new { rs274::RT_D_UNUSED_NEW } else { rs274::RT_D_UNUSED }, b'd');
         }
         if b.has(b'$')
             && !(matches!(motion, 760 | 330 | 331 | 950 | 960 | 970)
@@ -284,37 +285,37 @@ impl<S: Sink> Interp<'_, S> {
         if b.has(b'h') && !(length == 430 || motion == 760 || length == 432) {
             return unused(rs274::RT_H_UNUSED, b'h');
         }
-        if b.has(b'i') && !(matches!(motion, 20 | 30 | 50 | 51 | 760 | 870 | 331) || rough || special == 100) {
-            return unused(rs274::RT_I_UNUSED, b'i');
+        if b.has(b'i') && !(matches!(motion, 20 | 30 | 50 | 51 | 60 | 61 | 760 | 870 | 331) || rough || special == 100) {
+            return unused(if new { rs274::RT_I_UNUSED_NEW } else { rs274::RT_I_UNUSED }, b'i');
         }
-        if b.has(b'j') && !(matches!(motion, 20 | 30 | 50 | 51 | 760 | 870) || special == 100) {
-            return unused(rs274::RT_J_UNUSED, b'j');
+        if b.has(b'j') && !(matches!(motion, 20 | 30 | 50 | 51 | 60 | 61 | 760 | 870) || special == 100) {
+            return unused(if new { rs274::RT_J_UNUSED_NEW } else { rs274::RT_J_UNUSED }, b'j');
         }
         let repeats = cycle && self.is_fanuc();
-        if b.has(b'k') && !matches!(motion, 20 | 30 | 330 | 331 | 760 | 870) && !repeats {
-            return unused(rs274::RT_K_UNUSED, b'k');
+        if b.has(b'k') && !matches!(motion, 20 | 30 | 62 | 330 | 331 | 760 | 870) && !repeats {
+            return unused(if new { rs274::RT_K_UNUSED_NEW } else { rs274::RT_K_UNUSED }, b'k');
         }
         if b.has(b'l')
-            && !(eighties || repeats || matches!(motion, 760 | 52 | 730) || special == 100 || comp_on || m5 == 66 || self.m98)
+            && !(eighties || repeats || matches!(motion, 760 | 52 | 62 | 730) || special == 100 || comp_on || m5 == 66 || self.m98)
         {
             return unused(rs274::RT_L_UNUSED, b'l');
         }
         if b.has(b'p') {
             let used = matches!(special, 100 | 40)
                 || path
-                || matches!(motion, 760 | 820 | 860 | 880 | 890 | 50 | 52 | 700 | 20 | 30 | 740 | 840)
+                || matches!(motion, 760 | 820 | 860 | 880 | 890 | 50 | 52 | 60 | 62 | 700 | 20 | 30 | 740 | 840)
                 || matches!(m9, 50..=53)
                 || matches!(m5, 62..=66)
                 || m7 == 19
                 || user_m
                 || self.m98;
             if !used {
-                return unused(rs274::RT_P_UNUSED, b'p');
+                return unused(if new { rs274::RT_P_UNUSED_NEW } else { rs274::RT_P_UNUSED }, b'p');
             }
             self.check_p_value(motion, m7)?;
         }
         if b.or_minus_one(b'q') != -1.0 {
-            let used = matches!(motion, 830 | 730 | 50 | 760 | 700)
+            let used = matches!(motion, 830 | 730 | 50 | 60 | 62 | 760 | 700)
                 || rough
                 || user_m
                 || matches!(m5, 66..=68)
@@ -323,18 +324,18 @@ impl<S: Sink> Interp<'_, S> {
                 || path
                 || m7 == 19;
             if !used {
-                return unused(rs274::RT_Q_UNUSED, b'q');
+                return unused(if new { rs274::RT_Q_UNUSED_NEW } else { rs274::RT_Q_UNUSED }, b'q');
             }
         }
         if b.has(b'r') {
-            let used = matches!(motion, 20 | 30 | 760 | 730 | 740)
+            let used = matches!(motion, 20 | 30 | 62 | 760 | 730 | 740)
                 || rough
                 || eighties
                 || matches!(comp, 411 | 421)
                 || special == 100
                 || m7 == 19;
             // 2.10: G64 chooses the planner with R.
-            let planner = path && self.setup.version == gr_canon::Version::V2_10;
+            let planner = path && new;
             if !used && !planner {
                 return unused(rs274::RT_R_UNUSED, b'r');
             }

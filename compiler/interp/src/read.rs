@@ -1,6 +1,6 @@
 //! Reading a block: words from left to right, each evaluated when it is read; settings wait for the end.
 
-use gr_canon::Sink;
+use gr_canon::{Sink, Version};
 use gr_gcode::{Form, Scan, Target, Word};
 use gr_spec::{Family, code, rs274};
 
@@ -27,7 +27,7 @@ const fn g_groups() -> [i8; 1000] {
     let mut t = [-1; 1000];
     let table: &[(i8, &[usize])] = &[
         (0, &[40, 53, 100, 280, 281, 300, 301, 520, 530, 920]),
-        (1, &[0, 10, 20, 30, 50, 51, 52, 330, 331, 382, 383, 384, 385, 700, 710, 711, 712, 720, 721, 722, 730, 740]),
+        (1, &[0, 10, 20, 30, 50, 51, 52, 60, 61, 62, 63, 330, 331, 382, 383, 384, 385, 700, 710, 711, 712, 720, 721, 722, 730, 740]),
         (1, &[760, 800, 810, 820, 830, 840, 850, 860, 870, 880, 890]),
         (2, &[170, 171, 180, 181, 190, 191]),
         (3, &[900, 910]),
@@ -304,6 +304,9 @@ impl<S: Sink> Interp<'_, S> {
             Some(group) => group as usize,
             None => match G_GROUPS[n as usize] {
                 -1 => return Err(self.unknown_g(rs274::RT_UNKNOWN_G, value)),
+                _ if (60..=63).contains(&n) && self.setup.version != Version::V2_10 => {
+                    return Err(self.unknown_g(rs274::RT_UNKNOWN_G, value));
+                }
                 _ if self.is_fanuc() && self.means_otherwise(n) => return Err(self.unknown_g(rs274::RT_UNKNOWN_G, value)),
                 group => group as usize,
             },

@@ -484,6 +484,8 @@ pub(crate) struct Roughing {
     pub facing: bool,
     /// Most moves.
     pub limit: usize,
+    /// Goes on to the next piece of the contour when a level has nothing to cut, as 2.10 does.
+    pub leaves: bool,
 }
 
 impl Contour {
@@ -723,6 +725,7 @@ impl Contour {
             escape: Zx::new(job.retract, job.retract),
             starts: vec![begin],
             limit: self.most_cuts(begin, step).min(job.limit),
+            leaves: job.leaves,
         };
         let done = pockets.cut(job.kind, begin, &mut cuts);
         out.extend(cuts.into_iter().map(|c| self.restored(c)));
@@ -769,6 +772,7 @@ struct Pockets<'a> {
     escape: Zx,
     starts: Vec<Zx>,
     limit: usize,
+    leaves: bool,
 }
 
 impl Pockets<'_> {
@@ -844,7 +848,7 @@ impl Pockets<'_> {
 
     /// One pass along Z to the contour and back.
     fn pass(&self, x: &mut f64, at: Zx, i: &mut usize, out: &mut Vec<Cut>) {
-        for (k, segment) in self.segments.iter().enumerate().skip(*i) {
+            for (k, segment) in self.segments.iter().enumerate().skip(*i) {
             let is = segment.crossings(at.x);
             let (Some(front), Some(back)) = (is.first(), is.last()) else {
                 continue;
@@ -873,6 +877,10 @@ impl Pockets<'_> {
             out.push(if *i == 0 { Cut::Rapid(at) } else { Cut::Line(at) });
             *x -= self.step;
             return;
+        }
+        // Nothing is left to cut at this level: 2.9 tries again for ever.
+        if self.leaves {
+            *i += 1;
         }
     }
 }
@@ -1085,6 +1093,7 @@ impl<S: Sink> Interp<'_, S> {
             retract: word(b'r', 0.5),
             facing: cycle == 72,
             limit: usize::try_from(self.setup.budgets.passes).unwrap_or(usize::MAX),
+            leaves: self.setup.version == Version::V2_10,
         };
         Ok(contour.rough(&job, cuts))
     }

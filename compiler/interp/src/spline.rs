@@ -1,4 +1,5 @@
-//! Splines: G5 (cubic), G5.1 (quadratic), G5.2 … G5.3 (NURBS), all sent as NURBS with their control points.
+//! Splines: G5 (cubic), G5.1 (quadratic), G5.2 … G5.3 (NURBS) and 2.10's G6, G6.1 (the same as G5 and G5.1) and G6.2
+//! (NURBS with knots), all sent as NURBS with their control points.
 
 use gr_canon::{Call, Nurbs, Plane, Sink, Version};
 use gr_spec::{Rs274, code, rs274};
@@ -10,14 +11,16 @@ fn words(text: Rs274, why: &str) -> Box<Fault> {
 }
 
 impl<S: Sink> Interp<'_, S> {
-    /// G5, G5.1, G5.2, G5.3.
+    /// G5, G5.1, G5.2, G5.3, G6, G6.1, G6.2.
     pub(crate) fn convert_spline(&mut self, g: i16) -> Res {
         match g {
             52 => self.nurbs_point(),
             53 => self.nurbs_end(),
+            62 => self.knotted_point(),
+            63 => Ok(()), // 2.10 knows the code and does nothing: the knots end the curve.
             _ => {
                 self.check_spline()?;
-                if g == 51 { self.quadratic_spline() } else { self.cubic_spline() }
+                if matches!(g, 51 | 61) { self.quadratic_spline() } else { self.cubic_spline() }
             }
         }
     }
@@ -69,7 +72,7 @@ impl<S: Sink> Interp<'_, S> {
 
     fn send_spline(&mut self, order: u32, points: &[[f64; 2]]) {
         let points = points.iter().map(|p| [p[0], p[1], 1.0]).collect();
-        self.emit(Call::NurbsFeed(Box::new(Nurbs { order, points, plane: self.spline_plane() })));
+        self.emit(Call::NurbsFeed(Box::new(Nurbs { order, points, plane: self.spline_plane(), knots: Vec::new() })));
     }
 
     fn quadratic_spline(&mut self) -> Res {
@@ -159,6 +162,96 @@ impl<S: Sink> Interp<'_, S> {
         }
         self.m.motion = 52;
         Ok(())
+    }
+
+    /// G6.2: one more control point with its knot, or one of the last knots alone. A knot that has come `order` times
+    /// ends the curve.
+    fn knotted_point(&mut self) -> Res {
+        let plane = self.m.plane();
+        if !matches!(plane, Plane::Xy | Plane::Yz | Plane::Xz) {
+            return Err(words(rs274::NURBS_G6_PLANE, "the plane is none of G17, G18 and G19"));
+        }
+        let begun = self.m.motion == 62 && !self.queue.spline.knots.is_empty();
+        if !begun {
+            self.queue.spline = Nurbs::default();
+        }
+        self.check_knotted(begun)?;
+        if let Some(p) = self.block.get(b'p').filter(|p| *p != -1.0) {
+            self.queue.spline.order = crate::eval::to_int(p).max(0) as u32;
+        }
+        let [one, two] = self.spline_axes();
+        let both = self.block.has(b"xyz"[one]) && self.block.has(b"xyz"[two]);
+        if both || self.block.has(b'k') {
+            let end = self.find_ends()?;
+            // A word that is missing still has the value of an earlier block.
+            let last = self.queue.spline.knots.last().copied().unwrap_or(0.0);
+            let knot = self.block.get(b'k').unwrap_or(last);
+            self.queue.spline.points.push([end[one], end[two], self.block.values[crate::block::slot(b'r')]]);
+            self.queue.spline.knots.push(knot);
+        }
+        self.m.motion = 62;
+        let Nurbs { order, knots, .. } = &self.queue.spline;
+        let (order, count) = (*order as usize, knots.len());
+        if order > 0 && count > order && knots[count - 1] == knots[count - order] {
+            self.send_knotted(plane);
+        }
+        Ok(())
+    }
+
+    fn check_knotted(&self, begun: bool) -> Res {
+        let b = &self.block;
+        let [one, two] = self.spline_axes();
+        if b.has(b"xyz"[one]) != b.has(b"xyz"[two]) {
+            let text = match self.spline_plane() {
+                Plane::Yz => rs274::NURBS_ONE_AXIS_YZ,
+                Plane::Xz => rs274::NURBS_ONE_AXIS_XZ,
+                _ => rs274::NURBS_ONE_AXIS,
+            };
+            return Err(words(text, "one axis of the plane is missing"));
+        }
+        let whole = |letter: u8| b.get(letter).is_none_or(|v| crate::eval::whole(v).is_some());
+        let (p, q) = (b.get(b'p'), b.get(b'q').filter(|q| *q != -1.0));
+        if !begun && p.is_none() {
+            return Err(words(rs274::NURBS_G6_NO_ORDER, "the order P is missing on the first line"));
+        }
+        if !whole(b'p') {
+            return Err(words(rs274::NURBS_G6_ORDER_INTEGER, "the order P is not a whole number"));
+        }
+        if !begun && q.is_none_or(|q| q <= 0.0) {
+            return Err(words(rs274::NURBS_G6_NO_Q, "the kind of interpolation Q (1, 2 or 3) is missing on the first line"));
+        }
+        if q.is_some_and(|q| !(1.0..=3.0).contains(&q)) {
+            return Err(words(rs274::NURBS_G6_Q_RANGE, "the kind of interpolation Q is not 1, 2 or 3"));
+        }
+        if !whole(b'q') {
+            return Err(words(rs274::NURBS_G6_Q_INTEGER, "the kind of interpolation Q is not a whole number"));
+        }
+        let kept = |letter: u8| b.values[crate::block::slot(letter)];
+        if begun && kept(b'r') <= 0.0 {
+            return Err(words(rs274::NURBS_G6_WEIGHT, "the weight R is missing or not greater than zero"));
+        }
+        if begun && kept(b'k') < 0.0 {
+            return Err(words(rs274::NURBS_G6_NO_KNOT, "the knot K is missing or below zero"));
+        }
+        if !whole(b'k') {
+            return Err(words(rs274::NURBS_G6_KNOT_INTEGER, "the knot K is not a whole number"));
+        }
+        if self.m.feed_mode == 0 && self.m.feed == 0.0 {
+            return Err(Fault::new(code::ARC_NO_FEED, rs274::NURBS_G6_ZERO_FEED).arg("the feed is zero"));
+        }
+        Ok(())
+    }
+
+    /// Sends the curve. The last `order` lines hold knots only. In every plane the controller takes the first of the
+    /// last point's two coordinates for X and the second for Y.
+    fn send_knotted(&mut self, plane: Plane) {
+        let mut spline = std::mem::take(&mut self.queue.spline);
+        spline.plane = plane;
+        if let Some(last) = spline.points.last() {
+            (self.m.current[0], self.m.current[1]) = (last[0], last[1]);
+        }
+        self.emit(Call::NurbsFeed(Box::new(spline)));
+        self.m.motion = -1;
     }
 
     /// G5.3: sends the NURBS.

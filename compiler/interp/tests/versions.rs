@@ -125,3 +125,74 @@ fn roughing_leaves_the_stock() {
     assert_eq!(passes(&new(text).0), 16);
     assert!(passes(&old(text).0) < 5);
 }
+
+/// G6.2: the order on the first line, a knot on each; the knot that comes as often as the order ends the curve.
+#[test]
+fn splines_with_knots() {
+    let curve = "G6.2 P3 Q1 X0 Y0 R1 K0\nX1 Y2 R1 K0\nX3 Y2 R1 K0\nX4 Y0 R1 K1\nG6.2 K2\nG6.2 K2\nG6.2 K2\n";
+    let text = format!("F100\n{curve}G0 X5\nM2\n");
+    assert_eq!(old(&text).1, "Unknown g code used");
+    let (calls, fault) = new(&text);
+    assert_eq!(fault, "");
+    assert!(calls.contains(&"NURBS_G6_FEED(7, ...)".to_string()), "{calls:#?}");
+    for (line, text) in [
+        ("G6.2 Q1 X0 Y0 R1 K0", "Program the nurbs order P in the first block of instruction"),
+        ("G6.2 P3 X0 Y0 R1 K0", "Program the nurbs Q value (1,2,3) in the first block of nurbs instruction"),
+        ("G6.2 P3 Q4 X0 Y0 R1 K0", "nurbs Q value not in range 1 to 3"),
+        ("G6.2 P3.5 Q1 X0 Y0 R1 K0", "nurbs order P number is not an integer"),
+        ("G6.2 P3 Q1 X0 R1 K0", "You must specify both X and Y coordinates for Control Points"),
+        ("G6.2 P3 Q1 X0 Y0 R1 K0\nX1 Y1 R0 K0", "Must specify positive nurbs weight R for every Control Point"),
+        ("G6.2 P3 Q1 X0 Y0 R1 K0\nX1 Y1 R1 K-1", "Must specify nurbs K number for every Control Point"),
+        ("G17.1 G6.2 P3 Q1 X0 Y0 R1 K0", "one plane must be selected for nurbs: XY, YZ, ZX"),
+    ] {
+        assert_eq!(new(&format!("F100\n{line}\nM2\n")).1, text, "{line}");
+    }
+    assert_eq!(new("G6.2 P3 Q1 X0 Y0 R1 K0\nM2\n").1, "Cannot make a nurbs with 0 feedrate");
+    let (calls, _) = new("F100\nG6 X1 Y1 I0 J1 P0 Q-1\nG6.1 X2 Y2 I1 J0\nM2\n");
+    assert_eq!(calls.iter().filter(|c| c.starts_with("NURBS_G5_FEED")).count(), 2);
+}
+
+#[test]
+fn pecks_clear_by_a_millimetre_or_d() {
+    let drill = |words: &str| format!("G21 F100\nG83 X0 Y0 Z-2 R1 Q1{words}\nM2\n");
+    let level = |(calls, _): (Vec<String>, String)| {
+        let cut = calls.iter().position(|c| c.starts_with("STRAIGHT_FEED")).expect("it cuts");
+        calls[cut + 2].clone()
+    };
+    assert_eq!(level(old(&drill(""))), "STRAIGHT_TRAVERSE(0.0000, 0.0000, 0.2540, 0.0000, 0.0000, 0.0000)");
+    // An inch machine: 0.050 in.
+    assert_eq!(level(new(&drill(""))), "STRAIGHT_TRAVERSE(0.0000, 0.0000, 1.2700, 0.0000, 0.0000, 0.0000)");
+    assert_eq!(level(new(&drill(" D0.5"))), "STRAIGHT_TRAVERSE(0.0000, 0.0000, 0.5000, 0.0000, 0.0000, 0.0000)");
+    assert_eq!(old(&drill(" D0.5")).1, "D word with no G41, G41.1, G42, G42.1, G71, G71.1, G71.2 or G96 to use it");
+    assert_eq!(
+        new("G81 X1 Z-1 R1 D1 F1\nM2\n").1,
+        "D word with no G41, G41.1, G42, G42.1, G71, G71.1, G71.2 G73, G83 or G96 to use it"
+    );
+}
+
+#[test]
+fn equality_is_finer() {
+    let shown = |(calls, _): (Vec<String>, String)| calls.into_iter().find(|c| c.starts_with("MESSAGE")).unwrap_or_default();
+    let text = "#1=[1.00001 EQ 1] #2=[1.0000001 EQ 1]\n(debug,#1 #2)\nM2\n";
+    assert_eq!(shown(old(text)), "MESSAGE(\"1.000000 1.000000\")");
+    assert_eq!(shown(new(text)), "MESSAGE(\"0.000000 1.000000\")");
+}
+
+#[test]
+fn tool_change_and_version_number() {
+    let text = "T0 M6\n(debug,#<_vmajor>)\nM2\n";
+    let (calls, _) = old(text);
+    assert!(calls.contains(&"START_CHANGE()".to_string()) && calls.iter().any(|c| c.starts_with("CHANGE_TOOL(")), "{calls:#?}");
+    assert!(calls.contains(&"MESSAGE(\"2.900000\")".to_string()));
+    let (calls, _) = new(text);
+    assert!(!calls.contains(&"START_CHANGE()".to_string()) && calls.contains(&"CHANGE_TOOL()".to_string()), "{calls:#?}");
+    assert!(calls.contains(&"MESSAGE(\"2.100000\")".to_string()), "{calls:#?}");
+}
+
+/// A pass that finds nothing to cut goes on along the contour; 2.9 stays there for ever.
+#[test]
+fn roughing_goes_on_past_an_empty_level() {
+    let text = "G18 G21 G7\nF100\no100 sub\nG1 X18.7259\nZ0\nX19.726 C0.5\nW-5\nU0.5\nZ-25\nX20\no100 endsub\nG71 Q100 Z2.8 X20 D2 I2 R0.3\nM2\n";
+    assert_eq!(new(text).1, "");
+    assert!(old(text).1.contains("too many passes"), "{}", old(text).1);
+}

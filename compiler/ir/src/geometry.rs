@@ -162,16 +162,34 @@ fn sweep(from: f64, to: f64, turns: i32) -> f64 {
 pub fn nurbs_point(order: u32, points: &[f64], share: f64) -> Option<[f64; 2]> {
     let (points, _) = points.as_chunks::<3>();
     let k = (order as usize).min(points.len());
+    let spans = (points.len() + 1).checked_sub(k)?;
+    let t = share.clamp(0.0, 1.0) * spans as f64;
+    let span = (libm::floor(t) as usize).min(spans - 1);
+    de_boor(k, points, span, t, |i| (i.saturating_sub(k - 1)).min(spans) as f64)
+}
+
+/// The point of a NURBS with knots of its own, as many as points and order together, at a share of its parameter
+/// range (from the last of the first `order` knots to the first of the last `order`).
+pub fn knotted_point(order: u32, points: &[f64], knots: &[f64], share: f64) -> Option<[f64; 2]> {
+    let (points, _) = points.as_chunks::<3>();
+    let k = order as usize;
+    if k == 0 || points.len() < k || knots.len() < points.len() + k {
+        return None;
+    }
+    let (low, high) = (knots[k - 1], knots[points.len()]);
+    let t = low + (high - low) * share.clamp(0.0, 1.0);
+    let span = (0..=points.len() - k).rev().find(|s| knots[s + k - 1] <= t && knots[s + k - 1] < high)?;
+    de_boor(k, points, span, t, |i| knots[i])
+}
+
+/// The point at parameter `t`, which lies in the span that the points from `span` on shape.
+fn de_boor(k: usize, points: &[[f64; 3]], span: usize, t: f64, knot: impl Fn(usize) -> f64) -> Option<[f64; 2]> {
     if k == 0 || k > 16 {
         return None;
     }
-    let spans = points.len() - k + 1;
-    let t = share.clamp(0.0, 1.0) * spans as f64;
-    let span = (libm::floor(t) as usize).min(spans - 1);
-    let knot = |i: usize| (i.saturating_sub(k - 1)).min(spans) as f64;
     let mut d = [[0.0; 3]; 16];
     for (j, slot) in d.iter_mut().enumerate().take(k) {
-        let [x, y, w] = points[span + j];
+        let [x, y, w] = *points.get(span + j)?;
         *slot = [x * w, y * w, w];
     }
     for r in 1..k {

@@ -69,7 +69,7 @@ impl Lowering {
     }
 
     fn nurbs(&mut self, nurbs: &gr_canon::Nurbs, source: Source) {
-        if nurbs.plane != gr_canon::Plane::Xy {
+        if nurbs.plane != gr_canon::Plane::Xy || !nurbs.knots.is_empty() {
             return self.nurbs_as_lines(nurbs, source);
         }
         let k = self.scale();
@@ -84,20 +84,30 @@ impl Lowering {
         self.points = points;
     }
 
-    /// The spline operation lies in XY. Splines of the other planes (LinuxCNC 2.10 has them) become short lines,
-    /// 200 of a span: they stay nearer than a 20 000th of the control polygon.
+    /// The spline operation lies in XY and has uniform knots. Splines of the other planes and those with knots of
+    /// their own (LinuxCNC 2.10 has them) become short lines, 200 of a span: they stay nearer than a 20 000th of the
+    /// control polygon. With knots of its own a curve does not begin where the tool is, but at its first point.
     fn nurbs_as_lines(&mut self, nurbs: &gr_canon::Nurbs, source: Source) {
         const PIECES: usize = 200;
         let k = self.scale();
-        let (first, second) = if nurbs.plane == gr_canon::Plane::Yz { (1, 2) } else { (2, 0) };
-        let points: Vec<f64> = nurbs.points.iter().flat_map(|p| [p[0] * k, p[1] * k, p[2]]).collect();
-        let spans = (nurbs.points.len() + 1).saturating_sub(nurbs.order as usize).max(1);
+        let (first, second) = match nurbs.plane {
+            gr_canon::Plane::Yz => (1, 2),
+            gr_canon::Plane::Xz => (2, 0),
+            _ => (0, 1),
+        };
+        // The last lines of a G6.2 hold knots only.
+        let ends = if nurbs.knots.is_empty() { 0 } else { nurbs.order as usize };
+        let real = &nurbs.points[..nurbs.points.len().saturating_sub(ends)];
+        let points: Vec<f64> = real.iter().flat_map(|p| [p[0] * k, p[1] * k, p[2]]).collect();
+        let spans = (real.len() + 1).saturating_sub(nurbs.order as usize).max(1);
         let count = spans * PIECES;
-        for i in 1..=count {
+        for i in usize::from(nurbs.knots.is_empty())..=count {
             let share = i as f64 / count as f64;
-            let Some(p) = crate::geometry::nurbs_point(nurbs.order, &points, share) else {
-                break;
+            let p = match nurbs.knots[..] {
+                [] => crate::geometry::nurbs_point(nurbs.order, &points, share),
+                ref knots => crate::geometry::knotted_point(nurbs.order, &points, knots, share),
             };
+            let Some(p) = p else { break };
             let mut end = *self.out.pose();
             (end.axes[first], end.axes[second]) = (p[0], p[1]);
             self.out.push_to(Op::Linear, &end, source);
@@ -164,6 +174,7 @@ impl Lowering {
                 gr_canon::PathMode::Continuous(t) => PathMode::Blend(t * k),
             }),
             Call::SetNaivecamTolerance(t) => Op::MergeTolerance(t * k),
+            Call::SetPlannerMode(kind, corner) => Op::Planner((kind != 0).then_some(corner)),
             Call::UseToolLengthOffset(ref a) => Op::ToolOffset(self.axes(a)),
             Call::SetToolTableEntry(pocket, tool, ref o, diameter, front, back, orientation) => Op::ToolEntry {
                 pocket,

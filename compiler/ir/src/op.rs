@@ -209,6 +209,8 @@ pub enum Op<'a> {
     PathMode(PathMode),
     /// Tolerance for merging short lines, mm.
     MergeTolerance(f64),
+    /// Which planner blends moves: the trapezoidal one, or the smooth one with how sharp it may corner (0.1 … 1).
+    Planner(Option<f64>),
 
     /// G96/G97: with a limit in rpm the speed is a surface speed, without one it is in rpm.
     SpindleMode {

@@ -70,6 +70,7 @@ fn op() -> impl Strategy<Value = Op<'static>> {
         prop::sample::select(vec![Op::PathMode(PathMode::ExactStop), Op::PathMode(PathMode::ExactPath)]),
         number().prop_map(|t| Op::PathMode(PathMode::Blend(t))),
         number().prop_map(Op::MergeTolerance),
+        prop::option::of(number()).prop_map(Op::Planner),
         (int(), prop::option::of(number())).prop_map(|(spindle, surface)| Op::SpindleMode { spindle, surface }),
         (int(), number()).prop_map(|(spindle, speed)| Op::SpindleSpeed { spindle, speed }),
         (int(), prop::sample::select(vec![Turn::Cw, Turn::Ccw, Turn::Stop]))

@@ -30,6 +30,7 @@ pub(super) fn kind(op: &Op<'_>) -> u8 {
         Op::FeedReferenceXyz => 15,
         Op::PathMode(_) => 16,
         Op::MergeTolerance(_) => 17,
+        Op::Planner(_) => 50,
         Op::SpindleMode { .. } => 18,
         Op::SpindleSpeed { .. } => 19,
         Op::SpindleTurn { .. } => 20,
@@ -150,6 +151,10 @@ impl Builder {
     fn encode_auxiliary(&mut self, op: &Op<'_>) {
         match *op {
             Op::Dwell(v) | Op::MergeTolerance(v) | Op::Rotation(v) => self.values(&[v]),
+            Op::Planner(corner) => {
+                self.int(i32::from(corner.is_some()));
+                self.program.values.extend(corner);
+            }
             Op::ProbeMode(on) | Op::Mist(on) | Op::Flood(on) => self.int(i32::from(on)),
             Op::Units(units) => self.int(units as i32),
             Op::Plane(plane) => self.int(plane as i32),
@@ -349,6 +354,7 @@ impl<'p> Cursor<'p> {
                 Op::Begin { marker: marker(kind), code, text: self.str()? }
             }
             49 => Op::Close(marker(self.int()?)),
+            50 => Op::Planner(if self.flag()? { Some(self.value()?) } else { None }),
             _ => return None,
         })
     }

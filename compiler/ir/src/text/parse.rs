@@ -151,6 +151,10 @@ fn plain_op(f: &mut Fields<'_>) -> Res<Op<'static>> {
             other => return Err(format!("unknown path mode `{other}`")),
         },
         "merge-tolerance" => Op::MergeTolerance(f.number()?),
+        "planner" => {
+            let smooth = f.choice(&[("trapezoidal", false), ("smooth", true)])?;
+            Op::Planner(if smooth { Some(f.num("corner")?) } else { None })
+        }
         "mist" => Op::Mist(f.on_off()?),
         "flood" => Op::Flood(f.on_off()?),
         "rotation" => Op::Rotation(f.number()?),

@@ -184,6 +184,8 @@ impl Line {
             Op::PathMode(PathMode::ExactPath) => self.word("path exact-path"),
             Op::PathMode(PathMode::Blend(t)) => self.word("path blend").num("tolerance", *t),
             Op::MergeTolerance(t) => self.word("merge-tolerance").bare_number(*t),
+            Op::Planner(None) => self.word("planner trapezoidal"),
+            Op::Planner(Some(corner)) => self.word("planner smooth").num("corner", *corner),
             _ => self.auxiliary(op),
         };
     }
