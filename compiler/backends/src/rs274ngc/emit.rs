@@ -37,6 +37,10 @@ pub(super) struct Emitter<'a> {
     pub anchored: [bool; 9],
     /// The axis stands where a probe stopped, which only the machine knows.
     pub loose: [bool; 9],
+    /// The machine went to change the tool at a place of its own: the next move names all its axes.
+    pub displaced: bool,
+    /// Words of the canned cycle in force, while `motion` says that there is one.
+    pub cycle: Option<super::cycles::Modal>,
     /// The state whose frame `at` is in.
     pub frame: State,
     /// Active G0 or G1, as far as a word can be left out.
@@ -73,6 +77,8 @@ impl<'a> Emitter<'a> {
             at: program.start().axes,
             anchored: [false; 9],
             loose: [false; 9],
+            displaced: false,
+            cycle: None,
             frame: state,
             motion: None,
             plane: state.plane,
@@ -201,6 +207,10 @@ impl<'a> Emitter<'a> {
         if self.options.comments && !name.is_empty() {
             self.w.comment(&name);
         }
+        if self.options.comments {
+            let remarks = &self.options.remarks;
+            remarks.iter().for_each(|r| self.w.comment(r));
+        }
         let units = if self.options.units == Units::Inch { "G20" } else { "G21" };
         let plane = plane_word(self.plane);
         let rest = match self.options.language {
@@ -227,7 +237,9 @@ impl<'a> Emitter<'a> {
 
     fn op(&mut self, view: &View<'_, '_>) {
         match view.op {
+            Op::Rapid if self.cycle_there(view) => {}
             Op::Rapid => self.rapid(view),
+            Op::Linear if self.cycle_here(view) => {}
             Op::Linear => self.linear(view),
             Op::Arc(arc) => self.arc(view, &arc),
             Op::Nurbs { order, points } => self.nurbs(view, order, points),

@@ -12,9 +12,11 @@
 //! | `emit` | operations one after another |
 //! | `moves` | moves: which words, which numbers |
 //! | `arcs` | arcs whose rounded numbers still make a circle |
+//! | `cycles` | drilling as canned cycles |
 //! | `settings` | everything that does not move |
 
 mod arcs;
+mod cycles;
 mod emit;
 mod moves;
 mod settings;
@@ -71,6 +73,17 @@ pub enum Arcs {
     Lines,
 }
 
+/// Where the tool is changed.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum ChangeAt {
+    /// At the top of the Z axis of the machine: G53 G0 Z0.
+    G53,
+    /// At the machine's second reference point.
+    G30,
+    /// At the origin of G55, from 5 mm above it.
+    G55,
+}
+
 /// What can be chosen.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Options {
@@ -92,6 +105,12 @@ pub struct Options {
     pub repeat_words: bool,
     /// Write comments.
     pub comments: bool,
+    /// Write drilling as canned cycles where the control does exactly the same.
+    pub cycles: bool,
+    /// Where tools are changed; none = where the program has the tool.
+    pub change_at: Option<ChangeAt>,
+    /// Remarks at the top of the program.
+    pub remarks: Vec<String>,
     /// Program number and name, for the controls that want one.
     pub name: String,
     /// Work offsets that are stored in the control (1 = G54), mm and rad: values that a program only selects.
@@ -114,6 +133,9 @@ impl Default for Options {
             numbers: None,
             repeat_words: false,
             comments: true,
+            cycles: false,
+            change_at: None,
+            remarks: Vec::new(),
             name: String::new(),
             stored_offsets: [[0.0; 9]; 10],
             stored_rotations: [0.0; 10],
@@ -133,6 +155,9 @@ impl Options {
     fn mistakes(&self) -> Option<String> {
         if self.arcs == Arcs::IjkAbsolute && self.language != Language::Linuxcnc {
             return Some(format!("{} has no absolute arc centers", self.language.title()));
+        }
+        if self.change_at.is_some() && self.language != Language::Linuxcnc {
+            return Some("a place for tool changes can be chosen for LinuxCNC only".into());
         }
         if !(self.arc_tolerance > 0.0) {
             return Some("the arc tolerance must be above zero".into());

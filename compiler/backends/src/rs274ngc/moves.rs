@@ -43,9 +43,10 @@ impl Emitter<'_> {
             self.cannot("a tool that does not stand along Z", source);
         }
         let mut out = Vec::new();
+        let displaced = std::mem::take(&mut self.displaced);
         for i in 0..9 {
             let (from, to) = (start.axes[i], end.axes[i]);
-            let force = forced.contains(&i);
+            let force = forced.contains(&i) || displaced && i < 3;
             let moves = from.to_bits() != to.to_bits() && from != to;
             if self.loose[i] && !force && !self.given(i, source) {
                 self.at[i] = to;
@@ -109,8 +110,20 @@ impl Emitter<'_> {
                 return self.home(view, code);
             }
         }
+        if self.displaced {
+            return self.come_back(view);
+        }
         let words = self.axis_words(view.start, view.end, view.source, &[]);
         self.motion_block(0, &words, &[]);
+    }
+
+    /// The first rapid after a tool change elsewhere: across at the height of the change, then to its own height.
+    fn come_back(&mut self, view: &View<'_, '_>) {
+        let mut words = self.axis_words(view.start, view.end, view.source, &[0, 1, 2]);
+        let height: Vec<String> = words.iter().filter(|w| w.starts_with('Z')).cloned().collect();
+        words.retain(|w| !w.starts_with('Z'));
+        self.motion_block(0, &words, &[]);
+        self.motion_block(0, &height, &[]);
     }
 
     /// G53: the numbers are the machine's, whatever the offsets are.

@@ -1,12 +1,15 @@
 //! Everything that does not move: offsets, tools, spindle, coolant, modes, outputs.
 
-use super::Language;
 use super::emit::Emitter;
+use super::{ChangeAt, Language};
 use super::write::AXES;
 use gr_ir::{Axes, Op, Override, PathMode, Source, Turn, View};
 use gr_text::code;
 
 const OFFSETS: [&str; 10] = ["", "G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3"];
+
+/// Height above the place of tool changes in G55, mm.
+const ABOVE_CHANGE: f64 = 5.0;
 
 impl Emitter<'_> {
     pub fn setting(&mut self, view: &View<'_, '_>) {
@@ -30,6 +33,7 @@ impl Emitter<'_> {
             Op::Flood(on) => self.coolant(on, "M8", view),
             Op::PathMode(mode) => self.path_mode(mode, view),
             Op::MergeTolerance(t) if self.linuxcnc() && t > 0.0 => self.merge_tolerance(t, view),
+            Op::Planner(Some(_)) => self.as_comment("smooth planner (G64 R)", source),
             Op::Override(which, on) => self.override_switch(which, on, source),
             Op::DigitalOut { index, on, synced } => {
                 let code = match (synced, on) {
@@ -165,8 +169,11 @@ impl Emitter<'_> {
         let words = self.words(view.source);
         let zero = offset.iter().all(|v| *v == 0.0);
         // A tool that has not been measured has a length of 0 too, so for 0 the source decides.
-        let off = words.is_some_and(|w| w.g(490)) || (zero && !words.is_some_and(|w| w.g(430)));
         let named = self.tool_with(offset, view.state.tool);
+        let off = match words {
+            Some(w) => w.g(490) || zero && !w.g(430),
+            None => zero && (view.state.tool <= 0 || named != Some(view.state.tool)),
+        };
         let block = match (named, self.options.language) {
             _ if off || (zero && named.is_none()) => "G49".to_string(),
             (Some(n), Language::Linuxcnc | Language::FanucMill) => format!("G43 H{n}"),
@@ -202,8 +209,24 @@ impl Emitter<'_> {
             self.as_comment(&what, view.source);
             return self.w.block("M0");
         }
+        let Some(place) = self.options.change_at else {
+            self.w.block("M6");
+            return self.motion_unsure();
+        };
+        let (high, low) = (self.w.length(ABOVE_CHANGE, self.w.places).0, view.state.work.clamp(1, 9));
+        match place {
+            ChangeAt::G53 => self.w.block("G53 G0 Z0"),
+            ChangeAt::G30 => self.w.block("G30"),
+            ChangeAt::G55 => [format!("G55 G0 Z{high}"), "G0 X0 Y0".into(), "G0 Z0".into()].iter().for_each(|b| self.w.block(b)),
+        }
         self.w.block("M6");
+        if place == ChangeAt::G55 {
+            self.w.block(&format!("G0 Z{high}"));
+            self.w.block(OFFSETS[usize::from(low)]);
+        }
         self.motion_unsure();
+        self.anchored = [false; 9];
+        self.displaced = true;
     }
 
     fn tool_entry(&mut self, view: &View<'_, '_>) {
