@@ -75,18 +75,12 @@ fn accepted_programs_with_block_delete() {
     must_agree("corpus with block delete", &jobs);
 }
 
-/// Known gap (docs/conformance.md): after a call of a subroutine that the file does not have, the real one, told to go
-/// on, resumes behind the call; ours ends.
-const NOT_GONE_ON: [&str; 6] =
-    ["m98-unknown", "o-call-in-sub-undefined", "o-call-undefined", "o-call-undefined-name", "o-nested-sub", "o-redefined"];
-
 /// After an error rs274 goes on with the next line when it is told to.
 #[test]
 fn one_fault_programs_going_on() {
     let mut jobs = jobs("errors");
     // Told to go on, the real one goes round for ever in these; ours ends.
     jobs.retain(|(name, _)| name != "endless" && name != "name-readonly");
-    jobs.retain(|(name, _)| !NOT_GONE_ON.contains(&&**name));
     for (_, job) in &mut jobs {
         job.options = vec!["-n".into(), "0".into()];
     }

@@ -555,11 +555,14 @@ impl<'a, S: Sink> Interp<'a, S> {
         self.findings.push(Finding { file: p.file, line: p.line, frame: p.frame, fault, span, text });
     }
 
+    /// The file ends too early. Told to go on, the controller does so behind the call that it was in.
     fn end_of_file(&mut self) -> Option<End> {
         let fault = self.end_fault();
+        let called = self.level() > 0;
         self.found(fault);
         self.unwind();
-        Some(End::Fault)
+        let goes_on = called && self.setup.keep_going && self.findings.len() < 100;
+        (!goes_on).then_some(End::Fault)
     }
 
     /// What is wrong when a file ends.

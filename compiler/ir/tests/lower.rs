@@ -190,11 +190,24 @@ fn nurbs_begin_and_end_at_their_outer_points() {
         plane: gr_canon::Plane::Xy,
         order: 3,
         points: vec![[1.0, 0.0, 1.0], [1.0, 1.0, libm::sqrt(0.5)], [0.0, 1.0, 1.0]],
+        ..Nurbs::default()
     };
-    let program =
-        lower(&[Call::SetFeedRate(60.0), Call::StraightTraverse(at(1.0, 0.0, 0.0)), Call::NurbsFeed(Box::new(nurbs))]);
-    let r = report(&program, &Rates::default());
-    assert!((r.totals.feed_nm as f64 / 1e6 - FRAC_PI_2).abs() < 1e-4);
+    // The same curve with its knots, as G6.2 of LinuxCNC 2.10 sends it: the last lines hold knots only.
+    let mut knotted = nurbs.clone();
+    knotted.points.extend([[9.0, 9.0, 1.0]; 3]);
+    knotted.knots = vec![0.0, 0.0, 0.0, 1.0, 1.0, 1.0];
+    let mut halved = knotted.clone();
+    halved.points.insert(1, [1.0, libm::sqrt(0.5), 1.0]);
+    halved.knots = vec![0.0, 0.0, 0.0, 0.5, 1.0, 1.0, 1.0];
+    for curve in [nurbs, knotted] {
+        let program =
+            lower(&[Call::SetFeedRate(60.0), Call::StraightTraverse(at(1.0, 0.0, 0.0)), Call::NurbsFeed(Box::new(curve))]);
+        let r = report(&program, &Rates::default());
+        assert!((r.totals.feed_nm as f64 / 1e6 - FRAC_PI_2).abs() < 1e-4);
+    }
+    let program = lower(&[Call::SetFeedRate(60.0), Call::NurbsFeed(Box::new(halved))]);
+    let last = program.iter().last().map(|v| v.end.axes);
+    assert_eq!(last.map(|a| [a[0], a[1]]), Some([0.0, 1.0]));
 }
 
 #[test]
