@@ -1,1 +1,17 @@
-//! Predicted errors of a machine.
+//! What error a machine will make: by its joints, by its geometry, by cutting force; along a program, over the work
+//! space, and what can be done about it. The models are those of E. E. R. Gojtan (EPUSP 2009), for any kinematics.
+//!
+//! | module | job |
+//! |---|---|
+//! | `grade` | standard tolerances of lengths |
+//! | `material` | materials and cutting force |
+//! | `error` | the errors at one place of the machine |
+
+// `!(x <= limit)` is meant: a value that is not a number must fail the test.
+#![allow(clippy::neg_cmp_op_on_partial_ord)]
+
+pub mod error;
+pub mod grade;
+pub mod material;
+
+pub use error::{Budget, BudgetOptions, Errors, Sensitivity, Spread, closed_form};

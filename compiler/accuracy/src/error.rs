@@ -1,0 +1,239 @@
+//! The error of the tool point at one place of the machine: by joints, by geometry, by force.
+
+use crate::grade;
+use gr_machine::math::{V3, add, cross, dot, norm, scale};
+use gr_machine::{Chain, KinematicsError, Machine, ParameterKind, TwoLegs, differential, parameter_columns};
+
+/// How far each joint and each number of the geometry may be off, mm or rad.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Budget {
+    /// Of the joints, plus or minus; none = the machine file doesn't say.
+    pub joints: Option<Vec<f64>>,
+    /// Of the geometry, plus or minus, in the order of `Machine::parameters`; none = the file says nothing of it.
+    pub geometry: Option<Vec<f64>>,
+    /// What the file does not say and no grade covers: names of joints and parameters, taken as exact.
+    pub unsaid: Vec<String>,
+}
+
+/// Where the budget comes from besides the machine file.
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
+pub struct BudgetOptions {
+    /// A grade of ISO 286-1 in place of the file's.
+    pub grade: Option<u8>,
+    /// Tolerances by the formula of Gojtan 2009.
+    pub usp2009: bool,
+}
+
+impl Budget {
+    /// What the machine file and the options say.
+    pub fn new(machine: &Machine, options: BudgetOptions) -> Budget {
+        let file = machine.cell.accuracy.as_ref();
+        let mut unsaid = Vec::new();
+        let joints = file.filter(|a| a.joints.iter().any(Option::is_some)).map(|a| {
+            let mut one = |(i, e): (usize, &Option<f64>)| {
+                if e.is_none() {
+                    unsaid.push(machine.joints.get(i).map_or(String::new(), |j| j.name.clone()));
+                }
+                e.unwrap_or(0.0)
+            };
+            a.joints.iter().enumerate().map(&mut one).collect()
+        });
+        let grade = options.grade.or(file.and_then(|a| a.grade));
+        let single = file.map(|a| &a.parameters);
+        let says = grade.is_some() || single.is_some_and(|p| !p.is_empty());
+        let by_grade = if options.usp2009 { grade::tolerance_usp2009 } else { grade::tolerance };
+        let geometry = says.then(|| {
+            let mut out = Vec::new();
+            for p in machine.parameters() {
+                let said = single.and_then(|s| s.get(&p.name).copied());
+                let graded = || {
+                    let lengths = p.kind == ParameterKind::Length && !p.name.ends_with(".zero");
+                    grade.filter(|_| lengths).and_then(|g| by_grade(p.nominal, g)).map(|width| width / 2.0)
+                };
+                let tolerance = said.or_else(graded);
+                // Zeros of joints belong to the error of the joint.
+                if tolerance.is_none() && !p.name.ends_with(".zero") {
+                    unsaid.push(p.name.clone());
+                }
+                out.push(tolerance.unwrap_or(0.0));
+            }
+            out
+        });
+        Budget { joints, geometry, unsaid }
+    }
+}
+
+/// What moves the tool point at one place: mm per unit of each joint and of each number of the geometry, and the
+/// stiffness of each joint.
+#[derive(Clone, PartialEq, Debug, Default)]
+pub struct Sensitivity {
+    /// By the joints, mm per mm or rad.
+    pub joints: Vec<V3>,
+    /// By the geometry, mm per mm or rad.
+    pub geometry: Vec<V3>,
+    /// Of the joints, N/mm or N·mm/rad; none where the machine file has no member for a joint.
+    pub stiffness: Vec<Option<f64>>,
+}
+
+/// The velocity of a point `lever` away from where a column holds.
+fn at_lever(column: &[f64; 6], lever: V3) -> V3 {
+    let [x, y, z, a, b, c] = *column;
+    add([x, y, z], cross([a, b, c], lever))
+}
+
+impl Sensitivity {
+    /// At joint values, for a tool point `lever` from the flange (base directions, mm).
+    pub fn new(machine: &Machine, joints: &[f64], lever: V3) -> Result<Sensitivity, KinematicsError> {
+        let columns = differential::velocity(machine, joints)?;
+        let parameters = parameter_columns(machine, joints)?;
+        let stiff = machine.cell.stiffness.as_ref();
+        Ok(Sensitivity {
+            joints: columns.iter().map(|c| at_lever(c, lever)).collect(),
+            geometry: parameters.iter().map(|c| at_lever(c, lever)).collect(),
+            stiffness: joints.iter().enumerate().map(|(i, q)| stiff.and_then(|s| s.joint(i, *q))).collect(),
+        })
+    }
+
+    /// The same for a two-leg machine whose place is known; none at a singularity.
+    pub fn of_two_legs(machine: &Machine, legs: &TwoLegs, at: V3) -> Option<Sensitivity> {
+        let cut = |c: &[f64; 6]| [c[0], c[1], c[2]];
+        let stiff = machine.cell.stiffness.as_ref();
+        let lengths = legs.lengths(at);
+        Some(Sensitivity {
+            joints: legs.joint_columns_at(at)?.iter().map(cut).collect(),
+            geometry: legs.parameter_columns_at(at)?.iter().map(cut).collect(),
+            stiffness: lengths.iter().enumerate().map(|(i, q)| stiff.and_then(|s| s.joint(i, *q))).collect(),
+        })
+    }
+
+    /// Compliance of the tool point, mm/N; none where the stiffness of a joint that carries the force is not known.
+    /// The virtual work of a force on the tool equals that of the joints' springs.
+    pub fn compliance(&self) -> Option<[[f64; 3]; 3]> {
+        let mut out = [[0.0; 3]; 3];
+        for (column, k) in self.joints.iter().zip(&self.stiffness) {
+            let k = (*k)?;
+            for (row, a) in out.iter_mut().zip(column) {
+                row.iter_mut().zip(column).for_each(|(cell, b)| *cell += a * b / k);
+            }
+        }
+        Some(out)
+    }
+
+    /// How far a force, N, moves the tool point, mm.
+    pub fn deflection(&self, force: V3) -> Option<V3> {
+        Some(self.compliance()?.map(|row| dot(row, force)))
+    }
+}
+
+/// The error that independent causes of known size make together.
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
+pub struct Spread {
+    /// The worst pattern of signs, by axis, mm.
+    pub worst: V3,
+    /// Root of the sum of squares, by axis, mm.
+    pub rss: V3,
+    /// The longest error vector of any pattern of signs, mm.
+    pub longest: f64,
+    /// Root of the sum of squares of the lengths, mm.
+    pub typical: f64,
+}
+
+impl Spread {
+    /// By causes that each move the tool point by `columns` times `sizes`.
+    pub fn new(columns: &[V3], sizes: &[f64]) -> Spread {
+        let moves: Vec<V3> = columns.iter().zip(sizes).map(|(c, s)| scale(*c, *s)).filter(|v| *v != [0.0; 3]).collect();
+        let mut out = Spread { longest: longest(&moves), ..Spread::default() };
+        for v in &moves {
+            for axis in 0..3 {
+                out.worst[axis] += v[axis].abs();
+                out.rss[axis] += v[axis] * v[axis];
+            }
+        }
+        out.typical = libm::sqrt(out.rss.iter().sum());
+        out.rss = out.rss.map(libm::sqrt);
+        out
+    }
+}
+
+/// Up to so many causes all patterns of signs are tried.
+const ALL_PATTERNS: usize = 14;
+
+/// The greatest length of a sum of vectors with free signs. With many vectors a sum that no single change of sign and
+/// no turn towards it makes longer, found from many directions.
+fn longest(moves: &[V3]) -> f64 {
+    if moves.len() > ALL_PATTERNS {
+        return moves.iter().map(|d| climbed(moves, *d)).fold(0.0, f64::max);
+    }
+    let mut sum = moves.iter().fold([0.0; 3], |s, v| add(s, *v));
+    let mut best = dot(sum, sum);
+    let mut signs = vec![1.0f64; moves.len()];
+    // In Gray's order each pattern differs from the one before by one sign; the first sign is free to stay.
+    for step in 1u32..1 << moves.len().saturating_sub(1) {
+        let i = step.trailing_zeros() as usize;
+        signs[i] = -signs[i];
+        sum = add(sum, scale(moves[i], 2.0 * signs[i]));
+        best = best.max(dot(sum, sum));
+    }
+    libm::sqrt(best)
+}
+
+fn climbed(moves: &[V3], mut direction: V3) -> f64 {
+    let mut best = 0.0;
+    for _ in 0..50 {
+        let towards = |v: &V3| if dot(*v, direction) < 0.0 { scale(*v, -1.0) } else { *v };
+        direction = moves.iter().fold([0.0; 3], |s, v| add(s, towards(v)));
+        let length = norm(direction);
+        if length <= best * (1.0 + 1e-12) {
+            break;
+        }
+        best = length;
+    }
+    best
+}
+
+/// The errors at one place.
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
+pub struct Errors {
+    /// By the joints; none = no data.
+    pub kinematic: Option<Spread>,
+    /// By the geometry; none = no data.
+    pub geometric: Option<Spread>,
+    /// By the cutting force, mm; none = no data or no force.
+    pub elastic: Option<V3>,
+}
+
+impl Errors {
+    /// At a place, with a force on the tool (N) where there is one.
+    pub fn new(at: &Sensitivity, budget: &Budget, force: Option<V3>) -> Errors {
+        Errors {
+            kinematic: budget.joints.as_ref().map(|b| Spread::new(&at.joints, b)),
+            geometric: budget.geometry.as_ref().map(|b| Spread::new(&at.geometry, b)),
+            elastic: force.and_then(|f| at.deflection(f)),
+        }
+    }
+
+    /// Rule *sum*: longest kinematic + longest geometric + length of the deflection, mm.
+    pub fn sum(&self) -> f64 {
+        self.kinematic.map_or(0.0, |s| s.longest)
+            + self.geometric.map_or(0.0, |s| s.longest)
+            + self.elastic.map_or(0.0, norm)
+    }
+
+    /// Rule *root of squares*: of the typical kinematic and geometric errors and the deflection, mm.
+    pub fn root_of_squares(&self) -> f64 {
+        let parts = [
+            self.kinematic.map_or(0.0, |s| s.typical),
+            self.geometric.map_or(0.0, |s| s.typical),
+            self.elastic.map_or(0.0, norm),
+        ];
+        libm::sqrt(parts.iter().map(|p| p * p).sum())
+    }
+}
+
+/// Whether a machine's errors are in closed form, so that a map of them is quick.
+pub fn closed_form(machine: &Machine) -> bool {
+    matches!(
+        machine.chain,
+        Chain::TwoLegs(_) | Chain::Opw(_) | Chain::Scara(_) | Chain::Planar3r(_) | Chain::Cartesian
+    )
+}
