@@ -26,6 +26,8 @@ pub(crate) struct Emit<'a> {
     turn: Turn,
     coolant: Functions,
     locks: (bool, bool),
+    /// Features that some workingstep has cut.
+    pub cut: std::collections::BTreeSet<u64>,
 }
 
 impl<'a> Emit<'a> {
@@ -46,6 +48,7 @@ impl<'a> Emit<'a> {
             turn: Turn::Stop,
             coolant: Functions::default(),
             locks: (false, false),
+            cut: std::collections::BTreeSet::new(),
         }
     }
     pub fn begin(&mut self) {

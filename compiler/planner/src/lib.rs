@@ -30,7 +30,8 @@ pub fn tool_table(tools: &[Tool]) -> String {
     let line = |t: &Tool| {
         let length = t.length.unwrap_or(0.0);
         let name: String = t.name.chars().map(|c| if c < ' ' { ' ' } else { c }).collect();
-        format!("T{0} P{0} Z{length:+.4} D{1:+.4} ;{2} {name}\n", t.number, t.diameter, t.kind)
+        let radius = if t.edge_radius > 0.0 { format!(" R{}", t.edge_radius) } else { String::new() };
+        format!("T{0} P{0} Z{length:+.4} D{1:+.4} ;{2}{radius} {name}\n", t.number, t.diameter, t.kind)
     };
     tools.iter().map(line).collect()
 }

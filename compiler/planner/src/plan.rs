@@ -1,6 +1,8 @@
 //! The default planner: a process model becomes a motion program. Rapids go by the security plane, never into
 //! the part; what cannot be done is an error, never left out.
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use gr_ir::{Marker, Note, Op, Program, Stop};
 use gr_text::{Diagnostic, FileId, LineIndex, Severity, code};
 
@@ -82,6 +84,7 @@ pub fn plan(text: &[u8], file: FileId, options: &Options) -> (Option<Planned>, V
         setups: Vec::new(),
         axes: Vec::new(),
         tolerance: tolerance(&process, options),
+        tells: tells(&process),
     };
     p.e.b.file(file, &options.name);
     p.e.begin();
@@ -102,6 +105,20 @@ fn tolerance(process: &Process, options: &Options) -> f64 {
     options.tolerance.or(written).unwrap_or(0.05).clamp(0.001, 0.5)
 }
 
+/// Of each feature, the workingstep that leaves least: least allowance, then the smallest tool, then the last.
+fn tells(process: &Process) -> BTreeSet<u64> {
+    let mut best: BTreeMap<u64, (f64, f64, u64)> = BTreeMap::new();
+    for s in process.steps() {
+        let OperationKind::Mill(m) = &s.operation.kind else { continue };
+        let own = (m.allowance_side, s.operation.tool.diameter, s.origin.id);
+        let kept = best.entry(s.feature.origin.id).or_insert(own);
+        if own.0 < kept.0 - 1e-9 || (own.0 - kept.0).abs() <= 1e-9 && own.1 <= kept.1 {
+            *kept = own;
+        }
+    }
+    best.into_values().map(|b| b.2).collect()
+}
+
 fn highest(process: &Process) -> f64 {
     process.steps().iter().map(|s| s.security.point[2]).fold(0.0, f64::max)
 }
@@ -114,6 +131,8 @@ struct Planner<'a> {
     /// Tilted axes that were told.
     axes: Vec<String>,
     tolerance: f64,
+    /// Workingsteps that say what is left of their features.
+    tells: BTreeSet<u64>,
 }
 
 impl Planner<'_> {
@@ -238,8 +257,10 @@ impl Planner<'_> {
                 }
             }
             OperationKind::Mill(m) => {
+                let given = mill::Given { security, tolerance: self.tolerance, tells: self.tells.contains(&s.origin.id) };
                 for f in targets(s) {
-                    mill::mill(&mut self.e, s, m, f, security, self.tolerance);
+                    mill::mill(&mut self.e, s, m, f, &given);
+                    self.e.cut.insert(f.origin.id);
                 }
             }
             OperationKind::Other => self.e.say(code::PLAN_NOT_LOWERED, o.origin, &[&o.keyword, " without an explicit tool path"]),

@@ -281,6 +281,8 @@ pub enum Shape {
         wall: f64,
         /// Radius between wall and floor.
         radius: f64,
+        /// What stays.
+        bosses: Vec<Boss>,
     },
     /// A round hole.
     Hole {
@@ -295,6 +297,8 @@ pub enum Shape {
     Outside {
         /// Contour.
         boundary: Contour,
+        /// Of an open contour: whether the tool is on its left; none: the file does not say.
+        left: Option<bool>,
     },
     /// A boss of its own.
     Boss(Boss),
@@ -404,15 +408,15 @@ pub enum Travel {
 }
 
 /// Sections of slots.
-#[derive(Clone, Copy, PartialEq, Debug)]
+#[derive(Clone, PartialEq, Debug)]
 pub enum Section {
     /// Flat bottom with two walls: width at the bottom.
     SquareU {
         /// At the bottom.
         width: f64,
-        /// Radii between walls and bottom.
+        /// Radii between walls and bottom, first at +x of the profile.
         radius: [f64; 2],
-        /// Angles of the walls against vertical, rad.
+        /// Angles of the walls against vertical, rad, likewise.
         angle: [f64; 2],
     },
     /// Half-round bottom.
@@ -426,7 +430,7 @@ pub enum Section {
         radius: f64,
         /// Angle between the walls, rad.
         angle: f64,
-        /// Its tilt, rad.
+        /// Angle between the x axis of the profile and its first side, rad.
         tilt: f64,
     },
     /// T.
@@ -437,6 +441,8 @@ pub enum Section {
         bar_width: f64,
         /// Of the lower part.
         bar_depth: f64,
+        /// It has chamfers or a radius as well.
+        dressed: bool,
     },
     /// Part of a circle.
     Circular {
@@ -445,8 +451,8 @@ pub enum Section {
         /// Angle, rad.
         sweep: f64,
     },
-    /// Any curve.
-    General,
+    /// Any curve: x across, y up.
+    General(Contour),
 }
 
 /// Ends of slots.
@@ -496,6 +502,8 @@ pub struct Tool {
     pub cutting_length: Option<f64>,
     /// Edge radius.
     pub edge_radius: f64,
+    /// Half angle of a tapered body, rad; 0 for a cylinder.
+    pub taper: f64,
     /// From its reference to the tip.
     pub length: Option<f64>,
     /// Teeth.

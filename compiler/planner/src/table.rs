@@ -161,7 +161,7 @@ fn shape(shape: &Shape) -> String {
             let _ = write!(out, ", {}", bottom_name(bottom));
             out
         }
-        Shape::Outside { boundary } => format!("outside of {} points", boundary.points.len()),
+        Shape::Outside { boundary, .. } => format!("outside of {} points", boundary.points.len()),
         Shape::Thread { major, pitch, .. } => format!("thread {major}{}", pitch.map_or(String::new(), |p| format!(" pitch {p}"))),
         Shape::Compound(all) => {
             let inner: Vec<String> = all.iter().map(|f| format!("#{} {}", f.origin.id, self::shape(&f.shape))).collect();
@@ -209,9 +209,9 @@ fn section_text(s: &Section) -> String {
         Section::SquareU { width, radius, .. } => format!("square U width {width} radius {}", radius[0]),
         Section::RoundedU { width } => format!("rounded U width {width}"),
         Section::Vee { radius, angle, .. } => format!("V {} degrees radius {radius}", angle.to_degrees()),
-        Section::Tee { width, bar_width, bar_depth } => format!("T width {width} bar {bar_width} x {bar_depth}"),
+        Section::Tee { width, bar_width, bar_depth, .. } => format!("T width {width} bar {bar_width} x {bar_depth}"),
         Section::Circular { radius, .. } => format!("circular radius {radius}"),
-        Section::General => "general section".into(),
+        Section::General(_) => "general section".into(),
     }
 }
 

@@ -201,7 +201,7 @@ fn the_v_slot_keeps_to_its_section() {
         let (out, y) = ((s.end.axes[1] - 50.0).abs(), 20.0 - s.end.axes[2]);
         lowest[tool] = lowest[tool].max(y);
         if tool == 1 && y > 0.0 {
-            assert!(out + 1.5 <= half(y) + 1e-4, "face mill: {s:?}");
+            assert!(out + 1.5 <= half(y) + 1e-3, "face mill: {s:?}");
         }
         if tool == 2 && y > 0.0 {
             // The ball touches the section nowhere beyond the tolerance.
@@ -212,8 +212,8 @@ fn the_v_slot_keeps_to_its_section() {
             }
         }
     }
-    // Depth by face mill to where the wall ends, by ball to the floor.
-    assert!((lowest[1] - 6.1625).abs() < 1e-3 && (lowest[2] - 7.0).abs() < 1e-9, "{lowest:?}");
+    // The face mill takes the flat part of the floor, the ball all of it.
+    assert!((lowest[1] - 7.0).abs() < 1e-3 && (lowest[2] - 7.0).abs() < 1e-9, "{lowest:?}");
 }
 
 /// Programs for machines with three axes refuse tilted tools, and take everything else.

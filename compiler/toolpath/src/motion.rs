@@ -398,11 +398,18 @@ impl Writer<'_> {
             self.line(p, z, Tag::Approach);
             return Ok(());
         }
+        // A pass no longer than a fraction of the tool is no slope: turn round beside it instead.
+        if length < 0.5 * self.radius && need > 4.0 * length {
+            if let Some((centre, r, side)) = self.room_for_helix(path, 0.5 * self.radius) {
+                return self.helix_about(path, above, z, angle, centre, r, side);
+            }
+        }
         let round = path.is_closed() && need > length * 0.5 && width >= length;
         let window = length.min(width).min(need * 0.5).max(1e-3);
         let legs = if round { (need / length).ceil() } else { 2.0 * (need / window * 0.5).ceil() };
         if legs > 20_000.0 {
-            return Err(Error::Parameter("angle"));
+            // No way to go to and fro on: the tool axis is all that is left.
+            return Ok(self.line(p, z, Tag::Approach));
         }
         let there = if round { Some(path.opened()) } else { path.part(0.0, window) };
         let Some(there) = there else { return Ok(self.line(p, z, Tag::Approach)) };
@@ -415,21 +422,32 @@ impl Writer<'_> {
         Ok(())
     }
 
-    /// Down a helix beside the path, one flat turn at the bottom, out of it tangentially.
-    fn helix(&mut self, path: &Path2, above: f64, z: f64, radius: f64, angle: f64) -> Result<(), Error> {
+    /// Where a helix beside the start of a path has room: centre, radius, side.
+    fn room_for_helix(&self, path: &Path2, radius: f64) -> Option<(P2, f64, f64)> {
         let (p, t) = (path.start(), path.start_tangent());
-        let mut found = None;
-        'search: for k in [1.0, 0.75, 0.5, 0.35, 0.25] {
+        for k in [1.0, 0.75, 0.5, 0.35, 0.25] {
             for side in [1.0, -1.0] {
                 let r = radius * k;
                 let c = p + t.left() * (r * side);
                 if self.region.is_none_or(|g| g.contains(c) && g.dist(c) >= self.radius + r - 1e-6) {
-                    found = Some((c, r, side));
-                    break 'search;
+                    return Some((c, r, side));
                 }
             }
         }
-        let Some((centre, r, side)) = found else { return self.ramp(path, above, z, angle, f64::INFINITY) };
+        None
+    }
+
+    /// Down a helix beside the path, one flat turn at the bottom, out of it tangentially.
+    fn helix(&mut self, path: &Path2, above: f64, z: f64, radius: f64, angle: f64) -> Result<(), Error> {
+        match self.room_for_helix(path, radius) {
+            Some((centre, r, side)) => self.helix_about(path, above, z, angle, centre, r, side),
+            None => self.ramp(path, above, z, angle, f64::INFINITY),
+        }
+    }
+
+    #[allow(clippy::too_many_arguments)]
+    fn helix_about(&mut self, path: &Path2, above: f64, z: f64, angle: f64, centre: P2, r: f64, side: f64) -> Result<(), Error> {
+        let p = path.start();
         let top = self.down_to(p, above);
         let turns = ((top - z).max(0.0) / (TAU * r * libm::tan(angle))).ceil();
         if turns > 20_000.0 {

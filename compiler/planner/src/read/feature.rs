@@ -200,8 +200,12 @@ impl<'m> Reader<'m> {
                 };
                 let wall = node.node("wall_boundary");
                 let radius = wall.and_then(|w| w.length("profile_radius")).unwrap_or(0.0);
-                let angle = wall.and_then(|w| w.real("tilt_angle")).map_or(0.0, |a| self.angle(a));
-                Shape::Step { start, length, direction, wall: angle, radius }
+                // One side of the V is the floor, the other the wall.
+                let square = std::f64::consts::FRAC_PI_2;
+                let angle = |a: &str| wall.and_then(|w| w.real(a)).map(|v| self.angle(v));
+                let wall = angle("profile_angle").map_or(0.0, |a| a - square) + angle("tilt_angle").unwrap_or(0.0);
+                let bosses = self.bosses(node, placement)?;
+                Shape::Step { start, length, direction, wall: if wall.abs() < 1e-9 { 0.0 } else { wall }, radius, bosses }
             }
             "ROUND_HOLE" => self.hole(node)?,
             "GENERAL_OUTSIDE_PROFILE" => {
@@ -211,9 +215,11 @@ impl<'m> Reader<'m> {
                 } else {
                     self.open_contour(boundary, placement)?
                 };
-                Shape::Outside { boundary }
+                Shape::Outside { boundary, left: None }
             }
-            "BOSS" => Shape::Boss(self.boss(node, &Frame::default(), placement)?),
+            "GENERAL_SHAPE_PROFILE" | "PARTIAL_CIRCULAR_SHAPE_PROFILE" | "CIRCULAR_CLOSED_SHAPE_PROFILE"
+            | "RECTANGULAR_OPEN_SHAPE_PROFILE" | "RECTANGULAR_CLOSED_SHAPE_PROFILE" => self.shape_profile(node, placement)?,
+            "BOSS" => Shape::Boss(self.boss(node, placement, placement)?),
             "TOOLPATH_FEATURE" => Shape::Toolpath,
             "CATALOGUE_THREAD" | "DEFINED_THREAD" => {
                 let major = self.positive(node, "major_diameter", "the size of the thread")?;
@@ -248,6 +254,32 @@ impl<'m> Reader<'m> {
             self.missing(node, attribute, "the shape of the feature is not known without it");
         }
         found
+    }
+
+    /// A SHAPE_PROFILE: its wall, and on which side of it the material goes.
+    fn shape_profile(&mut self, node: Node<'m>, placement: &Frame) -> Option<Shape> {
+        if let Some(floor) = node.node("floor_condition").filter(|f| f.keyword() == "GENERAL_PROFILE_FLOOR") {
+            self.not_lowered(floor, "; only flat floors are");
+            return None;
+        }
+        let of = ["profile_boundary", "open_boundary", "closed_boundary"].into_iter().find_map(|a| node.node(a));
+        let Some(profile) = of else {
+            self.missing(node, "profile_boundary", "the shape of the feature is not known without it");
+            return None;
+        };
+        if profile.is_a("closed_profile") {
+            return Some(Shape::Outside { boundary: self.closed_contour(profile, placement)?, left: None });
+        }
+        let boundary = self.open_contour(profile, placement)?;
+        let away = node.node("removal_direction").and_then(|d| self.direction(d));
+        let left = match (boundary.points.first(), boundary.points.last(), away) {
+            (Some(a), Some(b), Some(d)) => {
+                let side = (b[0] - a[0]) * d[1] - (b[1] - a[1]) * d[0];
+                (side.abs() > 1e-9).then_some(side > 0.0)
+            }
+            _ => None,
+        };
+        Some(Shape::Outside { boundary, left })
     }
 
     fn slope(&mut self, node: Node<'m>) -> f64 {
@@ -411,12 +443,21 @@ impl<'m> Reader<'m> {
                 width: self.positive(node, "width", "a slot has a width")?,
                 bar_width: self.positive(node, "cross_bar_width", "a T-slot has one")?,
                 bar_depth: self.positive(node, "cross_bar_depth", "a T-slot has one")?,
+                dressed: ["first_offset", "second_offset", "radius"].iter().any(|a| node.length(a).is_some_and(|v| v > 0.0)),
             },
             "PARTIAL_CIRCULAR_PROFILE" => Section::Circular {
                 radius: self.positive(node, "radius", "a circle has one")?,
                 sweep: angle(self, "sweep_angle"),
             },
-            _ => Section::General,
+            "GENERAL_PROFILE" => {
+                let curve = self.need(node, "its_profile")?;
+                let frame = node.node("placement").and_then(|p| self.placement(p)).unwrap_or_default();
+                Section::General(self.contour(curve, &frame)?)
+            }
+            _ => {
+                self.not_lowered(node, " as the section of a slot");
+                return None;
+            }
         })
     }
 

@@ -165,7 +165,8 @@ impl<'m> Reader<'m> {
             diameter,
             tip_angle: tip.filter(|a| *a != 0.0).map(|a| self.angle(a)),
             cutting_length: dimension.and_then(|d| d.real("cutting_edge_length")).or_else(|| node.real("maximum_depth_of_cut")).filter(|l| *l > 0.0),
-            edge_radius: of.real("edge_radius").unwrap_or(0.0),
+            edge_radius: of.real("edge_radius").filter(|r| r.is_finite() && *r > 0.0).unwrap_or(0.0),
+            taper: dimension.and_then(|d| d.real("tool_circumference_angle")).filter(|_| body.keyword().starts_with("TAPERED")).map_or(0.0, |a| self.angle(a)),
             length: length.or_else(|| node.real("overall_assembly_length")).filter(|l| l.is_finite()),
             teeth: body.attr("number_of_teeth").or_else(|| body.attr("number_of_effective_teeth")).and_then(|v| v.integer()).and_then(|n| u32::try_from(n).ok()),
             right_handed: hand.as_deref().and_then(|h| match h {
@@ -290,6 +291,7 @@ impl<'m> Reader<'m> {
             tip_angle: None,
             cutting_length: None,
             edge_radius: 0.0,
+            taper: 0.0,
             length: None,
             teeth: None,
             right_handed: None,

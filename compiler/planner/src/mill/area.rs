@@ -1,0 +1,491 @@
+//! Areas emptied level by level: pockets, steps, milled holes, planes, and what is round about a boss or a profile.
+//! Walls that lean and floors with a radius have another outline on every level, so that no level reaches into the
+//! wall below it; islands begin at their own tops.
+
+use gr_toolpath as tp;
+use gr_toolpath::{P2, Path2, Region};
+
+use super::{Done, Job, Moves, RUN_OUT, path, words};
+use crate::emit::Emit;
+use crate::process::*;
+
+/// More levels for one wall than this are a mistake.
+const MOST_WALLS: usize = 5_000;
+
+/// What is to be emptied.
+struct Area {
+    /// At the top.
+    outline: Region,
+    islands: Vec<Island>,
+    /// Draft of the outer wall, rad.
+    slope: f64,
+    /// Radius between wall and floor that the tool does not make itself.
+    fillet: f64,
+    /// Down to where walls lean and fillets end.
+    depth: f64,
+    /// What a rounded edge gains on a wall that leans.
+    gain: f64,
+    /// Levels without islands begin inside the outline.
+    open: bool,
+}
+
+struct Island {
+    path: Path2,
+    top: f64,
+    slope: f64,
+    gain: f64,
+}
+
+impl Area {
+    /// How far the outer wall at a depth stands in from the outline at the top.
+    fn lean(&self, y: f64) -> f64 {
+        let over = y - (self.depth - self.fillet);
+        let round = if self.fillet > 0.0 && over > 0.0 { self.fillet - libm::sqrt((self.fillet * self.fillet - over * over).max(0.0)) } else { 0.0 };
+        if self.slope == 0.0 { round } else { y.min(self.depth) * libm::tan(self.slope) - self.gain + round }
+    }
+    fn steady(&self) -> bool {
+        self.slope == 0.0 && self.fillet == 0.0 && self.islands.iter().all(|i| i.slope == 0.0)
+    }
+    /// What is free at a depth.
+    fn at(&self, y: f64) -> Done<Vec<Region>> {
+        let by = self.lean(y);
+        let whole = if by > 1e-9 {
+            tp::erode(&self.outline, by).map_err(words)?
+        } else if by < -1e-9 {
+            tp::grow(std::slice::from_ref(self.outline.outer()), -by).map_err(words)?
+        } else {
+            vec![self.outline.clone()]
+        };
+        let mut solid = Vec::new();
+        for i in self.islands.iter().filter(|i| i.top < y - 1e-9) {
+            let by = (y - i.top) * libm::tan(i.slope) - i.gain;
+            if by > 1e-9 {
+                let grown = tp::grow(std::slice::from_ref(&i.path), by).map_err(words)?;
+                solid.extend(grown.iter().map(|r| r.outer().clone()));
+            } else {
+                solid.push(i.path.clone());
+            }
+        }
+        whole.into_iter().map(|r| Region::new(r.outer().clone(), solid.clone()).map_err(words)).collect()
+    }
+    /// Depths between which the outline stays the same: tops of islands.
+    fn breaks(&self, bottom: f64) -> Vec<f64> {
+        let mut out: Vec<f64> = self.islands.iter().map(|i| i.top).filter(|t| *t > 1e-6 && *t < bottom - 1e-6).collect();
+        out.push(bottom);
+        out.sort_by(f64::total_cmp);
+        out.dedup_by(|a, b| (*a - *b).abs() < 1e-6);
+        out
+    }
+    /// Depths for the wall alone between two levels: no stair further from the wall than the tolerance.
+    fn walls(&self, above: f64, y: f64, tolerance: f64) -> Done<Vec<f64>> {
+        let slope = self.islands.iter().map(|i| i.slope).fold(0.0, f64::max);
+        let most = |a: f64, b: f64| (self.lean(b) - self.lean(a)).abs().max((b - a) * libm::tan(slope));
+        let mut out = Vec::new();
+        let mut at = above;
+        while most(at, y) > tolerance && y - at > tolerance {
+            let (mut low, mut high) = (at, y);
+            for _ in 0..40 {
+                let mid = (low + high) / 2.0;
+                if most(at, mid) > tolerance { high = mid } else { low = mid }
+            }
+            at = low.max(at + tolerance);
+            if at < y - 1e-6 {
+                out.push(at);
+            }
+            if out.len() > MOST_WALLS {
+                return Err("its walls lean so much that they need too many levels".into());
+            }
+        }
+        Ok(out)
+    }
+}
+
+impl Job<'_> {
+    /// What a rounded edge gains against a flat one on a wall of this slope.
+    fn gain(&self, slope: f64) -> f64 {
+        self.edge * (1.0 + libm::tan(slope) - 1.0 / libm::cos(slope))
+    }
+    /// What is left of a radius at the foot of the wall for the centre of the tool's rounding to follow.
+    fn fillet(&self, radius: f64) -> f64 {
+        (radius - self.edge).max(0.0)
+    }
+    fn slope(&self, slope: f64) -> Done<f64> {
+        let taper = self.step.operation.tool.taper;
+        if !(0.0..1.5).contains(&slope) {
+            return Err(format!("walls that lean by {:.4} degrees", slope.to_degrees()));
+        }
+        if taper > slope + 1e-6 {
+            return Err(format!("the tool tapers by {:.4} degrees, the wall by {:.4}", taper.to_degrees(), slope.to_degrees()));
+        }
+        // A tool of the wall's own taper makes it in one.
+        Ok(if (taper - slope).abs() <= 1e-6 && taper > 0.0 { 0.0 } else { slope })
+    }
+    fn islands(&self, bosses: &[Boss]) -> Done<Vec<Island>> {
+        let inside = bosses.iter().filter(|b| b.top < self.depth - 1e-9);
+        inside
+            .map(|b| {
+                let slope = self.slope(b.slope)?;
+                let gain = if slope == 0.0 { 0.0 } else { self.gain(slope) };
+                Ok(Island { path: path(&b.boundary)?, top: b.top.max(0.0), slope, gain })
+            })
+            .collect()
+    }
+
+    fn outline(&self) -> Done<Area> {
+        let plain = |outline: Path2| -> Done<Area> {
+            let outline = Region::new(outline, Vec::new()).map_err(words)?;
+            Ok(Area { outline, islands: Vec::new(), slope: 0.0, fillet: 0.0, depth: self.depth, gain: 0.0, open: false })
+        };
+        let bottom = |b: &PocketBottom| match b {
+            PocketBottom::Other(what) => Err(format!("a pocket with a {what} bottom")),
+            _ => Ok(()),
+        };
+        let mut area = match &self.feature.shape {
+            Shape::Pocket { boundary, bosses, slope, bottom: floor, planar_radius, orthogonal_radius } => {
+                bottom(floor)?;
+                let mut a = plain(self.pocket_outline(boundary, *orthogonal_radius)?)?;
+                a.islands = self.islands(bosses)?;
+                a.slope = self.slope(*slope)?;
+                a.fillet = self.fillet(planar_radius.unwrap_or(0.0));
+                a
+            }
+            Shape::OpenPocket { boundary, wall, bosses, slope, bottom: floor, planar_radius, .. } => {
+                bottom(floor)?;
+                if wall.is_some() {
+                    return Err("an open pocket with a wall_boundary: which side of it is open is not settled; write the walls as open_boundary alone".into());
+                }
+                let lean = self.slope(*slope)?;
+                let mut a = plain(self.opened(boundary, self.depth * libm::tan(lean))?)?;
+                a.islands = self.islands(bosses)?;
+                (a.slope, a.open) = (lean, true);
+                a.fillet = self.fillet(planar_radius.unwrap_or(0.0));
+                a
+            }
+            Shape::Step { start, length, direction, wall, radius, bosses } => {
+                let lean = self.slope(*wall)?;
+                let mut a = plain(self.step_outline(*start, *length, *direction, self.depth * libm::tan(lean))?)?;
+                a.islands = self.islands(bosses)?;
+                (a.slope, a.open) = (lean, true);
+                a.fillet = self.fillet(*radius);
+                a
+            }
+            Shape::Hole { diameter, final_diameter, bottom } => {
+                let mut a = plain(Path2::circle(P2::default(), diameter / 2.0).map_err(words)?)?;
+                a.slope = self.slope(final_diameter.map_or(0.0, |f| libm::atan((diameter - f) / 2.0 / self.depth)))?;
+                a.fillet = match bottom {
+                    HoleBottom::Radiused(r) | HoleBottom::Spherical(r) => self.fillet(r.min(diameter / 2.0)),
+                    HoleBottom::Conical(..) => return Err("a milled hole with a conical bottom".into()),
+                    _ => 0.0,
+                };
+                a
+            }
+            _ => return Err(String::new()),
+        };
+        if area.slope > 0.0 {
+            area.gain = self.gain(area.slope);
+        }
+        if area.fillet > area.depth {
+            return Err(format!("a radius of {} mm at its floor, deeper than the feature", area.fillet));
+        }
+        Ok(area)
+    }
+
+    fn pocket_outline(&self, boundary: &Closed, corner: Option<f64>) -> Done<Path2> {
+        match (corner, boundary) {
+            (Some(r), Closed::Rectangle { frame, length, width }) if r > 0.0 && r <= length.min(*width) / 2.0 => {
+                let turn = libm::atan2(frame.x[1], frame.x[0]);
+                let outline = tp::profile::rectangle(*length, *width, r).map_err(words)?;
+                Ok(outline.rotated(turn).moved(P2::new(frame.origin[0], frame.origin[1])))
+            }
+            _ => path(&boundary.contour().ok_or("its profile has no size")?),
+        }
+    }
+
+    /// An open boundary closed over its mouth, out in the air far enough for the tool's centre to pass the mouth.
+    fn opened(&self, boundary: &Contour, lean: f64) -> Done<Path2> {
+        let line = path(boundary)?;
+        if line.is_closed() {
+            return Err("its open boundary is closed".into());
+        }
+        let (a, b) = (line.start(), line.end());
+        let mouth = b - a;
+        if mouth.norm() < 1e-6 {
+            return Err("its open boundary is closed".into());
+        }
+        // The pocket is on one side of the chord, the air on the other.
+        let area: f64 = tp::Path2::from_segs(line.segs().iter().copied().chain([tp::Seg::Line { a: b, b: a }]), true).map_err(words)?.area();
+        let out = if area > 0.0 { mouth.left() * (1.0 / mouth.norm()) } else { mouth.left() * (-1.0 / mouth.norm()) };
+        let far = self.radius + RUN_OUT + lean;
+        // Walls that go apart are prolonged, so that nothing is left beside the mouth.
+        let prolonged = |t: P2, sideways: P2| {
+            let (along, aside) = (t.dot(out), t.dot(sideways));
+            if along > 0.2 && aside > 0.0 { out + sideways * (aside / along) } else { out }
+        };
+        let u = mouth.unit();
+        let (p, q) = (a + prolonged(-line.start_tangent(), -u) * far, b + prolonged(line.end_tangent(), u) * far);
+        let rest = [tp::Seg::Line { a: b, b: q }, tp::Seg::Line { a: q, b: p }, tp::Seg::Line { a: p, b: a }];
+        tp::Path2::from_segs(line.segs().iter().copied().chain(rest), true).map_err(words)
+    }
+
+    /// From the edge to the nearer side of the raw part: how wide a step is does not stand in the feature.
+    fn step_outline(&self, start: [f64; 2], length: f64, direction: [f64; 2], lean: f64) -> Done<Path2> {
+        let [low, high] = self.step.stock.ok_or("its width follows from a raw block, and the workpiece has none")?;
+        let (u, v) = (P2::new(direction[0], direction[1]), P2::new(-direction[1], direction[0]));
+        let a = P2::new(start[0], start[1]);
+        let (mut left, mut right) = (0.0f64, 0.0f64);
+        for corner in 0..8 {
+            let p = std::array::from_fn(|i| if corner >> i & 1 == 1 { high[i] } else { low[i] });
+            let q = self.feature.frame.inverse_point(p);
+            let s = (P2::new(q[0], q[1]) - a).dot(v);
+            (left, right) = (left.max(s), right.max(-s));
+        }
+        // The tool's centre goes as far as the side of the raw part.
+        let out = self.radius + RUN_OUT + lean;
+        let (side, width) = match (left > 1e-6, right > 1e-6) {
+            (true, true) if left <= right => (v, left),
+            (true, false) => (v, left),
+            (_, true) => (v * -1.0, right),
+            (false, false) => return Err("its edge does not lie on the raw part".into()),
+        };
+        let (p, q) = (a - u * out, a + u * (length + out));
+        let far = side * (width + out);
+        Path2::polyline(&[p, q, q + far, p + far], true).map_err(words)
+    }
+
+    pub(super) fn area(&self, e: &mut Emit<'_>) -> Done<Moves> {
+        let area = self.outline()?;
+        let moves = self.emptied(e, &area)?;
+        if let Shape::Pocket { .. } | Shape::Hole { .. } = self.feature.shape {
+            if let Some(region) = area.at(self.depth.min(self.bottom))?.first() {
+                self.rest(e, region, |_| true);
+            }
+        } else if let Shape::OpenPocket { boundary, .. } = &self.feature.shape {
+            let wall = path(boundary)?;
+            let (a, b) = (wall.start(), wall.end());
+            self.rest(e, &area.outline, |p| wall.dist(p) < self.radius && p.dist(a) > 1e-6 && p.dist(b) > 1e-6);
+        }
+        let asked = match &self.feature.shape {
+            Shape::Pocket { planar_radius, .. } | Shape::OpenPocket { planar_radius, .. } => planar_radius.unwrap_or(0.0),
+            Shape::Step { radius, .. } => *radius,
+            Shape::Hole { bottom: HoleBottom::Radiused(r) | HoleBottom::Spherical(r), .. } => *r,
+            _ => 0.0,
+        };
+        let through = self.bottom > self.depth;
+        if self.edge > asked + 1e-6 && !through {
+            self.leaves(e, &format!("a radius of {} mm all along the foot of its walls", self.edge));
+        }
+        if !area.steady() && !self.m.finish {
+            self.leaves(e, &format!("stairs of up to {:.4} mm on its walls; a finishing workingstep takes them", self.stairs(&area)));
+        }
+        Ok(moves)
+    }
+
+    /// How far the stairs of roughing stand out from the walls.
+    fn stairs(&self, area: &Area) -> f64 {
+        let levels = (self.bottom / self.axial - 1e-9).ceil().max(1.0);
+        let slope = area.islands.iter().map(|i| i.slope).fold(area.slope, f64::max);
+        let each = self.bottom / levels;
+        (each * libm::tan(slope)).max(area.lean(self.bottom) - area.lean(self.bottom - each))
+    }
+
+    /// All levels, walls that lean between them when finishing.
+    fn emptied(&self, e: &mut Emit<'_>, area: &Area) -> Done<Moves> {
+        let entry = self.entry(false)?;
+        let inset = self.radius + self.m.allowance_side;
+        let mut moves = Vec::new();
+        let mut above = 0.0;
+        for bottom in area.breaks(self.bottom) {
+            if area.steady() {
+                for part in area.at(bottom)? {
+                    let passes = self.passes(&part)?;
+                    moves.extend(tp::motion(&passes, &self.heights(above, bottom), &entry, Some(&part), inset).map_err(words)?);
+                }
+                above = bottom;
+                continue;
+            }
+            let count = ((bottom - above) / self.axial - 1e-9).ceil().max(1.0);
+            let (from, each) = (above, (bottom - above) / count);
+            for k in 1..=count as usize {
+                let y = if k as f64 == count { bottom } else { from + each * k as f64 };
+                self.one_level(area, above, y, &entry, &mut moves)?;
+                above = y;
+            }
+        }
+        if moves.is_empty() {
+            let fits = area.at(self.bottom)?.iter().filter_map(|r| tp::largest_tool(r).ok()).fold(0.0, f64::max);
+            return Err(words(tp::Error::ToolTooLarge { fits }));
+        }
+        let _ = e;
+        Ok(moves)
+    }
+
+    fn one_level(&self, area: &Area, above: f64, y: f64, entry: &tp::Entry, moves: &mut Moves) -> Done<()> {
+        let inset = self.radius + self.m.allowance_side;
+        for part in area.at(y)? {
+            // Further down a leaning wall may leave no room: what the tool does not reach is said elsewhere.
+            match self.passes(&part) {
+                Ok(passes) => moves.extend(tp::motion(&passes, &self.level(above, y), entry, Some(&part), inset).map_err(words)?),
+                Err(why) if moves.is_empty() => return Err(why),
+                Err(_) => {}
+            }
+        }
+        if !self.m.finish {
+            return Ok(());
+        }
+        let mut high = above;
+        for wall in area.walls(above, y, self.tolerance)? {
+            for part in area.at(wall)? {
+                let mut what = tp::Contour::new(self.radius);
+                what.allowance = self.m.allowance_side;
+                what.cut_mode = self.cut_mode().unwrap_or(tp::CutMode::Climb);
+                if let Ok(passes) = tp::contour_closed(&part, &what) {
+                    let entry = tp::Entry { approach: tp::Approach::Ramp { angle: super::USUAL_RAMP }, ..tp::Entry::default() };
+                    moves.extend(tp::motion(&passes, &self.level(high, wall), &entry, Some(&part), inset).map_err(words)?);
+                }
+            }
+            high = wall;
+        }
+        Ok(())
+    }
+
+    fn passes(&self, region: &Region) -> Done<Vec<tp::Pass>> {
+        if !self.m.bottom {
+            return tp::contour_closed(region, &self.wall()).map_err(words);
+        }
+        Ok(tp::clear(region, &self.clearing()?).map_err(words)?.passes)
+    }
+
+    /// One pass along a wall.
+    fn wall(&self) -> tp::Contour {
+        let mut what = tp::Contour::new(self.radius);
+        what.allowance = self.m.allowance_side;
+        what.cut_mode = self.cut_mode().unwrap_or(tp::CutMode::Climb);
+        what.start = self.start();
+        let lead = (self.radius / 2.0).max(0.1);
+        (what.lead_in, what.lead_out) = (tp::Lead::Arc(lead), tp::Lead::Arc(lead));
+        what
+    }
+
+    pub(super) fn face(&self, e: &mut Emit<'_>) -> Done<Moves> {
+        let Shape::Face { length, direction, width, across, boundary, bosses } = &self.feature.shape else {
+            return Err(String::new());
+        };
+        let outline = match boundary {
+            Some(b) => path(b)?,
+            None => {
+                let at = |u: f64, v: f64| P2::new(direction[0] * u + across[0] * v, direction[1] * u + across[1] * v);
+                let corners = [at(0.0, 0.0), at(*length, 0.0), at(*length, *width), at(0.0, *width)];
+                Path2::polyline(&corners, true).map_err(words)?.oriented(true)
+            }
+        };
+        let overrun = self.step.operation.overcut.filter(|v| *v >= 0.0).unwrap_or(RUN_OUT);
+        let lines = self.m.strategy.as_ref().is_none_or(|s| matches!(s.keyword.as_str(), "UNIDIRECTIONAL" | "BIDIRECTIONAL"));
+        if !lines || bosses.iter().any(|b| b.top > 1e-9 || b.slope != 0.0) {
+            return self.face_as_area(e, &outline, bosses, overrun);
+        }
+        let solid: Done<Vec<Path2>> = bosses.iter().map(|b| path(&b.boundary)).collect();
+        let mut what = tp::Face::new(self.radius, self.by);
+        let feed = self.m.strategy.as_ref().and_then(|s| s.feed).unwrap_or(*direction);
+        what.angle = libm::atan2(feed[1], feed[0]);
+        what.overrun = overrun;
+        if let Some(s) = &self.m.strategy {
+            what.bidirectional = s.keyword != "UNIDIRECTIONAL";
+            what.step_left = s.step_left.unwrap_or(true);
+        }
+        let passes = tp::face(&outline, &solid?, &what).map_err(words)?;
+        tp::motion(&passes, &self.heights(0.0, self.bottom), &self.entry(true)?, None, self.radius).map_err(words)
+    }
+
+    /// A plane by a strategy that follows its edge: the tool's centre goes over all of it, and past it by the overrun.
+    fn face_as_area(&self, e: &mut Emit<'_>, outline: &Path2, bosses: &[Boss], overrun: f64) -> Done<Moves> {
+        let grown = tp::grow(std::slice::from_ref(outline), self.radius + overrun).map_err(words)?;
+        let outer = grown.first().ok_or("its boundary encloses nothing")?.outer().clone();
+        let outline = Region::new(outer, Vec::new()).map_err(words)?;
+        let islands = self.islands(bosses)?;
+        let area = Area { outline, islands, slope: 0.0, fillet: 0.0, depth: self.depth, gain: 0.0, open: true };
+        self.emptied(e, &area)
+    }
+
+    /// Round about a boss or a profile.
+    pub(super) fn around(&self, e: &mut Emit<'_>) -> Done<Moves> {
+        let (boundary, slope, left) = match &self.feature.shape {
+            Shape::Boss(b) => (&b.boundary, self.slope(b.slope)?, None),
+            Shape::Outside { boundary, left } => (boundary, 0.0, *left),
+            _ => return Err(String::new()),
+        };
+        let line = path(boundary)?;
+        if !line.is_closed() {
+            return self.beside(e, &line, left);
+        }
+        if self.m.bottom {
+            // Everything as far as the sides of the raw part: the tool's centre goes as far as they do.
+            let (a, b) = self.stock()?;
+            let out = P2::new(self.radius, self.radius) * (1.0 + 1e-3);
+            let (a, b) = (a - out, b + out);
+            let outline = Path2::polyline(&[a, P2::new(b.x, a.y), b, P2::new(a.x, b.y)], true).map_err(words)?;
+            let gain = if slope == 0.0 { 0.0 } else { self.gain(slope) };
+            let islands = vec![Island { path: line.clone(), top: 0.0, slope, gain }];
+            let outline = Region::new(outline, Vec::new()).map_err(words)?;
+            let area = Area { outline, islands, slope: 0.0, fillet: 0.0, depth: self.depth, gain: 0.0, open: true };
+            let moves = self.emptied(e, &area)?;
+            if let Some(region) = area.at(self.bottom)?.first() {
+                self.rest(e, region, |p| line.dist(p) < 2.0 * self.radius);
+            }
+            if slope > 0.0 && !self.m.finish {
+                self.leaves(e, &format!("stairs of up to {:.4} mm on its walls; a finishing workingstep takes them", self.stairs(&area)));
+            }
+            return Ok(moves);
+        }
+        let mut what = self.wall();
+        (what.lead_in, what.lead_out) = (tp::Lead::Arc(self.radius), tp::Lead::Arc(self.radius));
+        what.stock = self.in_front(&line);
+        what.stepover = self.by;
+        let mut moves = Vec::new();
+        let mut above = 0.0;
+        let step = if slope > 0.0 && self.m.finish { (self.tolerance / libm::tan(slope)).min(self.axial) } else { self.axial };
+        let count = if slope > 0.0 { (self.bottom / step - 1e-9).ceil().max(1.0) } else { 1.0 };
+        if count > MOST_WALLS as f64 {
+            return Err("its walls lean so much that they need too many levels".into());
+        }
+        for k in 1..=count as usize {
+            let y = if k as f64 == count { self.bottom } else { self.bottom * k as f64 / count };
+            let by = y * libm::tan(slope) - if slope > 0.0 { self.gain(slope) } else { 0.0 };
+            let paths = if by > 1e-9 {
+                tp::grow(std::slice::from_ref(&line), by).map_err(words)?.iter().map(|r| r.outer().clone()).collect()
+            } else {
+                vec![line.clone()]
+            };
+            for p in paths {
+                let side = if p.is_ccw() { tp::Side::Right } else { tp::Side::Left };
+                let passes = tp::contour(&p, side, &what).map_err(words)?;
+                let h = if slope > 0.0 { self.level(above, y) } else { self.heights(0.0, self.bottom) };
+                moves.extend(tp::motion(&passes, &h, &self.entry(false)?, None, self.radius).map_err(words)?);
+            }
+            above = y;
+        }
+        Ok(moves)
+    }
+
+    /// Material in front of a wall for several passes, if the strategy allows them and the raw part is known.
+    fn in_front(&self, line: &Path2) -> f64 {
+        let several = self.m.strategy.as_ref().is_some_and(|s| s.multiple == Some(true));
+        let Ok((a, b)) = self.stock() else { return 0.0 };
+        let corners = [a, b, P2::new(a.x, b.y), P2::new(b.x, a.y)];
+        let far = corners.iter().map(|c| line.dist(*c)).fold(0.0, f64::max);
+        if several { far } else { 0.0 }
+    }
+
+    fn beside(&self, e: &mut Emit<'_>, line: &Path2, left: Option<bool>) -> Done<Moves> {
+        if left.is_none() {
+            let rule = "an open profile does not say on which side the material goes: the tool is on its right, seen along it";
+            e.say(gr_text::code::PLAN_TAKES_TURNS, self.feature.origin, &[&self.name(), rule]);
+        }
+        let mut what = self.wall();
+        (what.lead_in, what.lead_out) = (tp::Lead::Line(self.radius + RUN_OUT), tp::Lead::Line(self.radius + RUN_OUT));
+        what.stock = self.in_front(line);
+        what.stepover = self.by;
+        let side = if left == Some(true) { tp::Side::Left } else { tp::Side::Right };
+        let passes = tp::contour(line, side, &what).map_err(words)?;
+        tp::motion(&passes, &self.heights(0.0, self.bottom), &self.entry(true)?, None, self.radius).map_err(words)
+    }
+}

@@ -1,0 +1,335 @@
+//! 2½D milling: planes, pockets, slots, steps, profiles, bosses and milled holes, by way of the plane geometry of
+//! `gr_toolpath`. What all of them share is here; [`area`] empties what has an outline, [`slot`] follows a section,
+//! [`section`] is the plane geometry of that section.
+
+mod area;
+mod section;
+mod slot;
+
+use gr_text::code;
+use gr_toolpath as tp;
+use gr_toolpath::{P2, Path2, Vertex};
+
+use crate::emit::Emit;
+use crate::frame::Frame;
+use crate::process::*;
+
+/// Run-out over open ends and edges beyond the tool's own radius, mm.
+const RUN_OUT: f64 = 1.0;
+/// Milled through-holes and pockets go this much below, mm.
+const BREAK_THROUGH: f64 = 0.5;
+/// More levels than this are a mistake.
+const MOST_LEVELS: f64 = 20_000.0;
+/// Slope down the first pass where the file does not say how to enter, rad.
+const USUAL_RAMP: f64 = 3.0 * std::f64::consts::PI / 180.0;
+
+type Done<T> = Result<T, String>;
+/// Levels with the moves of each.
+type Moves = Vec<tp::Move>;
+
+/// What a workingstep is planned with.
+pub(crate) struct Given {
+    /// Height for rapids.
+    pub security: f64,
+    /// Greatest distance of a stair or a scallop from the true surface, mm.
+    pub tolerance: f64,
+    /// It is the one that says what no tool of the plan reaches in its feature.
+    pub tells: bool,
+}
+
+struct Job<'a> {
+    step: &'a Workingstep,
+    m: &'a Milling,
+    feature: &'a Feature,
+    radius: f64,
+    /// Edge radius of the tool, at most its radius.
+    edge: f64,
+    /// Distance between passes.
+    by: f64,
+    axial: f64,
+    depth: f64,
+    bottom: f64,
+    retract: f64,
+    tolerance: f64,
+    tells: bool,
+}
+
+pub(crate) fn mill(e: &mut Emit<'_>, step: &Workingstep, m: &Milling, feature: &Feature, given: &Given) {
+    let Some(job) = job(e, step, m, feature, given) else { return };
+    let planned = match &feature.shape {
+        Shape::Face { .. } => job.face(e),
+        Shape::Pocket { .. } | Shape::OpenPocket { .. } | Shape::Hole { .. } | Shape::Step { .. } => job.area(e),
+        Shape::Outside { .. } | Shape::Boss(_) => job.around(e),
+        Shape::Slot { path, section, ends } => job.slot(e, path, section, ends),
+        Shape::Toolpath => Err("a tool path feature needs an explicit tool path".into()),
+        _ => Err(String::new()),
+    };
+    let moves = match planned {
+        Ok(moves) => moves,
+        Err(why) if why.is_empty() => {
+            let what = format!("{} with {}", feature.keyword, step.operation.keyword);
+            return e.say(code::PLAN_NOT_LOWERED, feature.origin, &[&what, ""]);
+        }
+        Err(why) => {
+            let what = format!("#{} {}", feature.origin.id, feature.keyword);
+            return e.say(code::PLAN_CANNOT_CUT, step.origin, &[&what, &why]);
+        }
+    };
+    job.check_approach(e, &moves);
+    for frame in &feature.copies {
+        write(e, step, frame, &moves, given.security);
+    }
+}
+
+fn job<'a>(e: &mut Emit<'_>, step: &'a Workingstep, m: &'a Milling, feature: &'a Feature, given: &Given) -> Option<Job<'a>> {
+    let o = &step.operation;
+    let radius = o.tool.diameter / 2.0;
+    let edge = o.tool.edge_radius.clamp(0.0, radius);
+    let through = matches!(
+        feature.shape,
+        Shape::Hole { bottom: HoleBottom::Through, .. }
+            | Shape::Pocket { bottom: PocketBottom::Through, .. }
+            | Shape::OpenPocket { bottom: PocketBottom::Through, .. }
+    );
+    let depth = feature.depth;
+    if !(depth > 0.0) {
+        e.say(code::PLAN_BAD_SIZE, feature.origin, &[&feature.keyword, "depth", &depth.to_string(), "above zero"]);
+        return None;
+    }
+    let bad = |e: &mut Emit<'_>, what: &str, v: f64, must: &str| {
+        e.say(code::PLAN_BAD_SIZE, o.origin, &[&o.keyword, what, &v.to_string(), must]);
+    };
+    if m.allowance_side < 0.0 || m.allowance_bottom < 0.0 || m.allowance_bottom >= depth {
+        let side = m.allowance_side < 0.0;
+        let (what, v) = if side { ("allowance_side", m.allowance_side) } else { ("allowance_bottom", m.allowance_bottom) };
+        bad(e, what, v, if side { "zero or more" } else { "between zero and the depth" });
+        return None;
+    }
+    // Past the bottom by the overcut, and with a rounded edge by that too, so that the opening is as wide below.
+    let bottom = if through { depth + o.overcut.filter(|v| *v > 0.0).unwrap_or(BREAK_THROUGH) + edge } else { depth - m.allowance_bottom };
+    let axial = match m.axial {
+        Some(a) if a > 0.0 => a,
+        None => depth,
+        Some(a) => {
+            bad(e, "axial_cutting_depth", a, "above zero");
+            return None;
+        }
+    };
+    if bottom / axial > MOST_LEVELS {
+        e.say(code::PLAN_TOO_MUCH, o.origin, &[&o.keyword, &MOST_LEVELS.to_string(), "levels"]);
+        return None;
+    }
+    if let Some(l) = o.tool.cutting_length.filter(|l| bottom > *l + 1e-6) {
+        let name = format!("T{} '{}'", o.tool.number, o.tool.name);
+        e.say(code::PLAN_DEEPER_THAN_EDGE, o.origin, &[&o.keyword, &bottom.to_string(), &name, &l.to_string()]);
+    }
+    let by = stepover(e, step, m)?;
+    let top = feature.frame.origin[2];
+    let usual = if feature.frame.upright() { (given.security - top).max(1.0) } else { 5.0 };
+    let retract = o.retract.filter(|r| *r > 0.0).unwrap_or(usual);
+    o.technology.feed?;
+    // What a rounded edge leaves standing between two passes stays within the tolerance.
+    let scallop = 2.0 * (radius - edge) + 2.0 * libm::sqrt(given.tolerance * (2.0 * edge - given.tolerance).max(0.0));
+    let by = if edge > 0.0 && m.bottom { by.min(scallop.max(radius * 1e-2)) } else { by };
+    Some(Job { step, m, feature, radius, edge, by, axial, depth, bottom, retract, tolerance: given.tolerance, tells: given.tells })
+}
+
+/// From the radial depth and the overlap: the smaller of the two.
+fn stepover(e: &mut Emit<'_>, step: &Workingstep, m: &Milling) -> Option<f64> {
+    let d = step.operation.tool.diameter;
+    let mut by = m.radial.filter(|r| *r > 0.0).unwrap_or(d).min(d * 0.9);
+    if let Some((s, o)) = m.strategy.as_ref().and_then(|s| Some((s, s.overlap?))) {
+        // More than one is no ratio: millimetres, as STEP Modeler writes, or percent, as the standard's example.
+        let millimetres = (o - 0.2 * d).abs() < 1e-6;
+        let ratio = if o > 0.0 && o < 1.0 && !millimetres {
+            o
+        } else if o == 0.0 {
+            0.0
+        } else if millimetres {
+            e.say(code::PLAN_OVERLAP_NOT_A_RATIO, s.origin, &[&o.to_string(), &format!("{o} mm, 0.2 of the tool's diameter")]);
+            0.2
+        } else {
+            e.say(code::PLAN_OVERLAP_NOT_A_RATIO, s.origin, &[&o.to_string(), &format!("{o} percent")]);
+            o / 100.0
+        };
+        if !(0.0..1.0).contains(&ratio) {
+            e.say(code::PLAN_BAD_SIZE, s.origin, &[&s.keyword, "overlap", &o.to_string(), "a ratio of 0 to 1"]);
+            return None;
+        }
+        by = by.min(d * (1.0 - ratio));
+    }
+    if by < d * 1e-3 {
+        e.say(code::PLAN_BAD_SIZE, step.operation.origin, &[&step.operation.keyword, "radial_cutting_depth", &by.to_string(), "more than a thousandth of the tool"]);
+        return None;
+    }
+    Some(by)
+}
+
+fn words(error: tp::Error) -> String {
+    error.to_string()
+}
+
+/// A contour as a path.
+fn path(c: &Contour) -> Done<Path2> {
+    let v: Vec<Vertex> = c.points.iter().map(|p| Vertex::arc(p[0], p[1], p[2])).collect();
+    Path2::from_vertices(&v, c.closed).map_err(words)
+}
+
+impl Job<'_> {
+    fn strategy(&self) -> Done<tp::Strategy> {
+        let Some(s) = &self.m.strategy else { return Ok(tp::Strategy::ContourParallel) };
+        let angle = s.feed.map_or(0.0, |f| libm::atan2(f[1], f[0]));
+        Ok(match s.keyword.as_str() {
+            "UNIDIRECTIONAL" => tp::Strategy::Unidirectional(angle),
+            "BIDIRECTIONAL" => tp::Strategy::Bidirectional(angle),
+            "BIDIRECTIONAL_CONTOUR" => tp::Strategy::BidirectionalContour(angle),
+            "CONTOUR_BIDIRECTIONAL" => tp::Strategy::ContourBidirectional(angle),
+            "CONTOUR_PARALLEL" => tp::Strategy::ContourParallel,
+            "CONTOUR_SPIRAL" => tp::Strategy::ContourSpiral,
+            "CENTER_MILLING" => tp::Strategy::CentreMilling,
+            "EXPLICIT_STRATEGY" => return Err("an explicit strategy needs an explicit tool path".into()),
+            other => return Err(format!("strategy {other}")),
+        })
+    }
+    fn cut_mode(&self) -> Option<tp::CutMode> {
+        let climb = self.m.strategy.as_ref()?.climb?;
+        // A spindle that turns the other way changes the sides.
+        let climb = climb == self.step.operation.technology.clockwise;
+        Some(if climb { tp::CutMode::Climb } else { tp::CutMode::Conventional })
+    }
+    fn start(&self) -> Option<P2> {
+        // A start point at the origin is what programs write that have none.
+        self.step.operation.start.filter(|p| *p != [0.0; 3]).map(|p| P2::new(p[0], p[1]))
+    }
+    fn clearing(&self) -> Done<tp::Clear> {
+        let mut c = tp::Clear::new(self.radius, self.by, self.strategy()?);
+        c.allowance = self.m.allowance_side;
+        c.cut_mode = self.cut_mode();
+        if let Some(s) = &self.m.strategy {
+            c.rotation = s.ccw.map(|ccw| if ccw { tp::Rotation::Ccw } else { tp::Rotation::Cw });
+            c.step_left = s.step_left.unwrap_or(true);
+        }
+        c.start = self.start();
+        Ok(c)
+    }
+    fn heights(&self, top: f64, bottom: f64) -> tp::Depth {
+        let safe = RUN_OUT.min(self.retract);
+        tp::Depth { top: -top, bottom: -bottom, step: self.axial, clearance: self.retract, safe: safe - top, finish: 0.0 }
+    }
+    /// One level between two heights, however thick.
+    fn level(&self, top: f64, bottom: f64) -> tp::Depth {
+        tp::Depth { step: (bottom - top).max(1e-6), ..self.heights(top, bottom) }
+    }
+    fn entry(&self, open: bool) -> Done<tp::Entry> {
+        let to = |a: &Approach, way_in: bool| -> Done<tp::Approach> {
+            Ok(match a {
+                // Into a closed area a cutter that may not cut at its centre goes down slowly on a slope.
+                Approach::None if way_in && !open => tp::Approach::Ramp { angle: USUAL_RAMP },
+                Approach::None | Approach::Axis => tp::Approach::Plunge,
+                Approach::Ramp(angle) => tp::Approach::Ramp { angle: *angle },
+                Approach::Helix(radius, angle) => tp::Approach::Helix { radius: *radius, angle: *angle },
+                Approach::Zigzag(angle, width) => tp::Approach::ZigZag { angle: *angle, width: *width },
+                Approach::Angle(angle, length) => tp::Approach::AirAngle { angle: *angle, length: *length },
+                Approach::Tangent(radius) => tp::Approach::AirTangent { radius: *radius },
+                Approach::Along(paths) => tp::Approach::AlongPath(along(paths)?),
+            })
+        };
+        let retract = match &self.m.retract {
+            Approach::Ramp(_) | Approach::Helix(..) | Approach::Zigzag(..) => tp::Approach::Plunge,
+            other => to(other, false)?,
+        };
+        Ok(tp::Entry { approach: to(&self.m.approach, true)?, retract, by_level: true })
+    }
+    /// A helix or an arc that found no room was replaced by a slope or a plunge: that is said.
+    fn check_approach(&self, e: &mut Emit<'_>, moves: &Moves) {
+        let (what, with) = match &self.m.approach {
+            Approach::Helix(..) => ("the helix of the approach", "a slope along the first pass"),
+            Approach::Tangent(_) => ("the arc of the approach", "a plunge along the tool axis"),
+            _ => return,
+        };
+        let mut found = 0;
+        let mut starts = 0;
+        let mut before = None;
+        let mut arc = false;
+        for m in moves {
+            let tag = Some(m.tag);
+            if m.tag == tp::Tag::Approach {
+                arc |= matches!(m.kind, tp::Kind::Arc { .. });
+            } else if before == Some(tp::Tag::Approach) {
+                starts += 1;
+                found += usize::from(arc);
+                arc = false;
+            }
+            before = tag;
+        }
+        if found < starts {
+            let places = format!("at {} of {starts} places it has no room", starts - found);
+            e.say(code::PLAN_APPROACH_CHANGED, self.step.operation.origin, &[what, with, &places]);
+        }
+    }
+    fn name(&self) -> String {
+        format!("#{} {}", self.feature.origin.id, self.feature.keyword)
+    }
+    /// What no tool of the plan reaches.
+    fn leaves(&self, e: &mut Emit<'_>, text: &str) {
+        if self.tells {
+            let tool = format!("T{}", self.step.operation.tool.number);
+            e.say(code::PLAN_UNREACHABLE_CORNER, self.step.operation.origin, &[&tool, &format!("{:.4}", self.radius), &self.name(), text]);
+        }
+    }
+    /// Spots of an outline the tool does not reach; `of` says which belong to the feature.
+    fn rest(&self, e: &mut Emit<'_>, region: &tp::Region, of: impl Fn(P2) -> bool) {
+        if !self.tells || self.m.allowance_side > 0.0 {
+            return;
+        }
+        // A tool of exactly the size of a corner or a hole reaches all of it.
+        let Ok(mut all) = tp::residuals(region, self.radius - 1e-6) else { return };
+        all.retain(|r| of(r.at));
+        let total: f64 = all.iter().map(|r| r.area).sum();
+        let Some(worst) = all.first() else { return };
+        let at = self.feature.frame.point([worst.at.x, worst.at.y, 0.0]);
+        let text = format!("{} spots, {total:.4} mm² in all, the largest at X{:.4} Y{:.4} with {:.4} mm²", all.len(), at[0], at[1], worst.area);
+        self.leaves(e, &text);
+    }
+    /// The raw part in the frame of the feature: lower left and upper right corner.
+    fn stock(&self) -> Done<(P2, P2)> {
+        let [low, high] = self.step.stock.ok_or("how far it reaches follows from a raw block, and the workpiece has none")?;
+        let (mut a, mut b) = (P2::new(f64::INFINITY, f64::INFINITY), P2::new(f64::NEG_INFINITY, f64::NEG_INFINITY));
+        for corner in 0..8 {
+            let p = std::array::from_fn(|i| if corner >> i & 1 == 1 { high[i] } else { low[i] });
+            let q = self.feature.frame.inverse_point(p);
+            (a, b) = (P2::new(a.x.min(q[0]), a.y.min(q[1])), P2::new(b.x.max(q[0]), b.y.max(q[1])));
+        }
+        Ok((a, b))
+    }
+}
+
+fn along(paths: &[Toolpath]) -> Done<Vec<tp::P3>> {
+    let mut out = Vec::new();
+    for p in paths {
+        let PathKind::Location { curve, .. } = &p.path else { return Err("an approach path of this kind".into()) };
+        for q in std::iter::once(curve.start).chain(curve.pieces.iter().map(Piece::end)) {
+            out.push(tp::P3::new(q[0], q[1], q[2]));
+        }
+    }
+    Ok(out)
+}
+
+/// Moves of the feature's plane as motion of one copy.
+fn write(e: &mut Emit<'_>, step: &Workingstep, frame: &Frame, moves: &[tp::Move], security: f64) {
+    let Some(first) = moves.first() else { return };
+    let p3 = |p: tp::P3| frame.point([p.x, p.y, p.z]);
+    e.travel(p3(first.to), frame.z, security);
+    e.technology(&step.operation.technology, step.operation.functions);
+    for m in moves {
+        let to = p3(m.to);
+        match m.kind {
+            tp::Kind::Rapid => e.rapid(to),
+            tp::Kind::Line => e.line(to),
+            tp::Kind::Arc { centre, sweep } => {
+                let z = e.at.map_or(m.to.z, |at| frame.inverse_point(at)[2]);
+                e.arc(frame.point([centre.x, centre.y, z]), frame.z, to, sweep);
+            }
+        }
+    }
+}
