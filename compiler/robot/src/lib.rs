@@ -3,7 +3,32 @@
 //!
 //! The result is a [`RobotProgram`]: moves with pose *and* joint values. Vendor languages, joint-space G-code and
 //! set-points are written from it; they decide nothing about motion.
+//!
+//! | module | job |
+//! |---|---|
+//! | `program` | what the result is |
+//! | `options` | what can be chosen; the summary |
+//! | `plan` | the passes in order, findings |
+//! | `gather` | motion IR → moves in work frames, actions of the cell |
+//! | `cell` | M words → signals, or a request to the operator |
+//! | `path` | the real path of a move |
+//! | `solver` | joint values and limits |
+//! | `choose` | one configuration per chain of cuts, chosen over all of them |
+//! | `emit` | targets, speed checks, figures |
 
+// Joints are walked by index; a value that is not a number must fail the test.
+#![allow(clippy::neg_cmp_op_on_partial_ord, clippy::needless_range_loop)]
+
+mod cell;
+mod choose;
+mod emit;
+mod gather;
+mod options;
+mod path;
+mod plan;
 mod program;
+mod solver;
 
+pub use options::{Options, Placement, Planned, Singularity, Summary};
+pub use plan::plan;
 pub use program::{Action, MAX_JOINTS, RobotProgram, Step, Target, Tool, WorkFrame, Zone};

@@ -1,0 +1,193 @@
+//! What the words M3 M5 S M8 M62 … become: outputs, routines and waits of the machine file, or a request to the
+//! operator.
+
+use gr_ir::Turn;
+use gr_machine::{Machine, Signal};
+
+use crate::Action;
+
+/// What a word becomes.
+pub(crate) struct Made {
+    pub actions: Vec<Action>,
+    /// A word the machine file says nothing about.
+    pub by_hand: Option<String>,
+}
+
+impl Made {
+    const NOTHING: Made = Made { actions: Vec::new(), by_hand: None };
+}
+
+pub(crate) struct Cells {
+    io: std::collections::BTreeMap<String, Signal>,
+    limits: (Option<f64>, Option<f64>),
+    by_hand: bool,
+    turning: Turn,
+    coolant: bool,
+    speed: f64,
+}
+
+impl Cells {
+    pub fn new(machine: &Machine) -> Cells {
+        let spindle = machine.cell.spindle.as_ref();
+        Cells {
+            io: machine.cell.io.clone(),
+            limits: spindle.map_or((None, None), |s| s.speed),
+            by_hand: spindle.is_some_and(|s| !s.controlled),
+            turning: Turn::Stop,
+            coolant: false,
+            speed: 0.0,
+        }
+    }
+
+    pub fn signal(&self, word: &str) -> Option<Signal> {
+        self.io.get(word).cloned()
+    }
+
+    /// What is wrong with a speed.
+    pub fn spindle_limit(&self, speed: f64) -> Option<String> {
+        let (min, max) = self.limits;
+        match (min.filter(|m| speed < *m), max.filter(|m| speed > *m)) {
+            (Some(m), _) => Some(format!("its least speed is {m}")),
+            (_, Some(m)) => Some(format!("its greatest speed is {m}")),
+            _ => None,
+        }
+    }
+
+    /// The output or routine of a word, then its wait.
+    pub fn word(&self, word: &str, value: Option<f64>, more: &str) -> Made {
+        match self.io.get(word) {
+            Some(signal) => Made { actions: steps(word, value, signal.clone()), by_hand: None },
+            None => {
+                let text = format!("{word}{more}");
+                let actions = vec![Action::Message(text), Action::Pause { optional: false }];
+                Made { actions, by_hand: Some(word.to_string()) }
+            }
+        }
+    }
+
+    fn spindle(&self, word: &str, speed: f64) -> Made {
+        let more = if speed > 0.0 && word != "M5" { format!(" S{speed}") } else { String::new() };
+        if self.by_hand {
+            let actions = vec![Action::Message(format!("{word}{more}")), Action::Pause { optional: false }];
+            return Made { actions, by_hand: Some(word.to_string()) };
+        }
+        let value = (word != "M5").then_some(speed);
+        self.word(word, value, &more)
+    }
+
+    pub fn speed(&mut self, speed: f64, turning: Turn) -> Made {
+        let same = self.speed == speed;
+        self.speed = speed;
+        if same {
+            return Made::NOTHING;
+        }
+        if !self.by_hand && self.io.contains_key("S") {
+            let mut made = self.word("S", Some(speed), "");
+            if turning != Turn::Stop {
+                made.actions.extend(self.io.get(turn_word(turning)).and_then(wait));
+            }
+            return made;
+        }
+        // Without an output of its own the speed goes with the word that starts the spindle.
+        if turning == Turn::Stop { Made::NOTHING } else { self.spindle(turn_word(turning), speed) }
+    }
+
+    pub fn turn(&mut self, turn: Turn, speed: f64) -> Made {
+        if self.turning == turn && turn == Turn::Stop {
+            return Made::NOTHING;
+        }
+        self.turning = turn;
+        self.spindle(turn_word(turn), speed)
+    }
+
+    pub fn coolant(&mut self, word: &str, on: bool, any: bool) -> Made {
+        if on {
+            self.coolant = true;
+            return self.word(word, None, "");
+        }
+        // M9 comes as two switches; one word does both.
+        if any || !self.coolant {
+            return Made::NOTHING;
+        }
+        self.coolant = false;
+        self.word("M9", None, "")
+    }
+
+    /// Spindle and coolant at the end of a program.
+    pub fn off(&mut self) -> Made {
+        let mut made = self.turn(Turn::Stop, 0.0);
+        let more = self.coolant("M9", false, false);
+        made.actions.extend(more.actions);
+        made.by_hand = made.by_hand.or(more.by_hand);
+        made
+    }
+
+    /// M62 … M65: a row for the output's own number (`M62P3`) comes before one for all.
+    pub fn digital(&self, index: i32, on: bool, synced: bool) -> Made {
+        let (own, other) = match (on, synced) {
+            (true, true) => ("M62", "M64"),
+            (true, false) => ("M64", "M62"),
+            (false, true) => ("M63", "M65"),
+            (false, false) => ("M65", "M63"),
+        };
+        let numbered = |w: &str| self.io.get(&format!("{w}P{index}")).cloned();
+        let word = format!("{own} P{index}");
+        if let Some(signal) = numbered(own).or_else(|| numbered(other)) {
+            return Made { actions: steps(&word, None, signal), by_hand: None };
+        }
+        let opposite = if on { ["M63", "M65"] } else { ["M62", "M64"] };
+        if let Some(signal) = opposite.into_iter().find_map(numbered).filter(|s| s.signal.is_some()) {
+            let value = Some(if on { 1.0 } else { 0.0 });
+            return Made { actions: steps(&word, None, Signal { value, ..signal }), by_hand: None };
+        }
+        let mut made = self.word(own, Some(f64::from(index)), &format!(" P{index}"));
+        made.by_hand = made.by_hand.map(|w| format!("{w}P{index}"));
+        made
+    }
+
+    /// M67, M68.
+    pub fn analog(&self, index: i32, value: f64, synced: bool) -> Made {
+        let (own, other) = if synced { ("M67", "M68") } else { ("M68", "M67") };
+        let numbered = |w: &str| self.io.get(&format!("{w}P{index}")).cloned();
+        if let Some(signal) = numbered(own).or_else(|| numbered(other)) {
+            return Made { actions: steps(&format!("{own} P{index}"), Some(value), signal), by_hand: None };
+        }
+        let mut made = self.word(own, Some(value), &format!(" P{index} Q{value}"));
+        made.by_hand = made.by_hand.map(|w| format!("{w}P{index}"));
+        made
+    }
+
+    /// Name of the input that M66 waits for.
+    pub fn input(&self, index: i32) -> Option<String> {
+        let row = self.io.get(&format!("M66P{index}"))?;
+        row.wait.clone().or_else(|| row.signal.clone())
+    }
+}
+
+fn turn_word(turn: Turn) -> &'static str {
+    match turn {
+        Turn::Cw => "M3",
+        Turn::Ccw => "M4",
+        Turn::Stop => "M5",
+    }
+}
+
+/// An output or routine without its wait, then the wait.
+fn steps(word: &str, value: Option<f64>, signal: Signal) -> Vec<Action> {
+    let after = wait(&signal);
+    let plain = Signal { wait: None, seconds: None, ..signal };
+    let mut out = Vec::new();
+    if plain.signal.is_some() || plain.routine.is_some() {
+        out.push(Action::Signal { word: word.to_string(), value, signal: plain });
+    }
+    out.extend(after);
+    out
+}
+
+fn wait(signal: &Signal) -> Option<Action> {
+    match (&signal.wait, signal.seconds) {
+        (Some(name), timeout) => Some(Action::WaitInput { name: name.clone(), on: true, timeout }),
+        (None, Some(s)) if s > 0.0 => Some(Action::Dwell(s)),
+        _ => None,
+    }
+}

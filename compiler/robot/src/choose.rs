@@ -1,0 +1,445 @@
+//! Second pass: one configuration for every chain of moves, chosen over all chains together.
+//!
+//! A chain is a place reached by a joint move and the lines and arcs that follow. Along a chain every configuration
+//! is followed at once through samples of the real path; a change of joints too great between two samples is looked
+//! at closer until it is small or proves to be a jump. What survives, times the whole turns of joints that have room
+//! for them, times the tool's turn about its own axis where that is free, are the nodes of a graph; the cheapest way
+//! through it, from home to home, is found by dynamic programming.
+
+use gr_ir::Source;
+use gr_machine::KinematicsError;
+
+use crate::gather::{Gathered, Item, Move, Way};
+use crate::path::{Mount, Path};
+use crate::solver::{Branches, Joints, Limits, Solver};
+use crate::MAX_JOINTS;
+
+/// Moves `first ..= last` (indices into the items); the first is reached by a joint move.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Chain {
+    pub first: usize,
+    pub last: usize,
+}
+
+/// Why a configuration ends.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Why {
+    Reach(KinematicsError),
+    Limit { joint: usize, value: f64, limit: f64 },
+    Jump,
+    Condition(gr_machine::Violation),
+}
+
+/// Where and why.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Fault {
+    pub item: usize,
+    /// Share of the move.
+    pub share: f64,
+    pub position: [f64; 3],
+    pub source: Option<Source>,
+    pub why: Why,
+}
+
+/// A configuration that holds along a chain, joints as at its start; `shift` brings them into the limits.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Node {
+    pub branch: u8,
+    pub spin: f64,
+    pub start: Joints,
+    pub end: Joints,
+    cost: f64,
+}
+
+struct Track {
+    branch: u8,
+    now: Joints,
+    start: Joints,
+    low: Joints,
+    high: Joints,
+    close: f64,
+    alive: bool,
+}
+
+/// A joint that changes more than this between two looks is looked at closer, rad (mm count a hundredth).
+const SMALL: f64 = 0.12;
+/// So often a stretch is halved.
+const HALVINGS: u32 = 18;
+/// Turns of a free tool tried first.
+const COARSE: usize = 24;
+/// Looks of the first, rough pass over a chain of a free tool.
+const ROUGH: usize = 200;
+
+pub(crate) struct Chooser<'a> {
+    pub g: &'a Gathered,
+    pub solver: &'a Solver,
+    pub limits: &'a Limits,
+    /// Greatest speed of each joint, for weighing travel.
+    pub speeds: Joints,
+    /// Nodes kept per chain.
+    pub kept: usize,
+}
+
+/// The chains of a program.
+pub(crate) fn chains(items: &[Item]) -> Vec<Chain> {
+    let mut out: Vec<Chain> = Vec::new();
+    for (i, item) in items.iter().enumerate() {
+        let Item::Move(m) = item else { continue };
+        match out.last_mut() {
+            Some(chain) if m.way != Way::Joint => chain.last = i,
+            _ => out.push(Chain { first: i, last: i }),
+        }
+    }
+    out
+}
+
+fn delta(a: &Joints, b: &Joints, turns: &[bool; MAX_JOINTS], count: usize) -> f64 {
+    let each = |i: usize| (a[i] - b[i]).abs() * if turns[i] { 1.0 } else { 0.01 };
+    (0..count).map(each).fold(0.0, f64::max)
+}
+
+/// Whole turns added so that angles lie next to others.
+pub(crate) fn unwrap(q: &mut Joints, near: &Joints, turns: &[bool; MAX_JOINTS], count: usize) {
+    const TURN: f64 = std::f64::consts::TAU;
+    for i in 0..count {
+        if turns[i] && (near[i] - q[i]).abs() > std::f64::consts::PI {
+            q[i] += TURN * libm::round((near[i] - q[i]) / TURN);
+        }
+    }
+}
+
+impl Chooser<'_> {
+    fn at(&self, i: usize) -> &Move {
+        match &self.g.items[i] {
+            Item::Move(m) => m,
+            Item::Do(_) => unreachable!("chains begin and end at moves"),
+        }
+    }
+
+    /// All nodes of a chain, or where the one that got furthest ended.
+    pub fn nodes(&self, chain: Chain) -> Result<Vec<Node>, Fault> {
+        let free = (chain.first..=chain.last).any(|i| matches!(&self.g.items[i], Item::Move(m) if m.free));
+        if !free {
+            return self.walked(chain, &[0.0]);
+        }
+        let turn = std::f64::consts::TAU / COARSE as f64;
+        let coarse: Vec<f64> = (0..COARSE).map(|k| turn * k as f64).collect();
+        let moves = (chain.first..=chain.last).filter(|i| matches!(self.g.items[*i], Item::Move(_))).count();
+        if moves <= ROUGH {
+            let all = self.walked(chain, &coarse)?;
+            return Ok(self.finer(chain, all, turn));
+        }
+        // A long chain: rough looks rank the turns, then the best are followed along the whole of it.
+        let ranked = self.ranked(chain, &coarse);
+        let mut last = None;
+        for few in ranked.chunks(3) {
+            match self.walked(chain, few) {
+                Ok(nodes) => return Ok(nodes),
+                Err(fault) => last = furthest(last, fault),
+            }
+        }
+        match last {
+            Some(fault) => Err(fault),
+            None => self.walked(chain, &coarse),
+        }
+    }
+
+    /// Turns of the tool between the coarse ones, about the best.
+    fn finer(&self, chain: Chain, mut all: Vec<Node>, turn: f64) -> Vec<Node> {
+        let Some(best) = all.iter().min_by(|a, b| a.cost.total_cmp(&b.cost)).map(|n| n.spin) else { return all };
+        let near = [-0.5, -0.25, 0.25, 0.5].map(|k| best + turn * k);
+        all.extend(self.walked(chain, &near).unwrap_or_default());
+        trimmed(all, self.kept)
+    }
+
+    fn ranked(&self, chain: Chain, spins: &[f64]) -> Vec<f64> {
+        let moves: Vec<usize> = (chain.first..=chain.last).filter(|i| matches!(self.g.items[*i], Item::Move(_))).collect();
+        let step = moves.len().div_ceil(ROUGH).max(1);
+        let score = |spin: f64| {
+            let mut out = Branches::NONE;
+            let mut sum = [0.0f64; 8];
+            for i in moves.iter().step_by(step) {
+                let m = self.at(*i);
+                let tool = gr_machine::math::Frame { turn: self.g.turns[m.turn as usize], position: m.position };
+                if self.solver.all(&Mount::new(self.g, m, spin).flange(&tool), &mut out).is_err() {
+                    return f64::INFINITY;
+                }
+                for (b, slot) in sum.iter_mut().enumerate() {
+                    let good = out.has(b as u8) && (0..self.solver.count).all(|j| self.limits.shifts(j, out.joints[b][j], out.joints[b][j]).is_some());
+                    let close = self.solver.closeness(&out.joints[b]).0;
+                    *slot += if good { 1.0 / close.max(1e-3) } else { 1e6 };
+                }
+            }
+            sum.into_iter().fold(f64::INFINITY, f64::min)
+        };
+        let mut rows: Vec<(f64, f64)> = spins.iter().map(|s| (score(*s), *s)).collect();
+        rows.sort_by(|a, b| a.0.total_cmp(&b.0));
+        rows.into_iter().map(|r| r.1).collect()
+    }
+
+    fn walked(&self, chain: Chain, spins: &[f64]) -> Result<Vec<Node>, Fault> {
+        let mut nodes = Vec::new();
+        let mut last = None;
+        for spin in spins {
+            match self.walk(chain, *spin) {
+                Ok(more) => nodes.extend(more),
+                Err(fault) => last = furthest(last, fault),
+            }
+        }
+        match last {
+            Some(fault) if nodes.is_empty() => Err(fault),
+            _ => Ok(trimmed(nodes, self.kept)),
+        }
+    }
+
+    /// Follows all configurations along a chain.
+    fn walk(&self, chain: Chain, spin: f64) -> Result<Vec<Node>, Fault> {
+        let first = self.at(chain.first);
+        let mut all = Branches::NONE;
+        let start = gr_machine::math::Frame { turn: self.g.turns[first.turn as usize], position: first.position };
+        let place = |item: usize, share: f64, position: [f64; 3], source: Option<Source>, why: Why| Fault { item, share, position, source, why };
+        let begin = |why: Why| place(chain.first, 1.0, first.position, first.source, why);
+        if let Err(e) = self.solver.all(&Mount::new(self.g, first, spin).flange(&start), &mut all) {
+            return Err(begin(Why::Reach(e)));
+        }
+        let mut tracks: Vec<Track> = (0..8)
+            .filter(|b| all.has(*b))
+            .map(|branch| {
+                let q = all.joints[usize::from(branch)];
+                let close = self.solver.closeness(&q).0;
+                Track { branch, now: q, start: q, low: q, high: q, close, alive: true }
+            })
+            .collect();
+        let mut fault = None;
+        for t in &mut tracks {
+            if let Some(why) = self.outside(t, &t.now) {
+                t.alive = false;
+                fault = furthest(fault, begin(why));
+            }
+        }
+        let (mut from, mut turn) = (first.position, first.turn);
+        let mut frame = first.frame;
+        for i in chain.first + 1..=chain.last {
+            if !tracks.iter().any(|t| t.alive) {
+                break;
+            }
+            let Item::Move(m) = &self.g.items[i] else { continue };
+            if m.frame != frame {
+                let base = self.g.frames[usize::from(frame)].frame.apply(from);
+                from = self.g.frames[usize::from(m.frame)].frame.inverse().apply(base);
+                frame = m.frame;
+            }
+            let path = Path::new(self.g, from, turn, m);
+            let mount = Mount::new(self.g, m, spin);
+            let looks = path.looks();
+            for k in 1..=looks {
+                let (a, b) = ((k - 1) as f64 / looks as f64, k as f64 / looks as f64);
+                let reach = self.solver.all(&mount.flange(&path.at(b)), &mut all);
+                for t in tracks.iter_mut().filter(|t| t.alive) {
+                    let why = match &reach {
+                        Err(e) => Some(Why::Reach(e.clone())),
+                        Ok(()) => self.advance(t, &all, &path, &mount, a, b),
+                    };
+                    if let Some(why) = why {
+                        t.alive = false;
+                        fault = furthest(fault, place(i, b, path.position(b), m.source, why));
+                    }
+                }
+            }
+            (from, turn) = (m.position, m.turn);
+        }
+        let nodes: Vec<Node> = tracks.iter().filter(|t| t.alive).flat_map(|t| self.turned(t, spin)).collect();
+        match fault {
+            Some(fault) if nodes.is_empty() => Err(fault),
+            _ if nodes.is_empty() => Err(begin(Why::Jump)),
+            _ => Ok(nodes),
+        }
+    }
+
+    /// Takes a track to the next look.
+    fn advance(&self, t: &mut Track, all: &Branches, path: &Path, mount: &Mount, a: f64, b: f64) -> Option<Why> {
+        let next = if self.solver.searches() {
+            match self.solver.near(&mount.flange(&path.at(b)), &t.now) {
+                Ok(q) => q,
+                Err(e) => return Some(Why::Reach(e)),
+            }
+        } else {
+            if !all.has(t.branch) {
+                // Two configurations that meet are told under one number.
+                if all.good & all.singular == 0 {
+                    return Some(Why::Jump);
+                }
+            }
+            let number = if all.has(t.branch) { t.branch } else { (all.good & all.singular).trailing_zeros() as u8 };
+            all.joints[usize::from(number)]
+        };
+        let mut q = next;
+        unwrap(&mut q, &t.now, &self.limits.turns, self.solver.count);
+        if delta(&q, &t.now, &self.limits.turns, self.solver.count) > SMALL && !self.smooth(t.branch, &t.now, &q, path, mount, (a, b), HALVINGS) {
+            return Some(Why::Jump);
+        }
+        t.now = q;
+        for i in 0..self.solver.count {
+            t.low[i] = t.low[i].min(q[i]);
+            t.high[i] = t.high[i].max(q[i]);
+        }
+        t.close = t.close.min(self.solver.closeness(&q).0);
+        self.outside(t, &q)
+    }
+
+    /// Whether a great change of joints is made of small ones; between `p` at the first share and `q` at the last.
+    #[allow(clippy::too_many_arguments)]
+    fn smooth(&self, branch: u8, p: &Joints, q: &Joints, path: &Path, mount: &Mount, (a, b): (f64, f64), left: u32) -> bool {
+        if delta(p, q, &self.limits.turns, self.solver.count) <= SMALL {
+            return true;
+        }
+        if left == 0 {
+            return false;
+        }
+        let middle = (a + b) / 2.0;
+        let flange = mount.flange(&path.at(middle));
+        let mut r = if self.solver.searches() {
+            match self.solver.near(&flange, p) {
+                Ok(r) => r,
+                Err(_) => return false,
+            }
+        } else {
+            let mut all = Branches::NONE;
+            if self.solver.all(&flange, &mut all).is_err() || !all.has(branch) {
+                return false;
+            }
+            all.joints[usize::from(branch)]
+        };
+        unwrap(&mut r, p, &self.limits.turns, self.solver.count);
+        let mut end = *q;
+        unwrap(&mut end, &r, &self.limits.turns, self.solver.count);
+        // The end must be reached by the same turns.
+        delta(&end, q, &self.limits.turns, self.solver.count) < 1e-9
+            && self.smooth(branch, p, &r, path, mount, (a, middle), left - 1)
+            && self.smooth(branch, &r, q, path, mount, (middle, b), left - 1)
+    }
+
+    fn outside(&self, t: &Track, q: &Joints) -> Option<Why> {
+        for i in 0..self.solver.count {
+            if self.limits.shifts(i, t.low[i], t.high[i]).is_none() {
+                let value = q[i];
+                let limit = if value > self.limits.max[i] || value - self.limits.min[i] > self.limits.max[i] - value {
+                    self.limits.max[i]
+                } else {
+                    self.limits.min[i]
+                };
+                return Some(Why::Limit { joint: i, value, limit });
+            }
+        }
+        if let Some((joint, value, limit)) = self.limits.coupled_outside(q) {
+            return Some(Why::Limit { joint, value, limit });
+        }
+        self.solver.violations(q).into_iter().next().map(Why::Condition)
+    }
+
+    /// The track with every set of whole turns that stays within the limits.
+    fn turned(&self, t: &Track, spin: f64) -> Vec<Node> {
+        let mut out = vec![(t.start, t.now, 0.0f64)];
+        for i in 0..self.solver.count {
+            let Some((first, last)) = self.limits.shifts(i, t.low[i], t.high[i]) else { return Vec::new() };
+            let mut next = Vec::new();
+            for (start, end, cost) in &out {
+                for k in first..=last {
+                    let shift = f64::from(k) * std::f64::consts::TAU;
+                    let (mut s, mut e) = (*start, *end);
+                    (s[i], e[i]) = (s[i] + shift, e[i] + shift);
+                    let range = self.limits.max[i] - self.limits.min[i];
+                    let left = (t.low[i] + shift - self.limits.min[i]).min(self.limits.max[i] - t.high[i] - shift);
+                    let share = if range.is_finite() && range > 0.0 { (left / range).clamp(0.0, 0.5) } else { 0.5 };
+                    next.push((s, e, cost + 0.02 / (share + 0.02)));
+                }
+            }
+            out = next;
+        }
+        let close = 0.3 / (t.close + 0.05);
+        out.into_iter().map(|(start, end, cost)| Node { branch: t.branch, spin, start, end, cost: cost + close }).collect()
+    }
+
+    /// Travel between two joint values: the time of the slowest joint and a little of all.
+    fn travel(&self, a: &Joints, b: &Joints) -> f64 {
+        let each = |i: usize| (a[i] - b[i]).abs() / self.speeds[i];
+        let (mut most, mut sum) = (0.0f64, 0.0);
+        for i in 0..self.solver.count {
+            most = most.max(each(i));
+            sum += each(i);
+        }
+        most + 0.1 * sum
+    }
+
+    /// One node per chain, the cheapest way from home to home.
+    pub fn cheapest(&self, all: &[Vec<Node>], home: &Joints) -> Vec<Node> {
+        let Some(first) = all.first() else { return Vec::new() };
+        let mut cost: Vec<f64> = first.iter().map(|n| self.travel(home, &n.start) + n.cost).collect();
+        let mut back: Vec<Vec<u16>> = Vec::with_capacity(all.len());
+        for pair in all.windows(2) {
+            let mut links = Vec::with_capacity(pair[1].len());
+            let mut next = Vec::with_capacity(pair[1].len());
+            for n in &pair[1] {
+                let (mut best, mut from) = (f64::INFINITY, 0);
+                for (k, p) in pair[0].iter().enumerate() {
+                    let c = cost[k] + self.travel(&p.end, &n.start);
+                    if c < best {
+                        (best, from) = (c, k);
+                    }
+                }
+                next.push(best + n.cost);
+                // Nodes of a chain are few.
+                links.push(u16::try_from(from).unwrap_or(0));
+            }
+            cost = next;
+            back.push(links);
+        }
+        let Some(last) = all.last() else { return Vec::new() };
+        let total = |i: usize| cost[i] + self.travel(&last[i].end, home);
+        let mut at = (0..last.len()).min_by(|a, b| total(*a).total_cmp(&total(*b))).unwrap_or(0);
+        let mut out = vec![last[at]];
+        for (links, nodes) in back.iter().zip(all).rev() {
+            at = usize::from(links[at]);
+            out.push(nodes[at]);
+        }
+        out.reverse();
+        out
+    }
+}
+
+/// The fault that came later; of two at one place the one that says more.
+fn furthest(old: Option<Fault>, new: Fault) -> Option<Fault> {
+    let rank = |f: &Fault| match f.why {
+        Why::Reach(_) => 0,
+        Why::Condition(_) => 1,
+        Why::Jump => 2,
+        Why::Limit { .. } => 3,
+    };
+    match old {
+        Some(o) if (o.item, o.share) > (new.item, new.share) => Some(o),
+        Some(o) if (o.item, o.share) == (new.item, new.share) && rank(&o) >= rank(&new) => Some(o),
+        _ => Some(new),
+    }
+}
+
+/// The cheapest nodes, every configuration represented.
+fn trimmed(mut nodes: Vec<Node>, most: usize) -> Vec<Node> {
+    nodes.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+    if nodes.len() <= most {
+        return nodes;
+    }
+    let mut kept: Vec<Node> = Vec::with_capacity(most);
+    for branch in 0..8 {
+        kept.extend(nodes.iter().filter(|n| n.branch == branch).take(most / 8));
+    }
+    for n in &nodes {
+        if kept.len() >= most {
+            break;
+        }
+        if !kept.iter().any(|k| k.branch == n.branch && k.spin == n.spin && k.start == n.start) {
+            kept.push(*n);
+        }
+    }
+    kept.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+    kept
+}

@@ -1,0 +1,320 @@
+//! Last pass: the chosen configurations become targets, the speed of joints is checked along the real path, and the
+//! figures of the summary are gathered.
+
+use gr_ir::Source;
+use gr_machine::math::{Frame, M3};
+use gr_machine::Machine;
+use gr_text::code;
+
+use crate::choose::{Chain, Node, unwrap};
+use crate::gather::{Findings, Gathered, Item, Move, Way};
+use crate::path::Mount;
+use crate::plan::{path_of, spun};
+use crate::solver::{Branches, Joints, Limits, Solver};
+use crate::{Action, MAX_JOINTS, RobotProgram, Step, Summary, Target, Zone};
+
+pub(crate) struct Emit<'a> {
+    machine: &'a Machine,
+    solver: &'a Solver,
+    limits: &'a Limits,
+    rapid_speeds: &'a Joints,
+    /// Greatest speeds at feed; infinite where not known.
+    speeds: Joints,
+    name: &'a str,
+    targets: Vec<Target>,
+    steps: Vec<Step>,
+    summary: Summary,
+    /// Values of external axes: they stand still.
+    external: Vec<f64>,
+}
+
+/// Sag of a joint move that is worth a word, mm.
+const SAG: f64 = 1.0;
+/// Closer to a singular position than this is worth a word, rad.
+const CLOSE: f64 = 3.0 * std::f64::consts::PI / 180.0;
+
+/// Where the tool is while the program is walked along.
+struct Here {
+    position: [f64; 3],
+    turn: u32,
+    frame: u16,
+    joints: Joints,
+}
+
+impl<'a> Emit<'a> {
+    pub fn new(machine: &'a Machine, solver: &'a Solver, limits: &'a Limits, rapid_speeds: &'a Joints, name: &'a str) -> Emit<'a> {
+        let mut speeds = [f64::INFINITY; MAX_JOINTS];
+        for (slot, j) in speeds.iter_mut().zip(&machine.joints) {
+            *slot = j.speed.unwrap_or(f64::INFINITY);
+        }
+        let external = machine.cell.external.iter().map(|e| {
+            0f64.max(e.joint.min.unwrap_or(f64::NEG_INFINITY)).min(e.joint.max.unwrap_or(f64::INFINITY))
+        });
+        Emit {
+            machine,
+            solver,
+            limits,
+            rapid_speeds,
+            speeds,
+            name,
+            targets: Vec::new(),
+            steps: Vec::new(),
+            summary: Summary::default(),
+            external: external.collect(),
+        }
+    }
+
+    pub fn run(mut self, g: &mut Gathered, list: &[Chain], nodes: &[Node], home: &Joints, findings: &mut Findings<'_>) -> (RobotProgram, Summary) {
+        let items = std::mem::take(&mut g.items);
+        self.steps.reserve(items.len() + 2);
+        self.targets.reserve(items.len() + 2);
+        self.summary.wait_seconds = g.wait_seconds;
+        let tools = g.tools.clone();
+        let mut here: Option<Here> = None;
+        let mut chain = 0;
+        let mut node: Option<&Node> = None;
+        let mut last = *home;
+        for (i, item) in items.into_iter().enumerate() {
+            match item {
+                Item::Do(step) => self.steps.push(step),
+                Item::Move(m) => {
+                    if list.get(chain).is_some_and(|c| c.first == i) {
+                        node = nodes.get(chain);
+                        chain += 1;
+                    }
+                    let Some(node) = node else { continue };
+                    self.mv(g, &m, node, &mut here, &mut last, findings);
+                }
+            }
+        }
+        let at_home = self.home_target(g, home, here.as_ref());
+        if here.is_some() {
+            self.summary.rapid_seconds += self.joint_time(&last, home, 1.0);
+            let to = self.keep(at_home);
+            let speed = self.joint_share();
+            self.steps.push(Step { action: Action::Joint { to, speed, zone: Zone::Stop }, source: None });
+        }
+        self.steps.push(Step { action: Action::End, source: None });
+        self.near_singular(findings);
+        let program = RobotProgram {
+            name: self.name.to_string(),
+            machine: self.machine.clone(),
+            tools,
+            frames: g.frames.clone(),
+            targets: self.targets,
+            home: at_home,
+            steps: self.steps,
+        };
+        (program, self.summary)
+    }
+
+    fn joint_share(&self) -> f64 {
+        (self.machine.cell.joint_speed.unwrap_or(100.0) / 100.0).clamp(0.001, 1.0)
+    }
+
+    fn keep(&mut self, target: Target) -> u32 {
+        self.targets.push(target);
+        u32::try_from(self.targets.len() - 1).unwrap_or(u32::MAX)
+    }
+
+    fn target(&self, position: [f64; 3], turn: &M3, joints: &Joints, branch: u8) -> Target {
+        let mut joints = *joints;
+        for (slot, v) in joints.iter_mut().skip(self.solver.count).zip(&self.external) {
+            *slot = *v;
+        }
+        Target { position, quaternion: quaternion(turn), joints, branch }
+    }
+
+    fn home_target(&self, g: &Gathered, home: &Joints, here: Option<&Here>) -> Target {
+        let frame = here.map_or(Frame::IDENTITY, |h| g.frames[usize::from(h.frame)].frame);
+        let tool = g.tools.last().map_or(Frame::IDENTITY, |t| t.frame);
+        let at = self.solver.forward(home).map_or(Frame::IDENTITY, |f| frame.inverse().then(&f).then(&tool));
+        let mut all = Branches::NONE;
+        let branch = self.solver.forward(home).and_then(|f| self.solver.all(&f, &mut all).ok()).map_or(0, |()| nearest(&all, home, self.solver.count));
+        self.target(at.position, &at.turn, home, branch)
+    }
+
+    fn mv(&mut self, g: &Gathered, m: &Move, node: &Node, here: &mut Option<Here>, last: &mut Joints, findings: &mut Findings<'_>) {
+        let turn = spun(&g.turns[m.turn as usize], m.free, node.spin);
+        if m.way == Way::Joint {
+            let joints = node.start;
+            let to = self.keep(self.target(m.position, &turn, &joints, node.branch));
+            self.sweep(g, m, here.as_ref(), last, &joints, findings);
+            self.summary.rapid_seconds += self.joint_time(last, &joints, m.speed);
+            self.summary.rapids += 1;
+            self.steps.push(Step { action: Action::Joint { to, speed: m.speed, zone: m.zone }, source: m.source });
+            *here = Some(Here { position: m.position, turn: m.turn, frame: m.frame, joints });
+            *last = joints;
+            self.look(&joints, m.source);
+            return;
+        }
+        let Some(h) = here else { return };
+        if h.frame != m.frame {
+            let base = g.frames[usize::from(h.frame)].frame.apply(h.position);
+            h.position = g.frames[usize::from(m.frame)].frame.inverse().apply(base);
+            h.frame = m.frame;
+        }
+        let (joints, via) = self.follow(g, m, node, h, findings);
+        let to = self.keep(self.target(m.position, &turn, &joints, node.branch));
+        let action = match m.way {
+            Way::Arc(i) => {
+                let a = g.arcs[i as usize];
+                let via = self.keep(self.target(a.via, &turn, &via, node.branch));
+                self.summary.arcs += 1;
+                Action::Arc { via, to, center: a.center, normal: a.normal, angle: a.angle, speed: m.speed, zone: m.zone }
+            }
+            _ => Action::Linear { to, speed: m.speed, zone: m.zone, rapid: m.rapid },
+        };
+        self.steps.push(Step { action, source: m.source });
+        *h = Here { position: m.position, turn: m.turn, frame: m.frame, joints };
+        *last = joints;
+    }
+
+    /// Joint values along a move: the end, the middle, and whether any joint is too fast.
+    fn follow(&mut self, g: &Gathered, m: &Move, node: &Node, h: &Here, findings: &mut Findings<'_>) -> (Joints, Joints) {
+        let path = path_of(g, h.position, h.turn, m);
+        let mount = Mount::new(g, m, node.spin);
+        let looks = path.looks();
+        // An even number of looks has one in the middle.
+        let looks = if matches!(m.way, Way::Arc(_)) { looks.next_multiple_of(2) } else { looks };
+        let (mut q, mut middle) = (h.joints, h.joints);
+        let mut all = Branches::NONE;
+        let seconds = if path.length > 0.0 { path.length / m.speed } else { 0.0 };
+        let mut worst = (0.0f64, 0usize);
+        for k in 1..=looks {
+            let share = k as f64 / looks as f64;
+            let flange = mount.flange(&path.at(share));
+            let mut next = q;
+            if self.solver.searches() {
+                next = self.solver.near(&flange, &q).unwrap_or(q);
+            } else if self.solver.all(&flange, &mut all).is_ok() {
+                let number = if all.has(node.branch) { node.branch } else { nearest(&all, &q, self.solver.count) };
+                next = all.joints[usize::from(number)];
+            }
+            unwrap(&mut next, &q, &self.limits.turns, self.solver.count);
+            for i in 0..self.solver.count {
+                let speed = (next[i] - q[i]).abs() * looks as f64 / seconds;
+                let part = speed / self.speeds[i];
+                if part > worst.0 {
+                    worst = (part, i);
+                }
+            }
+            q = next;
+            if 2 * k == looks {
+                middle = q;
+            }
+            self.look(&q, m.source);
+        }
+        if !m.rapid && seconds > 0.0 {
+            self.fast(m, worst, findings);
+        }
+        if m.rapid {
+            self.summary.rapids += 1;
+            self.summary.rapid_seconds += seconds;
+        } else {
+            self.summary.cuts += 1;
+            self.summary.cut_seconds += seconds;
+        }
+        (q, middle)
+    }
+
+    fn fast(&mut self, m: &Move, (part, i): (f64, usize), findings: &mut Findings<'_>) {
+        if self.summary.joint_speed.is_none_or(|(p, ..)| part > p) && part > 0.0 {
+            self.summary.joint_speed = Some((part, i, m.source));
+        }
+        if part > 1.0 + 1e-9 {
+            let joint = &self.machine.joints[i];
+            let per_second = |v: f64| format!("{}/s", joint.show(v));
+            let fits = libm::floor(m.speed / part * 60.0 * 10.0) / 10.0;
+            let limit = self.speeds[i];
+            findings.say(code::ROBOT_JOINT_SPEED, m.source, &[joint.name.clone(), per_second(limit * part), per_second(limit), format!("{fits} mm/min")]);
+        }
+    }
+
+    /// Margins at a place.
+    fn look(&mut self, q: &Joints, source: Option<Source>) {
+        let (close, which) = self.solver.closeness_of_all(q);
+        if close.is_finite() && self.summary.singularity.is_none_or(|(c, ..)| close < c) {
+            self.summary.singularity = Some((close, which, source));
+        }
+        let (left, joint) = self.limits.margin(q);
+        if self.summary.limit_margin.is_none_or(|(l, ..)| left < l) {
+            self.summary.limit_margin = Some((left, joint, source));
+        }
+        if let Some(margin) = self.solver.reach_margin(&Frame::IDENTITY, q)
+            && self.summary.reach_margin.is_none_or(|(m, _)| margin < m)
+        {
+            self.summary.reach_margin = Some((margin, source));
+        }
+    }
+
+    fn near_singular(&self, findings: &mut Findings<'_>) {
+        if let Some((close, which, source)) = self.summary.singularity
+            && close < CLOSE
+        {
+            findings.say(code::ROBOT_NEAR_SINGULAR, source, &[format!("{} but for {:.2}°", which.words(), close.to_degrees())]);
+        }
+    }
+
+    fn joint_time(&self, a: &Joints, b: &Joints, share: f64) -> f64 {
+        (0..self.solver.count).map(|i| (a[i] - b[i]).abs() / (self.rapid_speeds[i] * share)).fold(0.0, f64::max)
+    }
+
+    /// How deep the tool sags below both ends of a joint move.
+    fn sweep(&self, g: &Gathered, m: &Move, here: Option<&Here>, from: &Joints, to: &Joints, findings: &mut Findings<'_>) {
+        let Some(h) = here.filter(|_| m.source.is_some() && self.solver.control == gr_machine::Control::Full) else { return };
+        let frame = g.frames[usize::from(m.frame)].frame;
+        let tool = g.tools[usize::from(m.tool)].frame;
+        let back = frame.inverse();
+        let start = back.apply(g.frames[usize::from(h.frame)].frame.apply(h.position));
+        let least = start[2].min(m.position[2]);
+        let mut lowest = least;
+        for k in 1..16 {
+            let share = f64::from(k) / 16.0;
+            let mut q = *from;
+            for i in 0..self.solver.count {
+                q[i] += (to[i] - from[i]) * share;
+            }
+            if let Some(f) = self.solver.forward(&q) {
+                lowest = lowest.min(back.apply(f.then(&tool).position)[2]);
+            }
+        }
+        if least - lowest > SAG {
+            findings.say(code::ROBOT_RAPID_SWEEP, m.source, &[format!("{:.1}", least - lowest)]);
+        }
+    }
+}
+
+/// The configuration nearest to some joint values.
+fn nearest(all: &Branches, q: &Joints, count: usize) -> u8 {
+    let far = |b: u8| (0..count).map(|i| gr_turn(all.joints[usize::from(b)][i] - q[i]).abs()).fold(0.0, f64::max);
+    (0..8).filter(|b| all.has(*b)).min_by(|a, b| far(*a).total_cmp(&far(*b))).unwrap_or(0)
+}
+
+fn gr_turn(angle: f64) -> f64 {
+    const TURN: f64 = std::f64::consts::TAU;
+    angle - TURN * libm::round(angle / TURN)
+}
+
+/// A turn as unit quaternion, scalar first and never negative.
+pub(crate) fn quaternion(m: &M3) -> [f64; 4] {
+    let t = m[0][0] + m[1][1] + m[2][2];
+    let q = if t > 0.0 {
+        let s = libm::sqrt(t + 1.0) * 2.0;
+        [s / 4.0, (m[2][1] - m[1][2]) / s, (m[0][2] - m[2][0]) / s, (m[1][0] - m[0][1]) / s]
+    } else if m[0][0] >= m[1][1] && m[0][0] >= m[2][2] {
+        let s = libm::sqrt(1.0 + m[0][0] - m[1][1] - m[2][2]) * 2.0;
+        [(m[2][1] - m[1][2]) / s, s / 4.0, (m[0][1] + m[1][0]) / s, (m[0][2] + m[2][0]) / s]
+    } else if m[1][1] >= m[2][2] {
+        let s = libm::sqrt(1.0 + m[1][1] - m[0][0] - m[2][2]) * 2.0;
+        [(m[0][2] - m[2][0]) / s, (m[0][1] + m[1][0]) / s, s / 4.0, (m[1][2] + m[2][1]) / s]
+    } else {
+        let s = libm::sqrt(1.0 + m[2][2] - m[0][0] - m[1][1]) * 2.0;
+        [(m[1][0] - m[0][1]) / s, (m[0][2] + m[2][0]) / s, (m[1][2] + m[2][1]) / s, s / 4.0]
+    };
+    let l = libm::sqrt(q.iter().map(|v| v * v).sum());
+    // The first part that is not 0 is positive: one turn has one quaternion.
+    let negative = q.iter().find(|v| v.abs() > 1e-12).is_some_and(|v| *v < 0.0);
+    let sign = if negative { -1.0 } else { 1.0 };
+    q.map(|v| v / l * sign + 0.0)
+}

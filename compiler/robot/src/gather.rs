@@ -1,0 +1,807 @@
+//! First pass: operations of the motion IR become moves in work frames and actions of the cell, in order. No joint
+//! values yet. Frames, tools, tool directions, speeds, signals and the words a robot has no meaning for are settled
+//! here.
+
+use gr_ir::geometry::ArcShape;
+use gr_ir::{FeedMode, Note, Op, PathMode, Pose, Program, Source, Sources, State, Stop, Turn, View};
+use gr_machine::math::{Frame, M3, dot, euler, norm, product, rot_x, rot_z, rotation_vector, scale, sub, transpose};
+use gr_machine::{Chain, Control, Kind, Machine, Orientation, Rapid};
+use gr_text::{Code, Diagnostic, code};
+use std::f64::consts::PI;
+
+use crate::cell::Cells;
+use crate::{Action, Options, Step, Tool, WorkFrame, Zone};
+
+/// How a move goes.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(crate) enum Way {
+    Joint,
+    Line,
+    /// Index into [`Gathered::arcs`].
+    Arc(u32),
+}
+
+/// An arc of at most half a turn, in its work frame.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(crate) struct ArcPiece {
+    pub center: [f64; 3],
+    pub normal: [f64; 3],
+    pub via: [f64; 3],
+    pub angle: f64,
+}
+
+/// A move to a place in a work frame.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(crate) struct Move {
+    pub way: Way,
+    pub position: [f64; 3],
+    /// Index into [`Gathered::turns`].
+    pub turn: u32,
+    pub frame: u16,
+    pub tool: u16,
+    /// mm/s, or share of the joint speed.
+    pub speed: f64,
+    pub zone: Zone,
+    pub length: f64,
+    pub rapid: bool,
+    /// The tool may turn about its own axis as the arm likes.
+    pub free: bool,
+    /// Approach or retract: may be left out.
+    pub ours: bool,
+    pub source: Option<Source>,
+}
+
+pub(crate) enum Item {
+    Move(Move),
+    Do(Step),
+}
+
+pub(crate) struct Gathered {
+    pub items: Vec<Item>,
+    pub turns: Vec<M3>,
+    pub arcs: Vec<ArcPiece>,
+    pub tools: Vec<Tool>,
+    pub frames: Vec<WorkFrame>,
+    pub wait_seconds: f64,
+}
+
+/// Collects findings, one per line and code.
+pub(crate) struct Findings<'a> {
+    sources: &'a dyn Sources,
+    pub list: Vec<Diagnostic>,
+    seen: std::collections::BTreeSet<(Code, u32, u32)>,
+}
+
+/// Findings told at most.
+const MOST: usize = 200;
+
+impl<'a> Findings<'a> {
+    pub fn new(sources: &'a dyn Sources) -> Findings<'a> {
+        Findings { sources, list: Vec::new(), seen: std::collections::BTreeSet::new() }
+    }
+    pub fn say(&mut self, code: Code, source: Option<Source>, args: &[String]) {
+        let source = source.unwrap_or_default();
+        if self.list.len() < MOST && self.seen.insert((code, source.file.0, source.line)) {
+            let (file, span) = self.sources.place(source);
+            self.list.push(Diagnostic::new(code, file, span, args));
+        }
+    }
+    /// Once per program.
+    pub fn once(&mut self, code: Code, source: Option<Source>, args: &[String]) {
+        if !self.list.iter().any(|d| d.code == code) {
+            self.say(code, source, args);
+        }
+    }
+    pub fn bad(&self) -> bool {
+        self.list.iter().any(|d| d.severity == gr_text::Severity::Error)
+    }
+}
+
+/// Below this a radius counts as reached and a way as none, mm.
+const TINY: f64 = 1e-9;
+/// Speed of rapids in a line where the machine file has none, mm/s.
+const RAPID: f64 = 250.0;
+/// Largest corner where a program has G64 without a tolerance and the machine file no zone, mm.
+const CORNER: f64 = 0.5;
+/// A change of tool direction is cut so that no piece turns further, rad.
+const TURN_STEP: f64 = 5.0 * PI / 180.0;
+
+pub(crate) struct Gather<'a> {
+    machine: &'a Machine,
+    options: &'a Options,
+    pub findings: Findings<'a>,
+    pub out: Gathered,
+    cells: Cells,
+    source_machine: Option<(Machine, [usize; 2])>,
+    control: Control,
+    planar: bool,
+    /// Coordinates that the program has said.
+    seen: [bool; 3],
+    /// A rapid that waits for the coordinates not yet said.
+    waiting: bool,
+    frame: Option<u16>,
+    tool: Option<u16>,
+    /// Last place, in the base, and the turn there.
+    at: Option<([f64; 3], u32)>,
+    path_said: bool,
+    ended: bool,
+    source: Source,
+}
+
+impl<'a> Gather<'a> {
+    pub fn new(machine: &'a Machine, options: &'a Options, sources: &'a dyn Sources) -> Gather<'a> {
+        let out = Gathered {
+            items: Vec::new(),
+            turns: Vec::new(),
+            arcs: Vec::new(),
+            tools: Vec::new(),
+            frames: Vec::new(),
+            wait_seconds: 0.0,
+        };
+        let control = machine.kinematics().control();
+        let source_machine = match (&machine.orientation, machine.kind) {
+            (Some(Orientation::SourceMachine(id)), _) => gr_machine::builtin(id).and_then(rotary_joints),
+            (_, Kind::Mill) => rotary_joints(machine.clone()),
+            _ => None,
+        };
+        Gather {
+            machine,
+            options,
+            findings: Findings::new(sources),
+            out,
+            cells: Cells::new(machine),
+            source_machine,
+            control,
+            planar: matches!(machine.chain, Chain::Planar3r(_)),
+            seen: [false; 3],
+            waiting: false,
+            frame: None,
+            tool: None,
+            at: None,
+            path_said: false,
+            ended: false,
+            source: Source::default(),
+        }
+    }
+
+    pub fn run(&mut self, program: &Program) {
+        let mut cursor = program.cursor();
+        while let Some(view) = cursor.next() {
+            if self.ended || self.findings.list.len() >= MOST {
+                break;
+            }
+            self.source = view.source;
+            self.op(&view);
+        }
+        if !self.ended {
+            self.end(cursor.state(), None);
+        }
+        self.zones();
+    }
+
+    fn op(&mut self, view: &View<'_, '_>) {
+        match view.op {
+            Op::Rapid => self.rapid(view),
+            Op::Linear | Op::Arc(_) | Op::Nurbs { .. } => self.cut(view),
+            Op::Probe(_) => self.cannot("a probe move"),
+            Op::RigidTap { .. } => self.cannot("rigid tapping (G33.1)"),
+            Op::SyncStart(s) if !s.velocity => self.cannot("a motion locked to the spindle's angle (G33)"),
+            Op::IndexerLock(..) => self.cannot("an indexing axis"),
+            Op::SpindleOrient { .. } | Op::SpindleWait { .. } if self.control == Control::Position => self.yaws(view),
+            Op::SpindleOrient { angle, .. } => self.word("M19", Some(angle.to_degrees())),
+            Op::SpindleWait { .. } => {}
+            Op::RunTime(what) => self.findings.say(code::ROBOT_RUN_TIME, Some(view.source), &[what.to_string()]),
+            Op::ToolOffset(_) => {
+                for i in 0..3 {
+                    self.seen[i] &= view.start.axes[i] == view.end.axes[i];
+                }
+            }
+            Op::PathMode(_) => self.path_said = true,
+            Op::End => {
+                self.end(view.state, Some(view.source));
+                self.ended = true;
+            }
+            _ => self.action(view),
+        }
+    }
+
+    fn action(&mut self, view: &View<'_, '_>) {
+        let state = view.state;
+        match view.op {
+            Op::Dwell(t) if t > 0.0 => {
+                self.out.wait_seconds += t;
+                self.act(Action::Dwell(t));
+            }
+            Op::ToolChange(_) => self.change(state.tool),
+            Op::SpindleSpeed { speed, spindle } => self.speed_word(state, spindle, speed),
+            Op::SpindleTurn { turn, spindle } => self.turn_word(state, spindle, turn),
+            Op::SpindleMode { surface: Some(_), .. } => self.cannot("constant surface speed (G96)"),
+            Op::Mist(on) => self.coolant("M7", on, state),
+            Op::Flood(on) => self.coolant("M8", on, state),
+            Op::DigitalOut { index, on, synced } => {
+                let made = self.cells.digital(index, on, synced);
+                self.made(made);
+            }
+            Op::AnalogOut { index, value, synced } => {
+                let made = self.cells.analog(index, value, synced);
+                self.made(made);
+            }
+            Op::InputWait { index, digital, wait, timeout } => self.input(index, digital, wait, timeout),
+            Op::UserM { code, p, .. } => self.word(&format!("M{code}"), Some(p)),
+            Op::Note(Note::Message, text) => self.act(Action::Message(text.to_string())),
+            Op::Note(_, text) => self.act(Action::Comment(text.to_string())),
+            Op::Begin { text, .. } if !text.is_empty() => self.act(Action::Comment(text.to_string())),
+            Op::Stop(stop) => self.act(Action::Pause { optional: stop == Stop::Optional }),
+            _ => {}
+        }
+    }
+
+    fn cannot(&mut self, what: &str) {
+        self.findings.say(code::ROBOT_CANNOT, Some(self.source), &[what.to_string()]);
+    }
+    fn act(&mut self, action: Action) {
+        self.out.items.push(Item::Do(Step { action, source: Some(self.source) }));
+    }
+    /// Signals of a word, or what the operator must do.
+    fn made(&mut self, made: crate::cell::Made) {
+        if let Some(word) = made.by_hand {
+            let known = self.findings.list.iter().any(|d| d.code == code::ROBOT_BY_HAND && d.message.contains(&format!(" {word} ")));
+            if !known {
+                self.findings.say(code::ROBOT_BY_HAND, Some(self.source), &[word]);
+            }
+        }
+        made.actions.into_iter().for_each(|a| self.act(a));
+    }
+    fn word(&mut self, word: &str, value: Option<f64>) {
+        let made = self.cells.word(word, value, "");
+        self.made(made);
+    }
+
+    fn speed_word(&mut self, state: &State, spindle: i32, speed: f64) {
+        if speed > 0.0
+            && let Some(limit) = self.cells.spindle_limit(speed)
+        {
+            self.findings.say(code::ROBOT_SPINDLE_SPEED, Some(self.source), &[format!("{speed}"), limit]);
+        }
+        let turning = state.spindle(spindle).turn;
+        let made = self.cells.speed(speed, turning);
+        self.made(made);
+    }
+    fn turn_word(&mut self, state: &State, spindle: i32, turn: Turn) {
+        let made = self.cells.turn(turn, state.spindle(spindle).speed);
+        self.made(made);
+    }
+    fn coolant(&mut self, word: &str, on: bool, state: &State) {
+        let made = self.cells.coolant(word, on, state.mist || state.flood);
+        self.made(made);
+    }
+    fn input(&mut self, index: i32, digital: bool, wait: i32, timeout: f64) {
+        if !digital {
+            return self.cannot("waiting for an analog input");
+        }
+        let Some(name) = self.cells.input(index) else {
+            return self.word("M66", Some(f64::from(index)));
+        };
+        let timeout = (timeout > 0.0).then_some(timeout);
+        // 1 rise, 2 fall, 3 high, 4 low; 0 reads at once, and what is read has its own operation.
+        let states: &[bool] = match wait {
+            1 => &[false, true],
+            2 => &[true, false],
+            3 => &[true],
+            4 => &[false],
+            _ => &[],
+        };
+        for on in states {
+            self.act(Action::WaitInput { name: name.clone(), on: *on, timeout });
+        }
+    }
+    fn change(&mut self, tool: i32) {
+        let number = u32::try_from(tool).unwrap_or(0);
+        let by = self.cells.signal("M6");
+        self.act(Action::ChangeTool { number, by });
+    }
+
+    /// The work frame in force; none when it isn't known.
+    fn work(&mut self, state: &State) -> Option<u16> {
+        let name = work_name(state.work);
+        let placement = self.options.placements.iter().rfind(|p| p.line <= self.source.line);
+        let places = |n: &str| self.machine.cell.frames.get(n);
+        let any = (1..=9).find(|n| places(work_name(*n)).is_some());
+        let placed = match (places(name), any, placement) {
+            (_, _, Some(p)) => p.part,
+            (Some(frame), _, _) => *frame,
+            (None, Some(n), _) => {
+                self.findings.say(code::ROBOT_UNKNOWN_FRAME, Some(self.source), &[name.into(), work_name(n).into()]);
+                return None;
+            }
+            (None, None, None) => self.machine.cell.part_in_base(),
+        };
+        let (o, l) = (&state.work_offset, &state.local_offset);
+        let frame = placed
+            .then(&Frame { turn: rot_z(state.rotation), position: [o[0], o[1], o[2]] })
+            .then(&Frame::shift([l[0], l[1], l[2]]));
+        if let Some(last) = self.frame
+            && self.out.frames[usize::from(last)].frame == frame
+            && self.out.frames[usize::from(last)].name.split('_').next() == Some(name)
+        {
+            return Some(last);
+        }
+        let same = self.out.frames.iter().position(|f| f.frame == frame && f.name.split('_').next() == Some(name));
+        let index = same.unwrap_or_else(|| {
+            let more = self.out.frames.iter().filter(|f| f.name.split('_').next() == Some(name)).count();
+            let name = if more == 0 { name.to_string() } else { format!("{name}_{}", more + 1) };
+            self.out.frames.push(WorkFrame { name, frame });
+            self.out.frames.len() - 1
+        });
+        let index = u16::try_from(index).unwrap_or(u16::MAX);
+        self.act(Action::UseFrame(index));
+        self.frame = Some(index);
+        Some(index)
+    }
+
+    /// The tool point in force.
+    fn tool(&mut self, state: &State) -> Option<u16> {
+        let number = u32::try_from(state.tool).unwrap_or(0);
+        let length = state.tool_offset[2];
+        let known = self.machine.cell.tools.get(&number);
+        let nose = self.machine.cell.tool_frame(u32::MAX);
+        let (name, frame, mass) = match known {
+            Some(t) => {
+                let table = t.frame.position[2];
+                if length != 0.0 && (length - table).abs() > 1e-3 {
+                    let args = [number.to_string(), format!("{length:.3}"), format!("{table:.3}")];
+                    let told = self.findings.list.iter().any(|d| d.code == code::ROBOT_TOOL_LENGTH && d.message.contains(&format!("tool {number} ")));
+                    if !told {
+                        self.findings.say(code::ROBOT_TOOL_LENGTH, Some(self.source), &args);
+                    }
+                }
+                (t.name.clone(), nose.then(&t.frame), t.mass)
+            }
+            None if number == 0 && length == 0.0 => ("tool0".to_string(), nose, None),
+            None if length != 0.0 => {
+                if state.tool_offset[0] != 0.0 || state.tool_offset[1] != 0.0 {
+                    self.cannot("a tool offset in X or Y");
+                    return None;
+                }
+                (format!("tool{number}"), nose.then(&Frame::shift([0.0, 0.0, length])), None)
+            }
+            None if self.machine.kind != Kind::Robot => (format!("tool{number}"), nose, None),
+            None => {
+                self.findings.say(code::ROBOT_UNKNOWN_TOOL, Some(self.source), &[number.to_string()]);
+                return None;
+            }
+        };
+        let tool = Tool { number, name, frame, mass };
+        let same = self.out.tools.iter().position(|t| *t == tool);
+        let index = same.unwrap_or_else(|| {
+            self.out.tools.push(tool);
+            self.out.tools.len() - 1
+        });
+        let index = u16::try_from(index).unwrap_or(u16::MAX);
+        if self.tool != Some(index) {
+            self.act(Action::UseTool(index));
+            if self.tool.is_some() {
+                // Another point: where it stands is not where the program goes on.
+                self.at = None;
+            }
+            self.tool = Some(index);
+        }
+        Some(index)
+    }
+
+    /// Rotary words with their offsets.
+    fn rotary(&self, pose: &Pose, state: &State) -> [f64; 3] {
+        [3, 4, 5].map(|i| pose.axes[i] + state.work_offset[i] + state.local_offset[i] + state.tool_offset[i])
+    }
+
+    /// How the tool is turned in the work frame; none when the machine file doesn't say.
+    fn turn(&mut self, pose: &Pose, state: &State) -> Option<M3> {
+        let up = self.machine.kind == Kind::Robot;
+        if let Some(axis) = pose.tool_axis {
+            return Some(along(if up { scale(axis, -1.0) } else { axis }, pose.spin.unwrap_or(0.0)));
+        }
+        let words = self.rotary(pose, state);
+        let still = if up && !self.planar && self.control != Control::Position { rot_x(PI) } else { euler([0.0; 3]) };
+        let some = (0..3).find(|i| words[*i] != 0.0);
+        match (&self.machine.orientation, some) {
+            (_, Some(i)) if self.control == Control::Position => {
+                let _ = i;
+                None
+            }
+            (Some(Orientation::AbcEulerXyz), _) => Some(product(&euler(words), &still)),
+            (_, None) if self.source_machine.is_none() => Some(still),
+            (Some(Orientation::SourceMachine(_)), _) | (None, _) if self.source_machine.is_some() => {
+                let (machine, at) = self.source_machine.as_ref()?;
+                let mut joints = vec![0.0; machine.joints.len()];
+                for (slot, word) in at.iter().zip(rotary_letters(machine, *at)) {
+                    joints[*slot] = words[word];
+                }
+                let turn = machine.kinematics().forward_frame(&joints).ok()?.turn;
+                Some(if up { product(&turn, &rot_x(PI)) } else { turn })
+            }
+            (_, Some(i)) => {
+                self.findings.say(code::ROBOT_ROTARY_WORDS, Some(self.source), &[["A", "B", "C"][i].into()]);
+                None
+            }
+            _ => Some(still),
+        }
+    }
+
+    fn turn_index(&mut self, turn: M3) -> u32 {
+        if self.out.turns.last() != Some(&turn) {
+            self.out.turns.push(turn);
+        }
+        u32::try_from(self.out.turns.len() - 1).unwrap_or(u32::MAX)
+    }
+
+    /// A machine whose tool turns with its place can't do what needs a direction.
+    fn yaws(&mut self, view: &View<'_, '_>) {
+        let frame = self.frame.map_or(self.machine.cell.part_in_base(), |f| self.out.frames[usize::from(f)].frame);
+        let k = self.machine.kinematics();
+        let yaw = |p: [f64; 3]| {
+            let joints = k.inverse_frame(&Frame::shift(frame.apply(p))).ok()?;
+            let pose = k.forward(&joints.first()?.joints).ok()?;
+            Some(format!("{:.2}°", pose.rotation[2].to_degrees()))
+        };
+        let show = |p: [f64; 3]| yaw(p).unwrap_or_else(|| "its place".into());
+        let args = [show(view.start.xyz()), show(view.end.xyz())];
+        self.findings.say(code::ROBOT_YAWS, Some(self.source), &args);
+    }
+
+    fn foreign(&mut self, view: &View<'_, '_>) -> bool {
+        let moved = (6..9).any(|i| view.start.axes[i] != view.end.axes[i]);
+        if moved {
+            self.cannot("a move of U, V or W");
+        }
+        if self.control == Control::Position {
+            let turned = (3..6).any(|i| view.start.axes[i] != view.end.axes[i]) || view.end.spin.is_some();
+            let leaned = view.end.tool_axis.is_some_and(|a| a[2] < 1.0 - 1e-9);
+            if turned || leaned {
+                self.yaws(view);
+                return true;
+            }
+        }
+        moved
+    }
+
+    fn free(&self, tool: u16) -> bool {
+        if self.machine.cell.spindle.is_none() || self.control != Control::Full || self.machine.joints.len() < 6 {
+            return false;
+        }
+        let f = &self.out.tools[usize::from(tool)].frame;
+        let on_axis = f.position[0].abs() < TINY && f.position[1].abs() < TINY && f.turn[2][2].abs() > 1.0 - 1e-12;
+        !on_axis
+    }
+
+    fn base(&self, frame: u16, position: [f64; 3]) -> [f64; 3] {
+        self.out.frames[usize::from(frame)].frame.apply(position)
+    }
+
+    fn push(&mut self, m: Move) {
+        self.at = Some((self.base(m.frame, m.position), m.turn));
+        self.out.items.push(Item::Move(m));
+    }
+
+    /// Comes to a place by rapid; the first time from home, from above.
+    fn come(&mut self, frame: u16, tool: u16, position: [f64; 3], turn: u32) {
+        let first = !self.out.items.iter().any(|i| matches!(i, Item::Move(_)));
+        let here = self.base(frame, position);
+        let length = self.at.map_or(0.0, |(p, _)| norm(sub(here, p)));
+        let joint = self.joint_share();
+        let m = Move {
+            way: Way::Joint,
+            position,
+            turn,
+            frame,
+            tool,
+            speed: joint,
+            zone: self.zone_of_rapid(),
+            length,
+            rapid: true,
+            free: self.free(tool),
+            ours: false,
+            source: Some(self.source),
+        };
+        if first && self.options.approach > 0.0 && self.machine.kind == Kind::Robot {
+            let above = self.above(position, turn);
+            self.push(Move { position: above, ours: true, source: None, zone: Zone::Stop, ..m });
+            return self.push(Move { way: Way::Line, speed: self.rapid_speed(), length: self.options.approach, ..m });
+        }
+        let linear = self.at.is_some_and(|(from, was)| was == turn && self.straight(from, here, frame, turn));
+        if linear {
+            self.push(Move { way: Way::Line, speed: self.rapid_speed(), ..m });
+        } else {
+            self.push(m);
+        }
+    }
+
+    /// A rapid in a line: the machine does all so, or it goes along the tool's own axis, as in a hole.
+    fn straight(&self, from: [f64; 3], to: [f64; 3], frame: u16, turn: u32) -> bool {
+        if self.machine.cell.rapid == Some(Rapid::Linear) || self.machine.kind == Kind::Mill {
+            return true;
+        }
+        let z = self.out.frames[usize::from(frame)].frame.then(&Frame::turned(self.out.turns[turn as usize])).axis(2);
+        let way = sub(to, from);
+        let length = norm(way);
+        length > TINY && norm(sub(way, scale(z, dot(way, z)))) < 1e-6
+    }
+
+    fn joint_share(&self) -> f64 {
+        (self.machine.cell.joint_speed.unwrap_or(100.0) / 100.0).clamp(0.001, 1.0)
+    }
+    fn rapid_speed(&self) -> f64 {
+        self.machine.cell.rapid_speed.unwrap_or(RAPID)
+    }
+    /// A place straight above along the tool.
+    fn above(&self, position: [f64; 3], turn: u32) -> [f64; 3] {
+        let m = &self.out.turns[turn as usize];
+        let sign = if self.machine.kind == Kind::Robot && self.control != Control::Position && !self.planar { -1.0 } else { 1.0 };
+        [0, 1, 2].map(|i| position[i] + sign * m[i][2] * self.options.approach)
+    }
+
+    fn rapid(&mut self, view: &View<'_, '_>) {
+        if self.foreign(view) {
+            return;
+        }
+        for i in 0..3 {
+            self.seen[i] |= view.start.axes[i] != view.end.axes[i];
+        }
+        self.waiting = self.seen != [true; 3];
+        if !self.waiting {
+            self.go_to(view.end, view.state);
+        }
+    }
+
+    fn go_to(&mut self, pose: &Pose, state: &State) {
+        let (Some(frame), Some(tool)) = (self.work(state), self.tool(state)) else { return };
+        let Some(turn) = self.turn(pose, state) else { return };
+        let turn = self.turn_index(turn);
+        if self.at.is_none_or(|(p, t)| t != turn || norm(sub(p, self.base(frame, pose.xyz()))) > TINY) {
+            self.come(frame, tool, pose.xyz(), turn);
+        }
+    }
+
+    fn zone_of_rapid(&self) -> Zone {
+        match self.machine.cell.zones.default {
+            Some(z) if z > 0.0 => Zone::Blend(z),
+            _ => Zone::Stop,
+        }
+    }
+
+    fn zone(&self, state: &State) -> Zone {
+        let zones = &self.machine.cell.zones;
+        let size = match state.path {
+            PathMode::ExactStop => 0.0,
+            _ if !self.path_said => zones.default.unwrap_or(0.0),
+            PathMode::ExactPath => 0.0,
+            PathMode::Blend(t) if t > 0.0 => t,
+            PathMode::Blend(_) => zones.default.or(zones.max).unwrap_or(CORNER),
+        };
+        let size = zones.max.map_or(size, |m| size.min(m));
+        if size > 0.0 { Zone::Blend(size) } else { Zone::Stop }
+    }
+
+    /// Speed of the tool point, mm/s.
+    fn speed(&mut self, state: &State, length: f64) -> Option<f64> {
+        let rpm = |spindle: i32| {
+            let s = state.spindle(spindle);
+            if s.surface.is_some() || s.turn == Turn::Stop { 0.0 } else { s.speed.abs() }
+        };
+        let speed = match (state.sync, state.feed_mode) {
+            (Some(s), _) => s.per_rev * rpm(s.spindle) / 60.0,
+            (None, FeedMode::Inverse) if length > 0.0 => length * state.feed,
+            (None, FeedMode::PerRev) => state.feed * rpm(state.feed_spindle) / 60.0,
+            _ => state.feed,
+        };
+        if speed > 0.0 && speed.is_finite() {
+            return Some(speed);
+        }
+        let why = match state.feed_mode {
+            FeedMode::PerRev => "feed per revolution needs a turning spindle",
+            FeedMode::Inverse => "inverse time needs an F above 0 in this block",
+            FeedMode::PerTime => "there is no feed",
+        };
+        self.findings.say(code::ROBOT_FEED, Some(self.source), &[why.to_string()]);
+        None
+    }
+
+    fn cut(&mut self, view: &View<'_, '_>) {
+        if self.foreign(view) {
+            return;
+        }
+        let state = view.state;
+        self.seen = [true; 3];
+        self.waiting = false;
+        let (Some(frame), Some(tool)) = (self.work(state), self.tool(state)) else { return };
+        let (Some(from), Some(to)) = (self.turn(view.start, state), self.turn(view.end, state)) else { return };
+        let length = match gr_ir::geometry::length(&view.op, view.start, view.end) {
+            gr_ir::geometry::Length::Linear(mm) => mm,
+            gr_ir::geometry::Length::Angular(_) => 0.0,
+        };
+        let angle = norm(rotation_vector(&product(&transpose(&from), &to)));
+        let words = (3..6).fold(0.0f64, |a, i| a.max((view.end.axes[i] - view.start.axes[i]).abs()));
+        if length <= TINY && words == 0.0 && angle < 1e-12 {
+            return;
+        }
+        let Some(speed) = self.speed(state, length) else { return };
+        let start = self.turn_index(from);
+        let here = self.base(frame, view.start.xyz());
+        if self.at.is_none_or(|(p, t)| norm(sub(p, here)) > 1e-6 || t != start && self.out.turns[t as usize] != from) {
+            self.come(frame, tool, view.start.xyz(), start);
+        }
+        if length <= TINY {
+            self.findings.once(code::ROBOT_TURN_SPEED, Some(self.source), &[]);
+        }
+        let m = Move {
+            way: Way::Line,
+            position: view.end.xyz(),
+            turn: start,
+            frame,
+            tool,
+            speed,
+            zone: self.zone(state),
+            length,
+            rapid: false,
+            free: self.free(tool),
+            ours: false,
+            source: Some(self.source),
+        };
+        match view.op {
+            _ if angle.max(words) > 1e-12 => self.turning(view, m, angle.max(words)),
+            Op::Arc(arc) => self.arc(view, ArcShape::new(&arc, view.start, view.end), m),
+            Op::Nurbs { .. } => self.pieces(view, m),
+            _ => self.push(m),
+        }
+    }
+
+    /// A move in which the tool turns: cut so that words and directions agree within a small angle.
+    fn turning(&mut self, view: &View<'_, '_>, m: Move, angle: f64) {
+        let by_turn = libm::ceil(angle / TURN_STEP - 1e-9).clamp(1.0, 10_000.0) as usize;
+        let mut points: Vec<[f64; 9]> = vec![view.start.axes];
+        gr_ir::geometry::flatten(&view.op, view.start, view.end, self.options.tolerance, |p| points.push(*p));
+        let each = by_turn.div_ceil(points.len() - 1).max(1);
+        let total = (points.len() - 1) * each;
+        let axis = |share: f64| match (view.start.tool_axis, view.end.tool_axis) {
+            (Some(a), Some(b)) => {
+                let v = [0, 1, 2].map(|i| a[i] + (b[i] - a[i]) * share);
+                let l = norm(v);
+                if l > 1e-9 { Some(scale(v, 1.0 / l)) } else { Some(b) }
+            }
+            (_, b) => b,
+        };
+        let mut done = 0;
+        for pair in points.windows(2) {
+            for k in 1..=each {
+                done += 1;
+                let share = k as f64 / each as f64;
+                let axes: [f64; 9] = std::array::from_fn(|i| pair[0][i] + (pair[1][i] - pair[0][i]) * share);
+                let whole = done as f64 / total as f64;
+                let pose = Pose { axes, tool_axis: axis(whole), spin: view.end.spin };
+                let Some(turn) = self.turn(&pose, view.state) else { return };
+                let turn = self.turn_index(turn);
+                self.push(Move { position: pose.xyz(), turn, length: m.length / total as f64, ..m });
+            }
+        }
+    }
+
+    fn pieces(&mut self, view: &View<'_, '_>, m: Move) {
+        let mut points: Vec<[f64; 3]> = Vec::new();
+        gr_ir::geometry::flatten(&view.op, view.start, view.end, self.options.tolerance, |p| points.push([p[0], p[1], p[2]]));
+        let mut last = view.start.xyz();
+        for p in points {
+            let length = norm(sub(p, last));
+            if length > TINY {
+                self.push(Move { position: p, length, ..m });
+                last = p;
+            }
+        }
+    }
+
+    fn arc(&mut self, view: &View<'_, '_>, shape: ArcShape, m: Move) {
+        let mismatch = (shape.radius - shape.end_radius).abs();
+        if shape.rise.abs() > TINY || mismatch > self.options.tolerance || !(shape.radius > TINY) {
+            return self.pieces(view, m);
+        }
+        let count = libm::ceil(shape.sweep.abs() / PI - 1e-9).max(1.0) as usize;
+        let angle = shape.sweep.abs() / count as f64;
+        let sagitta = shape.radius * (1.0 - libm::cos(angle / 2.0));
+        if sagitta < self.options.tolerance.min(1e-3) && shape.sweep.abs() < 0.5 {
+            return self.push(m);
+        }
+        let normal = if shape.sweep < 0.0 { scale(shape.normal, -1.0) } else { shape.normal };
+        for k in 0..count {
+            let share = |s: f64| (k as f64 + s) / count as f64;
+            let position = if k + 1 == count { view.end.xyz() } else { shape.point(share(1.0)) };
+            let piece = ArcPiece { center: shape.center, normal, via: shape.point(share(0.5)), angle };
+            self.out.arcs.push(piece);
+            let index = u32::try_from(self.out.arcs.len() - 1).unwrap_or(u32::MAX);
+            let zone = if k + 1 == count { m.zone } else { through(m.zone) };
+            self.push(Move { way: Way::Arc(index), position, length: m.length / count as f64, zone, ..m });
+        }
+    }
+
+    /// Retract, everything off, home.
+    fn end(&mut self, state: &State, source: Option<Source>) {
+        if self.waiting && !self.out.items.iter().any(|i| matches!(i, Item::Move(_))) {
+            // A program of rapids alone that never said all coordinates.
+            self.waiting = false;
+        }
+        let last = self.out.items.iter().rev().find_map(|i| if let Item::Move(m) = i { Some(*m) } else { None });
+        if let Some(m) = last.filter(|_| self.options.approach > 0.0 && self.machine.kind == Kind::Robot) {
+            let above = self.above(m.position, m.turn);
+            let speed = self.rapid_speed();
+            let length = self.options.approach;
+            self.push(Move { way: Way::Line, position: above, speed, length, rapid: true, ours: true, zone: Zone::Stop, source: None, ..m });
+        }
+        let made = self.cells.off();
+        let _ = state;
+        self.made(made);
+        if let Some(source) = source {
+            self.source = source;
+        }
+    }
+
+    /// Zones: at most half of both neighbours, none before actions and where a cut and a rapid meet.
+    fn zones(&mut self) {
+        let items = &mut self.out.items;
+        for i in 0..items.len() {
+            let next = items[i + 1..].iter().find(|n| !silent(n));
+            let (length, rapid, joint) = match next {
+                Some(Item::Move(n)) => (n.length, n.rapid, n.way == Way::Joint),
+                _ => (0.0, false, false),
+            };
+            if let Item::Move(m) = &mut items[i]
+                && let Zone::Blend(size) = m.zone
+            {
+                let fits = m.rapid == rapid && (m.way == Way::Joint) == joint;
+                let size = size.min(m.length / 2.0).min(length / 2.0);
+                m.zone = if fits && size > 1e-6 { Zone::Blend(size) } else { Zone::Stop };
+            }
+        }
+    }
+}
+
+/// What makes no stop.
+fn silent(item: &Item) -> bool {
+    matches!(item, Item::Do(Step { action: Action::Comment(_) | Action::UseFrame(_), .. }))
+}
+
+/// Between the halves of one arc nothing stops.
+fn through(zone: Zone) -> Zone {
+    match zone {
+        Zone::Stop => Zone::Blend(0.1),
+        z => z,
+    }
+}
+
+/// A frame with this Z; X as near to the X of the work frame as can be, then turned about Z.
+fn along(z: [f64; 3], spin: f64) -> M3 {
+    let l = norm(z).max(f64::MIN_POSITIVE);
+    let z = scale(z, 1.0 / l);
+    let help = if z[0].abs() < 0.9 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] };
+    let x = sub(help, scale(z, dot(help, z)));
+    let x = scale(x, 1.0 / norm(x).max(f64::MIN_POSITIVE));
+    let y = gr_machine::math::cross(z, x);
+    let turn = [[x[0], y[0], z[0]], [x[1], y[1], z[1]], [x[2], y[2], z[2]]];
+    if spin == 0.0 { turn } else { product(&turn, &rot_z(spin)) }
+}
+
+/// A five-axis machine and the places of its rotary joints.
+fn rotary_joints(machine: Machine) -> Option<(Machine, [usize; 2])> {
+    matches!(machine.chain, Chain::FiveAxis(_)).then_some((machine, [3, 4]))
+}
+
+/// Which of the words A B C drives each rotary joint.
+fn rotary_letters(machine: &Machine, at: [usize; 2]) -> [usize; 2] {
+    at.map(|i| match machine.joints[i].word.or_else(|| machine.joints[i].name.chars().next()) {
+        Some('A' | 'a') => 0,
+        Some('B' | 'b') => 1,
+        _ => 2,
+    })
+}
+
+/// `G54` … `G59.3`.
+pub(crate) fn work_name(number: u8) -> &'static str {
+    const NAMES: [&str; 9] = ["G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3"];
+    NAMES[usize::from(number.clamp(1, 9)) - 1]
+}

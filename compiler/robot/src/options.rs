@@ -1,0 +1,104 @@
+//! What can be chosen when a program is planned, and what comes of it.
+
+use gr_ir::Source;
+use gr_machine::math::Frame;
+use gr_text::Diagnostic;
+
+use crate::RobotProgram;
+
+/// What can be chosen.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Options {
+    /// Name of the program.
+    pub name: String,
+    /// Greatest distance of straight pieces from a curve that is no arc of the robot's, mm.
+    pub tolerance: f64,
+    /// How far above its first and last point the tool comes and leaves, mm; 0 = not at all.
+    pub approach: f64,
+    /// Where no configuration fits a whole cut, lift the tool by this much, change, and go on, mm.
+    pub reconfigure: Option<f64>,
+    /// Placements of the part in the base that hold from a line of the program on (a job's setups), by line.
+    pub placements: Vec<Placement>,
+}
+
+/// Where the part is, from a line of the main program on.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Placement {
+    /// Name of the setup.
+    pub name: String,
+    /// First line, from 0.
+    pub line: u32,
+    /// The part's frame in the base.
+    pub part: Frame,
+}
+
+impl Default for Options {
+    fn default() -> Options {
+        Options { name: "program".into(), tolerance: 0.01, approach: 50.0, reconfigure: None, placements: Vec::new() }
+    }
+}
+
+/// A planned program and what is worth knowing about it.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Planned {
+    /// The motion.
+    pub program: RobotProgram,
+    /// Warnings.
+    pub warnings: Vec<Diagnostic>,
+    /// Figures.
+    pub summary: Summary,
+}
+
+/// Figures of a planned program.
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
+pub struct Summary {
+    /// Cutting moves.
+    pub cuts: usize,
+    /// Arcs among them.
+    pub arcs: usize,
+    /// Rapids.
+    pub rapids: usize,
+    /// Time at feed, s.
+    pub cut_seconds: f64,
+    /// Time of rapids, without acceleration, s.
+    pub rapid_seconds: f64,
+    /// Time of dwells, s.
+    pub wait_seconds: f64,
+    /// Least distance of the wrist from the border of its reach, mm, and where.
+    pub reach_margin: Option<(f64, Option<Source>)>,
+    /// Least share of a joint's range that is left to a limit, 0 … 0.5: joint and where.
+    pub limit_margin: Option<(f64, usize, Option<Source>)>,
+    /// Least angle to a singular position, rad, and where; by wrist, elbow and shoulder.
+    pub singularity: Option<(f64, Singularity, Option<Source>)>,
+    /// Greatest share of a joint's speed limit at the programmed feeds: joint and where.
+    pub joint_speed: Option<(f64, usize, Option<Source>)>,
+}
+
+/// Which axes come into line.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Singularity {
+    /// Fourth and sixth.
+    Wrist,
+    /// Arm stretched or folded.
+    Elbow,
+    /// Wrist over the first axis.
+    Shoulder,
+}
+
+impl Singularity {
+    /// In words.
+    pub fn words(self) -> &'static str {
+        match self {
+            Singularity::Wrist => "the wrist is straight",
+            Singularity::Elbow => "the arm is stretched",
+            Singularity::Shoulder => "the wrist is over the first axis",
+        }
+    }
+}
+
+impl Summary {
+    /// All time, s.
+    pub fn seconds(&self) -> f64 {
+        self.cut_seconds + self.rapid_seconds + self.wait_seconds
+    }
+}

@@ -1,0 +1,81 @@
+//! The real path of a move: the tool frame at any share of the way, and how finely it must be looked at.
+
+use gr_machine::math::{Frame, M3, about, add, norm, product, rot_z, rotate, rotation_vector, scale, sub, transpose};
+
+use crate::gather::{ArcPiece, Gathered, Move, Way};
+
+/// One move between two tool frames in its work frame.
+pub(crate) struct Path {
+    from: [f64; 3],
+    to: [f64; 3],
+    turn: M3,
+    /// Rotation vector from the first to the last turn, in the work frame.
+    vector: [f64; 3],
+    angle: f64,
+    arc: Option<ArcPiece>,
+    pub length: f64,
+}
+
+/// Longest stretch between two looks, mm and rad.
+const STEP: f64 = 10.0;
+const ANGLE: f64 = 0.1;
+
+impl Path {
+    pub fn new(g: &Gathered, from: [f64; 3], from_turn: u32, m: &Move) -> Path {
+        let (a, b) = (&g.turns[from_turn as usize], &g.turns[m.turn as usize]);
+        let vector = if from_turn == m.turn { [0.0; 3] } else { rotation_vector(&product(b, &transpose(a))) };
+        let arc = if let Way::Arc(i) = m.way { Some(g.arcs[i as usize]) } else { None };
+        let length = arc.map_or_else(|| norm(sub(m.position, from)), |a| norm(sub(from, a.center)) * a.angle);
+        Path { from, to: m.position, turn: *a, vector, angle: norm(vector), arc, length }
+    }
+
+    /// Into how many stretches it is cut to be looked at.
+    pub fn looks(&self) -> usize {
+        let turned = self.angle.max(self.arc.map_or(0.0, |a| a.angle / 2.0));
+        let count = (self.length / STEP).max(turned / ANGLE);
+        libm::ceil(count).clamp(1.0, 100_000.0) as usize
+    }
+
+    pub fn position(&self, share: f64) -> [f64; 3] {
+        match &self.arc {
+            _ if share >= 1.0 => self.to,
+            Some(a) => {
+                let arm = sub(self.from, a.center);
+                let turned = rotate(&about(a.normal, a.angle * share), arm);
+                add(a.center, turned)
+            }
+            None => [0, 1, 2].map(|i| self.from[i] + (self.to[i] - self.from[i]) * share),
+        }
+    }
+
+    pub fn turn(&self, share: f64) -> M3 {
+        if self.angle < 1e-12 {
+            return self.turn;
+        }
+        product(&about(scale(self.vector, 1.0 / self.angle), self.angle * share), &self.turn)
+    }
+
+    /// The tool frame in the work frame.
+    pub fn at(&self, share: f64) -> Frame {
+        Frame { turn: self.turn(share), position: self.position(share) }
+    }
+}
+
+/// From a tool frame in a work frame to the flange in the base.
+#[derive(Clone, Copy)]
+pub(crate) struct Mount {
+    frame: Frame,
+    /// Turn about the tool's axis, then from the tool point to the flange.
+    tail: Frame,
+}
+
+impl Mount {
+    pub fn new(g: &Gathered, m: &Move, spin: f64) -> Mount {
+        let back = g.tools[usize::from(m.tool)].frame.inverse();
+        let tail = if spin == 0.0 || !m.free { back } else { Frame::turned(rot_z(spin)).then(&back) };
+        Mount { frame: g.frames[usize::from(m.frame)].frame, tail }
+    }
+    pub fn flange(&self, tool: &Frame) -> Frame {
+        self.frame.then(tool).then(&self.tail)
+    }
+}

@@ -1,0 +1,308 @@
+//! All passes in order: gather, choose, emit; and what goes wrong in them as findings at source lines.
+
+use gr_ir::{Program, Sources};
+use gr_machine::math::{Frame, M3, product, rot_z};
+use gr_machine::{Chain as MachineChain, Kind, KinematicsError, Machine};
+use gr_text::{Diagnostic, code};
+
+use crate::choose::{Chain, Chooser, Fault, Node, Why, chains};
+use crate::emit::Emit;
+use crate::gather::{Findings, Gather, Gathered, Item, Move, Way};
+use crate::path::{Mount, Path};
+use crate::solver::{Branches, Joints, Limits, Solver};
+use crate::{MAX_JOINTS, Options, Planned, Zone};
+
+/// Speed of a joint the machine file gives none for, rad/s or mm/s.
+const CALM: f64 = std::f64::consts::FRAC_PI_2;
+const CALM_SLIDE: f64 = 200.0;
+
+/// Plans the motion of one machine. With errors there is no result, and the list holds everything that was found.
+pub fn plan(program: &Program, machine: &Machine, sources: &dyn Sources, options: &Options) -> Result<Planned, Vec<Diagnostic>> {
+    let mut gather = Gather::new(machine, options, sources);
+    if let MachineChain::Incomplete { .. } = machine.chain {
+        let why = machine.kinematics().forward(&[]).err().map_or(String::new(), |e| e.to_string());
+        gather.findings.say(code::ROBOT_HOME, None, &[why]);
+        return Err(gather.findings.list);
+    }
+    gather.run(program);
+    let Gather { out: gathered, findings, .. } = gather;
+    let mut planner = Planner {
+        machine,
+        options,
+        g: gathered,
+        findings,
+        solver: Solver::new(machine),
+        limits: Limits::new(machine),
+        speeds: speeds(machine),
+    };
+    planner.run()
+}
+
+/// Greatest speed of each joint in a rapid.
+pub(crate) fn speeds(machine: &Machine) -> Joints {
+    let mut out = [CALM; MAX_JOINTS];
+    for (slot, j) in out.iter_mut().zip(&machine.joints) {
+        let calm = if j.kind == gr_machine::JointKind::Revolute { CALM } else { CALM_SLIDE };
+        *slot = j.rapid.or(j.speed).unwrap_or(calm);
+    }
+    out
+}
+
+struct Planner<'a> {
+    machine: &'a Machine,
+    options: &'a Options,
+    g: Gathered,
+    findings: Findings<'a>,
+    solver: Solver,
+    limits: Limits,
+    speeds: Joints,
+}
+
+impl Planner<'_> {
+    fn run(&mut self) -> Result<Planned, Vec<Diagnostic>> {
+        let home = self.home();
+        self.drop_unreachable();
+        let mut chosen = Vec::new();
+        let mut list = Vec::new();
+        if let Some(home) = home {
+            list = self.nodes(&mut chosen);
+            if !self.findings.bad() {
+                chosen = vec![self.chooser().cheapest(&chosen, &home)];
+            }
+        }
+        let (Some(home), false) = (home, self.findings.bad()) else { return Err(std::mem::take(&mut self.findings.list)) };
+        let nodes: Vec<Node> = chosen.into_iter().next().unwrap_or_default();
+        let emitted = Emit::new(self.machine, &self.solver, &self.limits, &self.speeds, &self.options.name).run(&mut self.g, &list, &nodes, &home, &mut self.findings);
+        if self.findings.bad() {
+            return Err(std::mem::take(&mut self.findings.list));
+        }
+        let (program, summary) = emitted;
+        Ok(Planned { program, warnings: std::mem::take(&mut self.findings.list), summary })
+    }
+
+    fn chooser(&self) -> Chooser<'_> {
+        let count = chains(&self.g.items).len().max(1);
+        Chooser { g: &self.g, solver: &self.solver, limits: &self.limits, speeds: self.speeds, kept: (2_000_000 / count).clamp(8, 48) }
+    }
+
+    /// Joint values of the home position.
+    fn home(&mut self) -> Option<Joints> {
+        let cell = &self.machine.cell;
+        let given = cell.home.clone().or_else(|| self.machine.start_joints.clone());
+        let given = given.or_else(|| {
+            let frame = self.machine.start.frame();
+            self.machine.kinematics().inverse_frame(&frame).ok().and_then(|all| all.into_iter().next()).map(|s| s.joints)
+        });
+        let Some(given) = given else {
+            self.findings.say(code::ROBOT_HOME, None, &["the machine file gives none, and the start can't be reached".into()]);
+            return None;
+        };
+        let mut out = [0.0; MAX_JOINTS];
+        for (slot, v) in out.iter_mut().zip(&given) {
+            *slot = *v;
+        }
+        if let Some((i, v)) = self.machine.outside(&given).into_iter().next() {
+            let joint = &self.machine.joints[i];
+            self.findings.say(code::ROBOT_HOME, None, &[format!("joint {} would be at {}, outside its limits", joint.name, joint.show(v))]);
+            return None;
+        }
+        Some(out)
+    }
+
+    /// Approach and retract that can't be had are left out.
+    fn drop_unreachable(&mut self) {
+        let last = self.g.items.iter().rposition(|i| matches!(i, Item::Move(_)));
+        let ours: Vec<usize> = (0..self.g.items.len()).filter(|i| matches!(&self.g.items[*i], Item::Move(m) if m.ours)).collect();
+        for i in ours.into_iter().rev() {
+            let Item::Move(m) = &self.g.items[i] else { continue };
+            if !self.stands(m) {
+                self.leave_out(i, Some(i) == last);
+            }
+        }
+    }
+
+    fn stands(&self, m: &Move) -> bool {
+        let spins: Vec<f64> = if m.free { (0..24).map(|k| f64::from(k) * std::f64::consts::TAU / 24.0).collect() } else { vec![0.0] };
+        let tool = Frame { turn: self.g.turns[m.turn as usize], position: m.position };
+        let mut all = Branches::NONE;
+        spins.into_iter().any(|spin| {
+            self.solver.all(&Mount::new(&self.g, m, spin).flange(&tool), &mut all).is_ok()
+                && (0..8).any(|b| {
+                    all.has(b) && {
+                        let q = all.joints[usize::from(b)];
+                        (0..self.solver.count).all(|j| self.limits.shifts(j, q[j], q[j]).is_some())
+                            && self.limits.coupled_outside(&q).is_none()
+                            && self.solver.violations(&q).is_empty()
+                    }
+                })
+        })
+    }
+
+    fn leave_out(&mut self, i: usize, last: bool) {
+        let which = if last { "last" } else { "first" };
+        let source = self.g.items.iter().find_map(|i| if let Item::Move(Move { source: Some(s), .. }) = i { Some(*s) } else { None });
+        let args = [format!("{}", self.options.approach), which.to_string()];
+        if let Some((file, line)) = source.map(|s| (s.file, s.line)) {
+            let _ = (file, line);
+        }
+        self.findings.say(code::ROBOT_NO_APPROACH, source, &args);
+        let Item::Move(m) = self.g.items.remove(i) else { return };
+        if m.way == Way::Joint
+            && let Some(Item::Move(next)) = self.g.items.get_mut(i..).and_then(|rest| rest.iter_mut().find(|n| matches!(n, Item::Move(_))))
+        {
+            *next = Move { way: Way::Joint, speed: m.speed, zone: Zone::Stop, rapid: true, ..*next };
+        }
+    }
+
+    /// Nodes of all chains; a chain without any is a finding, or is divided where that was asked for.
+    fn nodes(&mut self, out: &mut Vec<Vec<Node>>) -> Vec<Chain> {
+        let mut list = chains(&self.g.items);
+        let mut k = 0;
+        while k < list.len() {
+            let chain = list[k];
+            let found = self.chooser().nodes(chain);
+            match found {
+                Ok(nodes) => {
+                    out.push(nodes);
+                    k += 1;
+                }
+                Err(fault) => {
+                    if self.without_ours(chain) || self.divided(chain, &fault) {
+                        list = chains(&self.g.items);
+                        continue;
+                    }
+                    self.tell(chain, &fault);
+                    k += 1;
+                    if fault.item < chain.last && !self.full() {
+                        // What comes after is told too, as if the machine stood there.
+                        list.insert(k, Chain { first: fault.item, last: chain.last });
+                        if fault.item == chain.first {
+                            list[k].first = self.next_move(fault.item).unwrap_or(chain.last);
+                        }
+                    }
+                    if self.full() {
+                        break;
+                    }
+                }
+            }
+        }
+        list
+    }
+
+    fn full(&self) -> bool {
+        self.findings.list.len() >= 100
+    }
+    fn next_move(&self, after: usize) -> Option<usize> {
+        (after + 1..self.g.items.len()).find(|i| matches!(self.g.items[*i], Item::Move(_)))
+    }
+
+    /// Tries again without approach and retract.
+    fn without_ours(&mut self, chain: Chain) -> bool {
+        let found = (chain.first..=chain.last).rev().find(|i| matches!(&self.g.items[*i], Item::Move(m) if m.ours));
+        let Some(i) = found else { return false };
+        let last = self.next_move(i).is_none();
+        self.leave_out(i, last);
+        true
+    }
+
+    /// Puts a retract, a change of configuration and a return before the move that can't be done.
+    fn divided(&mut self, chain: Chain, fault: &Fault) -> bool {
+        let Some(height) = self.options.reconfigure else { return false };
+        let before = (chain.first..fault.item).rev().find(|i| matches!(self.g.items[*i], Item::Move(_)));
+        let Some(at) = before.filter(|at| *at > chain.first) else { return false };
+        let Item::Move(m) = &self.g.items[at] else { return false };
+        let m = *m;
+        let axis: M3 = self.g.turns[m.turn as usize];
+        let sign = if self.machine.kind == Kind::Robot { -1.0 } else { 1.0 };
+        let up = [0, 1, 2].map(|i| m.position[i] + sign * axis[i][2] * height);
+        let speed = self.machine.cell.rapid_speed.unwrap_or(100.0);
+        let lift = Move { way: Way::Line, position: up, speed, zone: Zone::Stop, length: height, rapid: true, ..m };
+        let change = Move { way: Way::Joint, speed: 0.5, length: 0.0, ..lift };
+        let back = Move { position: m.position, ..lift };
+        if let Item::Move(m) = &mut self.g.items[at] {
+            m.zone = Zone::Stop;
+        }
+        let more = [lift, change, back].map(Item::Move);
+        self.g.items.splice(at + 1..at + 1, more);
+        true
+    }
+
+    fn tell(&mut self, chain: Chain, fault: &Fault) {
+        let Item::Move(m) = &self.g.items[fault.item] else { return };
+        let m = *m;
+        let at = show(fault.position);
+        let source = fault.source.or(m.source);
+        let first = match &self.g.items[chain.first] {
+            Item::Move(f) => f.source.map_or(0, |s| s.line + 1),
+            Item::Do(_) => 0,
+        };
+        match &fault.why {
+            Why::Reach(KinematicsError::Direction) | Why::Reach(KinematicsError::OutOfPlane { .. }) if self.solver.count < 6 && self.solver.control == gr_machine::Control::Full => {
+                self.findings.say(code::ROBOT_SEVERAL_SETUPS, source, &[]);
+            }
+            Why::Reach(e) if fault.share < 1.0 && m.way != Way::Joint && self.stands(&m) => {
+                self.findings.say(code::ROBOT_LEAVES_WORKSPACE, source, &[at, e.to_string()]);
+            }
+            Why::Reach(KinematicsError::Singular) => self.findings.say(code::ROBOT_SINGULAR, source, &[format!("{at}; {}", KinematicsError::Singular)]),
+            Why::Reach(e) => self.findings.say(code::ROBOT_OUT_OF_REACH, source, &[format!("{at}; {e}")]),
+            Why::Condition(v) if fault.share < 1.0 && m.way != Way::Joint && self.stands(&m) => {
+                let why = format!("`{}`, {} would be at {}", v.name, v.what, amount(v));
+                self.findings.say(code::ROBOT_LEAVES_WORKSPACE, source, &[at, why]);
+            }
+            Why::Condition(v) => {
+                let limit = amount(&gr_machine::Violation { value: v.limit, ..v.clone() });
+                self.findings.say(code::ROBOT_CONDITION, source, &[v.name.into(), v.what.clone(), amount(v), limit]);
+            }
+            Why::Limit { joint, value, limit } => self.limit(chain, fault, source, *joint, *value, *limit, first),
+            Why::Jump => {
+                let why = format!("at {at} it is singular: the tool can't go on without a jump of joints");
+                if self.stands_at(fault, &m) {
+                    self.findings.say(code::ROBOT_CONFIGURATION, source, &[first.to_string(), why]);
+                } else {
+                    self.findings.say(code::ROBOT_SINGULAR, source, &[at]);
+                }
+            }
+        }
+    }
+
+    #[allow(clippy::too_many_arguments)]
+    fn limit(&mut self, chain: Chain, fault: &Fault, source: Option<gr_ir::Source>, joint: usize, value: f64, limit: f64, first: u32) {
+        let j = &self.machine.joints[joint];
+        let (value, bound) = (j.show(value), j.show(limit));
+        let Item::Move(m) = &self.g.items[fault.item] else { return };
+        if fault.item > chain.first && self.stands_at(fault, m) {
+            let why = format!("joint {} would have to go to {value}, its limit is {bound}", j.name);
+            return self.findings.say(code::ROBOT_CONFIGURATION, source, &[first.to_string(), why]);
+        }
+        self.findings.say(code::ROBOT_JOINT_LIMIT, source, &[j.name.clone(), value, bound]);
+    }
+
+    /// Whether the arm could stand at the place of a fault in some configuration.
+    fn stands_at(&self, fault: &Fault, m: &Move) -> bool {
+        self.stands(&Move { position: fault.position, ..*m })
+    }
+}
+
+pub(crate) fn show(p: [f64; 3]) -> String {
+    format!("X {:.3} Y {:.3} Z {:.3}", p[0], p[1], p[2])
+}
+
+/// A value of a condition: lengths and determinants as numbers, angles in degrees.
+fn amount(v: &gr_machine::Violation) -> String {
+    let angle = ["yaw", "universal", "spherical"].iter().any(|n| v.name.starts_with(n));
+    match (angle, v.name) {
+        (true, _) => format!("{:.3}°", v.value.to_degrees()),
+        (_, "singular") => format!("{:.3e}", v.value),
+        _ => format!("{:.3} mm", v.value),
+    }
+}
+
+/// The tool's turn with its own spin.
+pub(crate) fn spun(turn: &M3, free: bool, spin: f64) -> M3 {
+    if free && spin != 0.0 { product(turn, &rot_z(spin)) } else { *turn }
+}
+
+/// The path of a move from the place before it.
+pub(crate) fn path_of(g: &Gathered, from: [f64; 3], turn: u32, m: &Move) -> Path {
+    Path::new(g, from, turn, m)
+}
