@@ -8,6 +8,7 @@ use gr_backends::{Texts, joint};
 use gr_canon::{Printer, Units};
 use gr_ir::{Program, Source};
 use gr_machine::Machine;
+use gr_planner::Tool;
 use gr_text::{Diagnostic, FileId, Span};
 
 use crate::options::UnitArg;
@@ -47,6 +48,15 @@ pub struct TargetOptions {
     /// rs274ngc: leave out comments
     #[arg(long)]
     pub no_comments: bool,
+    /// rs274ngc: write drilling as canned cycles (G81, G82, G85, G89) where they do exactly the same
+    #[arg(long)]
+    pub cycles: bool,
+    /// rs274ngc: where tools are changed [default: above the part, where the program has the tool]
+    #[arg(long, value_enum, value_name = "PLACE")]
+    pub tool_change_at: Option<ChangeAt>,
+    /// stepnc: leave out what STEP-NC cannot say, with a warning each
+    #[arg(long)]
+    pub lossy: bool,
     /// joint-gcode: greatest time between two points, s
     #[arg(long, value_name = "S")]
     pub interval: Option<f64>,
@@ -62,6 +72,20 @@ pub struct TargetOptions {
     /// Reproduce a published system
     #[arg(long, value_enum, value_name = "SYSTEM")]
     pub reference: Option<Reference>,
+    /// unb2013: its settings file arqConf.txt [default: the greatest values it allows]
+    #[arg(long, value_name = "FILE")]
+    pub reference_config: Option<PathBuf>,
+}
+
+/// Where tools are changed.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
+pub enum ChangeAt {
+    /// At the top of the machine's Z axis: G53 G0 Z0
+    G53,
+    /// At the machine's second reference point: G30
+    G30,
+    /// At the origin of G55
+    G55,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
@@ -92,10 +116,22 @@ pub enum RoundArg {
     Truncate,
 }
 
-#[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Reference {
     /// The joint-space compiler for a planar arm, UFMG 2008
     Ufmg2008,
+    /// The STEP-NC to RS274NGC adapter for a router, UnB 2013
+    Unb2013,
+    /// The STEP-NC trajectory generator for robots, UFSC 2016
+    Ufsc2016,
+}
+
+impl Reference {
+    /// Whether it starts from STEP-NC.
+    fn reads_exchange(self) -> bool {
+        self != Reference::Ufmg2008
+    }
 }
 
 /// One file of a result. The first is the main one.
@@ -107,6 +143,7 @@ pub struct Artifact {
 }
 
 /// A result with everything that was found on the way.
+#[derive(Default)]
 pub struct Built {
     /// Files; none when there were errors.
     pub artifacts: Vec<Artifact>,
@@ -118,6 +155,10 @@ pub struct Built {
     pub sources: Sources,
     /// Subroutine files used.
     pub subs: Vec<PathBuf>,
+    /// Tools of a STEP-NC file, and the tool table that its program needs, if that is its own (mm).
+    pub tools: Vec<Tool>,
+    /// See `tools`.
+    pub table: Option<String>,
 }
 
 /// What a build needs besides the program.
@@ -137,6 +178,12 @@ pub struct Goal<'a> {
 /// Makes a target of a program, and checks it. `Err` holds the findings when it has errors. Usage errors come back
 /// as text.
 pub fn build(unit: &Unit, goal: &Goal<'_>) -> Result<Result<(Built, Checked), String>, Checked> {
+    if let Some(mistake) = mismatch(unit, goal) {
+        return Ok(Err(mistake));
+    }
+    if unit.exchange {
+        return of_exchange(unit, goal);
+    }
     if goal.target == "canon" {
         if goal.from_line.is_some() {
             return Ok(Err("--from-line goes with targets that are made of motion, not with canon".into()));
@@ -145,6 +192,92 @@ pub fn build(unit: &Unit, goal: &Goal<'_>) -> Result<Result<(Built, Checked), St
     }
     let (motion, checked) = motion(unit, goal.machine)?;
     Ok(of_motion(motion, unit, goal).map(|built| (built, checked)))
+}
+
+/// What does not go together.
+fn mismatch(unit: &Unit, goal: &Goal<'_>) -> Option<String> {
+    let name = unit.name();
+    if goal.target.starts_with("plan") && !unit.exchange {
+        return Some(format!("--target {} lists the workingsteps of a STEP-NC file; {name} is G-code", goal.target));
+    }
+    let reference = goal.options.reference?;
+    if reference.reads_exchange() != unit.exchange {
+        let what = if unit.exchange { "a STEP-NC file" } else { "G-code" };
+        return Some(format!("--reference {} does not read {what} ({name})", id_of(reference)));
+    }
+    if reference == Reference::Unb2013 && goal.target == "plan" {
+        return None;
+    }
+    let other = reference != Reference::Unb2013 && goal.options.reference_config.is_some();
+    other.then(|| "--reference-config belongs to --reference unb2013".into())
+}
+
+fn id_of(reference: Reference) -> String {
+    reference.to_possible_value().map(|v| v.get_name().to_string()).unwrap_or_default()
+}
+
+fn of_exchange(unit: &Unit, goal: &Goal<'_>) -> Result<Result<(Built, Checked), String>, Checked> {
+    if goal.target.starts_with("plan") {
+        let (text, checked) = crate::exchange::list(unit, goal.target == "plan-json")?;
+        let built = Built { artifacts: one(text.into_bytes()), ..Built::default() };
+        return Ok(Ok((built, checked)));
+    }
+    if goal.options.reference == Some(Reference::Unb2013) {
+        let (converted, checked) = crate::exchange::unb2013(unit, goal.options.reference_config.as_deref())?;
+        return Ok(of_converted(unit, converted, goal).map(|built| (built, checked)));
+    }
+    let (motion, checked) = match goal.options.reference {
+        Some(Reference::Ufsc2016) => crate::exchange::ufsc2016(unit)?,
+        _ => motion(unit, goal.machine)?,
+    };
+    if goal.target != "canon" {
+        return Ok(of_motion(motion, unit, goal).map(|built| (built, checked)));
+    }
+    // Canonical calls are those of the program that is written.
+    let written = Goal { target: "rs274ngc", ..*goal };
+    let made = of_motion(motion, unit, &written).map(|mut built| {
+        if let Some(main) = built.artifacts.first_mut() {
+            let text = String::from_utf8_lossy(&main.bytes).into_owned();
+            let tools = built.table.as_deref().map(crate::exchange::tool_table);
+            main.bytes = calls(unit, text, tools);
+            built.artifacts.truncate(1);
+        }
+        (built, checked)
+    });
+    Ok(made)
+}
+
+/// Other targets of a program that a published system made: through the interpreter.
+fn of_converted(unit: &Unit, converted: crate::exchange::Converted, goal: &Goal<'_>) -> Result<Built, String> {
+    let crate::exchange::Converted { program, table, files } = converted;
+    let base = Built { table: Some(table.clone()), subs: files, ..Built::default() };
+    if goal.target == "rs274ngc" {
+        let artifacts = vec![
+            Artifact { suffix: "", bytes: program.into_bytes() },
+            Artifact { suffix: ".tbl", bytes: table.into_bytes() },
+        ];
+        return Ok(Built { artifacts, ..base });
+    }
+    let tools = crate::exchange::tool_table(&table);
+    if goal.target == "canon" {
+        return Ok(Built { artifacts: one(calls(unit, program, Some(tools))), ..base });
+    }
+    let mut setup = unit.setup.clone();
+    setup.tools = tools;
+    let motion = crate::pipeline::motion_of(&format!("{} as G-code", unit.name()), program, &setup);
+    let made = of_motion(motion, unit, goal)?;
+    Ok(Built { table: base.table, subs: base.subs, ..made })
+}
+
+/// Canonical calls of a program of our own making.
+fn calls(unit: &Unit, program: String, tools: Option<gr_interp::ToolTable>) -> Vec<u8> {
+    let mut setup = unit.setup.clone();
+    if let Some(tools) = tools {
+        setup.tools = tools;
+        setup.machine_units = Units::Mm;
+    }
+    let printer = Printer::new(Vec::new(), crate::setup::version_of(setup.dialect));
+    gr_driver::stream(&unit.name(), program.into(), &setup, None, printer).sink.into_inner()
 }
 
 fn of_motion(mut motion: Motion, unit: &Unit, goal: &Goal<'_>) -> Result<Built, String> {
@@ -156,13 +289,14 @@ fn of_motion(mut motion: Motion, unit: &Unit, goal: &Goal<'_>) -> Result<Built, 
     }
     let name = stem(&unit.path);
     let made: Result<(Vec<Artifact>, Vec<Diagnostic>), Vec<Diagnostic>> = match goal.target {
+        "stepnc" => stepnc(&motion, unit, goal.options, &name),
         "motion" => Ok((one(gr_ir::text::print(&motion.program, true).into_bytes()), Vec::new())),
         "rs274ngc" => normalised(&motion, unit, goal.options, &name)?,
         "joint-gcode" => joints(&motion, goal)?,
         "json" => dumped(|out| gr_backends::dump::json(&motion.program, out)),
         "csv" => dumped(|out| gr_backends::dump::csv(&motion.program, &gr_backends::dump::CsvOptions::default(), out)),
         "svg" | "png" | "html" => one_picture(&motion.program, goal.target, &name)?,
-        "sheet" | "sheet-json" | "sheet-html" => Ok((one(sheet(&motion.program, unit, goal.target, &name)), Vec::new())),
+        "sheet" | "sheet-json" | "sheet-html" => Ok((one(sheet(&motion, unit, goal.target, &name)), Vec::new())),
         other => return Err(format!("the target {other} can't be made by this version")),
     };
     Ok(match made {
@@ -174,14 +308,16 @@ fn of_motion(mut motion: Motion, unit: &Unit, goal: &Goal<'_>) -> Result<Built, 
 fn built(motion: Motion, artifacts: Vec<Artifact>, more: Vec<Diagnostic>) -> Built {
     let mut found = motion.found;
     found.extend(more);
-    Built { artifacts, written: None, found, sources: motion.sources, subs: motion.subs }
+    let table = motion.plan.as_ref().filter(|p| p.own_table).map(|p| gr_planner::tool_table(&p.tools));
+    let tools = motion.plan.map(|p| p.tools).unwrap_or_default();
+    Built { artifacts, written: None, found, sources: motion.sources, subs: motion.subs, tools, table }
 }
 
 /// Lets the program begin later.
 fn restart(motion: &mut Motion, line: u32, safe_z: Option<f64>) {
     let options = gr_backends::from_line::Options { safe_z };
     let made = {
-        let texts = texts(&motion.sources);
+        let texts = texts(motion);
         gr_backends::from_line::from_line(&motion.program, FileId(0), line, &options, &texts)
     };
     match made {
@@ -208,9 +344,17 @@ pub fn picture(program: &Program, kind: &str, options: &gr_backends::plot::Optio
     })
 }
 
-/// The tool table for a setup sheet.
-fn tool_rows(unit: &Unit) -> Vec<gr_backends::sheet::ToolRow> {
-    let unit_mm = if unit.setup.machine_units == Units::Inch { 25.4 } else { 1.0 };
+/// The tool table for a setup sheet and a preview.
+pub fn tool_rows(motion: &Motion, unit: &Unit) -> Vec<gr_backends::sheet::ToolRow> {
+    if let Some(plan) = &motion.plan {
+        let row = |t: &Tool| gr_backends::sheet::ToolRow {
+            number: i32::try_from(t.number).unwrap_or(i32::MAX),
+            diameter: t.diameter,
+            comment: format!("{}, {}", crate::tools::title(t), t.name),
+        };
+        return plan.tools.iter().map(row).collect();
+    }
+    let unit_mm = unit.unit_mm();
     let row = |t: &gr_interp::Tool| gr_backends::sheet::ToolRow {
         number: t.number,
         diameter: t.diameter * unit_mm,
@@ -219,13 +363,13 @@ fn tool_rows(unit: &Unit) -> Vec<gr_backends::sheet::ToolRow> {
     unit.setup.tools.rows.iter().filter(|t| &*t.comment != gr_interp::ASSUMED).map(row).collect()
 }
 
-fn sheet(program: &Program, unit: &Unit, kind: &str, name: &str) -> Vec<u8> {
+fn sheet(motion: &Motion, unit: &Unit, kind: &str, name: &str) -> Vec<u8> {
     let options = gr_backends::sheet::Options {
         title: name.to_string(),
-        tools: tool_rows(unit),
+        tools: tool_rows(motion, unit),
         ..gr_backends::sheet::Options::default()
     };
-    let sheet = gr_backends::sheet::sheet(program, &options);
+    let sheet = gr_backends::sheet::sheet(&motion.program, &options);
     let text = match kind {
         "sheet-json" => sheet.json(),
         "sheet-html" => sheet.html(),
@@ -256,8 +400,8 @@ fn canon(unit: &Unit, file: Option<&Path>) -> Result<Result<(Built, Checked), St
         artifacts,
         written,
         found: Vec::new(),
-        sources: Sources::default(),
         subs: files.subs().cloned().collect(),
+        ..Built::default()
     };
     // Beside the goal while it is being made; in memory when that can't be, which then says why when it is written.
     if let Some(pending) = file.and_then(|f| Pending::new(f).ok()) {
@@ -293,9 +437,56 @@ fn normalised(motion: &Motion, unit: &Unit, options: &TargetOptions, name: &str)
     o.numbers = options.line_numbers.as_deref().map(line_numbers).transpose()?;
     o.repeat_words = options.repeat_words;
     o.comments = !options.no_comments;
+    o.cycles = options.cycles;
+    o.change_at = options.tool_change_at.map(|p| match p {
+        ChangeAt::G53 => rs274ngc::ChangeAt::G53,
+        ChangeAt::G30 => rs274ngc::ChangeAt::G30,
+        ChangeAt::G55 => rs274ngc::ChangeAt::G55,
+    });
     stored(&mut o, unit);
-    let texts = texts(&motion.sources);
-    Ok(rs274ngc::emit(&motion.program, &o, &texts).map(|e| (one(e.text.into_bytes()), e.notes)))
+    let mut table = None;
+    if let Some(plan) = &motion.plan {
+        planned(&mut o, plan);
+        table = plan.own_table.then(|| gr_planner::tool_table(&plan.tools));
+    }
+    let texts = texts(motion);
+    Ok(rs274ngc::emit(&motion.program, &o, &texts).map(|e| {
+        let mut artifacts = one(e.text.into_bytes());
+        artifacts.extend(table.map(|t| Artifact { suffix: ".tbl", bytes: t.into_bytes() }));
+        (artifacts, e.notes)
+    }))
+}
+
+/// Tools of a process plan: what the operator loads, and their lengths as the program's own.
+fn planned(o: &mut rs274ngc::Options, plan: &crate::exchange::Plan) {
+    o.tools.clear();
+    for tool in &plan.tools {
+        let number = i32::try_from(tool.number).unwrap_or(i32::MAX);
+        let mut offset = [0.0; 9];
+        offset[2] = tool.length.unwrap_or(0.0);
+        o.tools.push((number, offset));
+        o.remarks.push(format!("T{number}: {} {}", crate::tools::title(tool), tool.name));
+    }
+}
+
+/// The motion as a process plan with explicit tool paths.
+fn stepnc(motion: &Motion, unit: &Unit, options: &TargetOptions, name: &str) -> Made {
+    let unit_mm = unit.unit_mm();
+    let row = |t: &gr_interp::Tool| (t.number, t.diameter * unit_mm, t.offset[2] * unit_mm);
+    let number = |t: &Tool| i32::try_from(t.number).unwrap_or(i32::MAX);
+    let tools = match &motion.plan {
+        Some(plan) => plan.tools.iter().map(|t| (number(t), t.diameter, t.length.unwrap_or(0.0))).collect(),
+        None => unit.setup.tools.rows.iter().skip(1).filter(|t| &*t.comment != gr_interp::ASSUMED).map(row).collect(),
+    };
+    let o = gr_planner::stepnc::Options {
+        name: name.to_string(),
+        lossy: options.lossy,
+        tools,
+        tolerance: options.arc_tolerance.unwrap_or_default(),
+    };
+    let texts = texts(motion);
+    let place = |s: Source| gr_backends::Sources::place(&texts, s);
+    gr_planner::stepnc::write_at(&motion.program, &o, &place).map(|(text, notes)| (one(text.into_bytes()), notes))
 }
 
 /// Work offsets and tools that the control has in store, in mm and rad.
@@ -324,8 +515,28 @@ fn line_numbers(text: &str) -> Result<(u32, u32), String> {
     Ok((number(first)?, number(step)?))
 }
 
-fn texts(sources: &Sources) -> Texts<'_> {
-    Texts::new(sources.iter().map(|(id, f)| (id, &*f.text)))
+/// Lines that motion comes from. Those of a STEP-NC file are places, not words of G-code.
+enum Lines<'a> {
+    Code(Texts<'a>),
+    Instances(Texts<'a>),
+}
+
+impl gr_backends::Sources for Lines<'_> {
+    fn place(&self, source: Source) -> (FileId, Span) {
+        let (Lines::Code(t) | Lines::Instances(t)) = self;
+        t.place(source)
+    }
+    fn line(&self, file: FileId, line: u32) -> Option<&str> {
+        match self {
+            Lines::Code(t) => t.line(file, line),
+            Lines::Instances(_) => None,
+        }
+    }
+}
+
+fn texts(motion: &Motion) -> Lines<'_> {
+    let texts = Texts::new(motion.sources.iter().map(|(id, f)| (id, &*f.text)));
+    if motion.plan.is_some() { Lines::Instances(texts) } else { Lines::Code(texts) }
 }
 
 fn joints(motion: &Motion, goal: &Goal<'_>) -> Result<Made, String> {
@@ -347,9 +558,9 @@ fn joints(motion: &Motion, goal: &Goal<'_>) -> Result<Made, String> {
     let machine = match (goal.machine, o.reference) {
         (Some(m), _) => m,
         (None, Some(Reference::Ufmg2008)) => &builtin,
-        (None, None) => return Err("the target joint-gcode needs --machine; `gcc-robot machine list` shows the ids".into()),
+        (None, _) => return Err("the target joint-gcode needs --machine; `gcc-robot machine list` shows the ids".into()),
     };
-    let texts = texts(&motion.sources);
+    let texts = texts(motion);
     let place = |s: Source| -> (FileId, Span) { gr_backends::Sources::place(&texts, s) };
     Ok(plan(&motion.program, machine, &options, &place))
 }

@@ -3,6 +3,7 @@
 
 mod commands;
 mod emit;
+mod exchange;
 mod exit;
 mod options;
 mod output;
@@ -12,6 +13,7 @@ mod project;
 mod render;
 mod setup;
 mod sources;
+mod tools;
 
 use std::process::ExitCode;
 
@@ -55,6 +57,7 @@ fn run(cli: Cli) -> ExitCode {
         Command::Explain(args) => commands::explain::run(&args).into(),
         Command::Target(args) => commands::target::run(&args).into(),
         Command::Machine(args) => commands::machine::run(global, &args).into(),
+        Command::Filter(args) => commands::filter::run(global, &args).into(),
         Command::Rs274(args) => commands::rs274::run("gcc-robot rs274".as_ref(), &args.arguments),
         Command::Init(args) => commands::init::run(global, &args).into(),
         Command::Lsp(_) => match gr_lsp::run() {

@@ -68,6 +68,8 @@ pub enum Command {
     Target(TargetArgs),
     /// List, show and check machines
     Machine(MachineArgs),
+    /// Filter of LinuxCNC: a STEP-NC file becomes G-code on standard output, with the tools of the machine
+    Filter(FilterArgs),
     /// Stand in for LinuxCNC's rs274: same options, output, messages and exit status
     Rs274(Rs274Args),
     /// Write a project file gcc-robot.toml
@@ -105,6 +107,28 @@ pub struct SetupArgs {
     /// Folder with subroutine files; may be given several times
     #[arg(long = "subs", value_name = "FOLDER")]
     pub subs: Vec<PathBuf>,
+    /// STEP-NC: how feeds, speeds and angles are meant [default: as the header of the file says, with a warning]
+    #[arg(long, value_enum, value_name = "UNITS")]
+    pub step_units: Option<StepUnits>,
+}
+
+/// Units of technology in STEP-NC files.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum StepUnits {
+    /// m/s, 1/s, degrees: ISO 14649
+    Iso,
+    /// m/min, rpm, mm/rev, radians: STEP Modeler
+    StepModeler,
+}
+
+impl From<StepUnits> for gr_planner::Units {
+    fn from(u: StepUnits) -> gr_planner::Units {
+        match u {
+            StepUnits::Iso => gr_planner::Units::Iso,
+            StepUnits::StepModeler => gr_planner::Units::StepModeler,
+        }
+    }
 }
 
 /// A length unit.
@@ -183,6 +207,19 @@ pub struct BuildArgs {
 }
 
 #[derive(Args, Debug)]
+pub struct FilterArgs {
+    /// STEP-NC file (or program)
+    pub file: PathBuf,
+    /// Number the tools here and write a tool table for them; an older one is kept as FILE.bak
+    #[arg(long, value_name = "FILE", conflicts_with = "tools")]
+    pub write_tools: Option<PathBuf>,
+    #[command(flatten)]
+    pub setup: SetupArgs,
+    #[command(flatten)]
+    pub options: crate::emit::TargetOptions,
+}
+
+#[derive(Args, Debug)]
 pub struct FmtArgs {
     /// Programs and folders; `-` reads standard input and writes standard output
     #[arg(required = true, value_name = "PATH")]
@@ -257,8 +294,14 @@ pub struct PreviewArgs {
     /// Program
     pub file: PathBuf,
     /// Picture: .svg, .png or .html
-    #[arg(short, long, value_name = "PATH")]
-    pub output: PathBuf,
+    #[arg(short, long, value_name = "PATH", required_unless_present = "serve")]
+    pub output: Option<PathBuf>,
+    /// Serve the picture as a page on this computer that follows the file
+    #[arg(long, conflicts_with = "output")]
+    pub serve: bool,
+    /// With --serve: follow an editor by JSON lines on standard input, answer on standard output
+    #[arg(long, requires = "serve")]
+    pub editor: bool,
     /// What is shown
     #[arg(long, value_enum, default_value = "all")]
     pub view: ViewArg,

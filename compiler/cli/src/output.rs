@@ -91,7 +91,7 @@ pub fn to_stdout(bytes: &[u8]) -> std::io::Result<()> {
 }
 
 /// Names of the files a result was made from, as a rule for make and ninja.
-pub fn depfile(goal: &Path, sources: &[PathBuf]) -> String {
+pub fn depfile(goals: &[PathBuf], sources: &[PathBuf]) -> String {
     let escape = |p: &Path| {
         let text = p.display().to_string();
         let mut out = String::new();
@@ -104,7 +104,8 @@ pub fn depfile(goal: &Path, sources: &[PathBuf]) -> String {
         }
         out
     };
-    let mut text = format!("{}:", escape(goal));
+    let goals: Vec<String> = goals.iter().map(|g| escape(g)).collect();
+    let mut text = format!("{}:", goals.join(" "));
     for source in sources {
         text.push_str(" \\\n  ");
         text.push_str(&escape(source));
@@ -148,7 +149,7 @@ mod tests {
 
     #[test]
     fn rule_for_make() {
-        let text = depfile(Path::new("out file.ngc"), &["a$.ngc".into(), "b#.tbl".into()]);
+        let text = depfile(&["out file.ngc".into()], &["a$.ngc".into(), "b#.tbl".into()]);
         assert_eq!(text, "out\\ file.ngc: \\\n  a$$.ngc \\\n  b\\#.tbl\n\na$$.ngc:\n\nb\\#.tbl:\n");
     }
 }

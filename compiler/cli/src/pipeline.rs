@@ -8,10 +8,11 @@ use gr_driver::{Loaded, Options, Rules, Session};
 use gr_interp::Setup;
 use gr_ir::Program;
 use gr_spec::Family;
-use gr_text::{Diagnostic, Encoding, FileId, Severity};
+use gr_text::{Diagnostic, Encoding, FileId, Severity, code};
 
 use crate::commands::check::{Checked, session_sources, unreadable};
-use crate::setup::{Levels, Station};
+use crate::exchange::Plan;
+use crate::setup::{Levels, Station, is_for_a_printer};
 use crate::sources::{Sources, read};
 
 /// A source file.
@@ -26,9 +27,32 @@ pub struct Unit {
     pub setup: Setup,
     /// How severe lints are.
     pub lints: Levels,
+    /// A STEP-NC file.
+    pub exchange: bool,
+    /// How its technology is read; none: as it says.
+    pub step_units: Option<gr_planner::Units>,
+    /// Name of the machine's tool table; none: every tool exists.
+    pub tools: Option<String>,
 }
 
 impl Unit {
+    /// A text, as the options and the project want it run.
+    pub fn new(path: &Path, text: Arc<str>, encoding: Encoding, station: &Station) -> Unit {
+        Unit {
+            setup: station.setup_for(path, &text),
+            exchange: crate::exchange::is_exchange(path, &text),
+            path: path.to_path_buf(),
+            text,
+            encoding,
+            lints: station.lints.clone(),
+            step_units: station.step_units,
+            tools: station.tools.as_ref().map(|p| p.display().to_string()),
+        }
+    }
+    /// Millimetres per unit of the machine's tool table.
+    pub fn unit_mm(&self) -> f64 {
+        if self.setup.machine_units == gr_canon::Units::Inch { 25.4 } else { 1.0 }
+    }
     /// Its name in messages.
     pub fn name(&self) -> String {
         self.path.display().to_string()
@@ -58,8 +82,14 @@ impl Unit {
 pub fn load(path: &Path, station: &Station) -> Result<Unit, Checked> {
     let name = path.display().to_string();
     let decoded = read(path).map_err(|(code, args)| unreadable(&name, code, &args))?;
-    let setup = station.setup_for(path, &decoded.text);
-    Ok(Unit { path: path.to_path_buf(), text: decoded.text.into(), encoding: decoded.encoding, setup, lints: station.lints.clone() })
+    let unit = Unit::new(path, decoded.text.into(), decoded.encoding, station);
+    if !unit.exchange && station.undeclared(path, &unit.text) {
+        let why = if is_for_a_printer(&unit.text) { ": it looks like a program for a 3D printer" } else { "" };
+        let mut checked = unreadable(&name, code::FILE_UNKNOWN_CONTROL, &[name.clone(), why.to_string()]);
+        checked.unreadable = false;
+        return Err(checked);
+    }
+    Ok(unit)
 }
 
 /// Runs a program into a sink and checks it. `Err` holds the findings when there are errors; otherwise they are
@@ -80,10 +110,15 @@ pub struct Motion {
     pub subs: Vec<PathBuf>,
     /// What else was found.
     pub found: Vec<Diagnostic>,
+    /// The process plan that it comes from; none for G-code.
+    pub plan: Option<Plan>,
 }
 
 /// Runs, lowers and checks a program.
 pub fn motion(unit: &Unit, machine: Option<&gr_machine::Machine>) -> Result<(Motion, Checked), Checked> {
+    if unit.exchange {
+        return crate::exchange::motion(unit);
+    }
     if unit.setup.dialect.family == Family::Ufmg2008 {
         let checked = unit.check()?;
         return Ok((ufmg(unit, machine), checked));
@@ -103,7 +138,7 @@ fn plain(motion: gr_driver::Motion) -> Motion {
     for (name, text) in motion.texts {
         sources.add(name, text);
     }
-    Motion { program: motion.program, sources, subs: motion.subs, found: Vec::new() }
+    Motion { program: motion.program, sources, subs: motion.subs, found: Vec::new(), plan: None }
 }
 
 /// The UFMG 2008 language has commands of its own and no interpreter state.
@@ -116,5 +151,5 @@ fn ufmg(unit: &Unit, machine: Option<&gr_machine::Machine>) -> Motion {
     found.extend(more);
     let mut sources = Sources::default();
     sources.add(name, unit.text.clone());
-    Motion { program, sources, subs: Vec::new(), found }
+    Motion { program, sources, subs: Vec::new(), found, plan: None }
 }

@@ -49,7 +49,8 @@ pub struct Section {
     pub machine_units: Option<crate::options::UnitArg>,
     pub block_delete: bool,
     pub subs: Vec<PathBuf>,
-    pub reference: Option<String>,
+    pub step_units: Option<crate::options::StepUnits>,
+    pub reference: Option<crate::emit::Reference>,
 }
 
 #[derive(Debug, Deserialize)]

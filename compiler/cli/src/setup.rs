@@ -18,6 +18,10 @@ use crate::sources::{Sources, read};
 pub struct Station {
     /// What the interpreter starts from; the dialect may still depend on the file.
     pub setup: Setup,
+    /// How technology of STEP-NC files is read; none: as the file says.
+    pub step_units: Option<gr_planner::Units>,
+    /// The machine's tool table, if one was named.
+    pub tools: Option<PathBuf>,
     /// Asked for by an option.
     pub dialect: Option<&'static Dialect>,
     /// The machine, if one was named.
@@ -78,8 +82,9 @@ pub fn station(
         reader.ini(&path, &mut setup);
     }
     setup.machine_units = units(args, section).or(setup.ini.machine_units()).unwrap_or(Units::Mm);
-    if let Some(path) = named(&args.tools, section.and_then(|s| s.tools.as_ref())).or_else(|| ini_path(&setup, "EMCIO", "TOOL_TABLE")) {
-        reader.tools(&path, &mut setup);
+    let tools = named(&args.tools, section.and_then(|s| s.tools.as_ref())).or_else(|| ini_path(&setup, "EMCIO", "TOOL_TABLE"));
+    if let Some(path) = &tools {
+        reader.tools(path, &mut setup);
     } else {
         setup.tools = gr_interp::assumed_tools();
     }
@@ -98,8 +103,9 @@ pub fn station(
         limits(machine, &mut setup);
     }
     let lints = reader.levels(lints, project.as_ref());
+    let step_units = args.step_units.or(section.and_then(|s| s.step_units)).map(gr_planner::Units::from);
     let Reader { files, .. } = reader;
-    (renderer.tally.errors == errors).then_some(Station { setup, dialect, machine, files, project, lints })
+    (renderer.tally.errors == errors).then_some(Station { setup, step_units, tools, dialect, machine, files, project, lints })
 }
 
 fn units(args: &SetupArgs, section: Option<&crate::project::Section>) -> Option<Units> {
@@ -156,11 +162,11 @@ impl Station {
             .or_else(|| modeline(text))
             .or_else(|| self.project.as_ref().and_then(|p| p.dialect_of(path)).and_then(Dialect::find))
             .or_else(|| by_extension(path))
+            .or_else(|| is_printer(path).then(|| recognised(text)).flatten())
     }
     /// A `.gcode` file of which nobody says what control it is for: mostly a printer's.
     pub fn undeclared(&self, path: &Path, text: &str) -> bool {
-        let printer = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gcode"));
-        printer && self.declared(path, text).is_none()
+        is_printer(path) && self.declared(path, text).is_none()
     }
     /// The setup for a file.
     pub fn setup_for(&self, path: &Path, text: &str) -> Setup {
@@ -186,16 +192,70 @@ pub fn modeline(text: &str) -> Option<&'static Dialect> {
     })
 }
 
+/// Files of this ending come from slicers for printers, from CAM systems and from hand, for any control.
+fn is_printer(path: &Path) -> bool {
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gcode"))
+}
+
+/// Lines of a program that tell what wrote it, or what it is for.
+const HEAD_LINES: usize = 200;
+
+/// Words of slicers in the first lines, or codes that only printers have.
+pub fn is_for_a_printer(text: &str) -> bool {
+    let slicers = ["slicer", "cura", "ideamaker", ";layer", "; layer", "simplify3d", "kisslicer"];
+    text.lines().take(HEAD_LINES).any(|line| {
+        let line = line.trim().to_ascii_lowercase();
+        let comment = line.starts_with(';') && slicers.iter().any(|s| line.contains(s));
+        let code = line.split([' ', ';']).next().unwrap_or("");
+        comment || matches!(code, "m104" | "m109" | "m140" | "m190" | "m106" | "m107")
+    })
+}
+
+/// The dialect of a program that tells it: a postprocessor's remark, or syntax that one control alone has.
+fn recognised(text: &str) -> Option<&'static Dialect> {
+    if is_for_a_printer(text) {
+        return None;
+    }
+    for line in text.lines().take(HEAD_LINES) {
+        let line = line.trim().to_ascii_lowercase();
+        if line.starts_with(['(', ';']) {
+            let named = [("linuxcnc", "linuxcnc"), ("emc2", "linuxcnc"), ("grbl", "grbl"), ("fanuc", "fanuc-mill")];
+            if let Some((_, dialect)) = named.iter().find(|(word, _)| line.contains(word)) {
+                return Dialect::find(dialect);
+            }
+        } else if line.contains("#<") || is_control(&line) {
+            return Some(Dialect::linuxcnc());
+        }
+    }
+    None
+}
+
+/// Whether a line begins with an O-word of LinuxCNC: `o100 sub`, `o<name> call`.
+fn is_control(line: &str) -> bool {
+    let Some(rest) = line.strip_prefix('o') else { return false };
+    let word = match rest.strip_prefix('<').and_then(|r| r.split_once('>')) {
+        Some((_, after)) => after,
+        None => rest.trim_start_matches(|c: char| c.is_ascii_digit() || c == '.'),
+    };
+    let keywords = ["sub", "call", "if", "while", "do", "repeat"];
+    word.len() < rest.len() && keywords.iter().any(|k| word.trim_start().starts_with(k))
+}
+
 fn by_extension(path: &Path) -> Option<&'static Dialect> {
     let extension = path.extension()?.to_str()?.to_ascii_lowercase();
     Dialect::all().iter().find(|d| d.extensions.contains(&extension.as_str()))
 }
 
-/// Extensions of all dialects, or of the one that was asked for.
-pub fn extensions(dialect: Option<&'static Dialect>) -> Vec<&'static str> {
-    match dialect {
+/// Whether a file in a folder is a program: by the extensions of all dialects, or of the one that was asked for;
+/// STEP-NC files only where none was.
+pub fn is_program(dialect: Option<&'static Dialect>) -> impl Fn(&Path) -> bool {
+    let extensions: Vec<&str> = match dialect {
         Some(d) if !d.extensions.is_empty() => d.extensions.to_vec(),
         _ => Dialect::all().iter().flat_map(|d| d.extensions.iter().copied()).collect(),
+    };
+    move |path| {
+        let ending = path.extension().and_then(|e| e.to_str()).unwrap_or("");
+        extensions.iter().any(|x| x.eq_ignore_ascii_case(ending)) || dialect.is_none() && crate::exchange::is_program(path)
     }
 }
 

@@ -88,10 +88,50 @@ pub fn about_file(code: gr_text::Code, file: FileId, args: &[String]) -> Diagnos
 pub fn read(path: &Path) -> Result<Decoded, (gr_text::Code, Vec<String>)> {
     let name = path.display().to_string();
     let bytes = read_bytes(path).map_err(|(code, mut args)| {
-        args.insert(0, name);
+        args.insert(0, name.clone());
         (code, args)
     })?;
+    if let Some(kind) = binary(&bytes) {
+        return Err((code::FILE_BINARY, vec![name, kind.to_string()]));
+    }
     Ok(decode(bytes))
+}
+
+/// Bytes that are looked at to tell a text from another kind of file.
+const HEAD: usize = 8192;
+
+/// First bytes of kinds of files that programs come packed in, or are taken for.
+const MAGIC: [(&[u8], &str); 12] = [
+    (b"PK\x03\x04", "a ZIP archive"),
+    (b"\x1F\x8B", "compressed by gzip"),
+    (b"7z\xBC\xAF\x27\x1C", "a 7z archive"),
+    (b"Rar!\x1A", "a RAR archive"),
+    (b"BZh9", "compressed by bzip2"),
+    (b"\xFD7zXZ", "compressed by xz"),
+    (b"%PDF-", "a PDF document"),
+    (b"\x89PNG", "a picture"),
+    (b"\xFF\xD8\xFF", "a picture"),
+    (b"\x7FELF", "an executable program"),
+    (b"MZ\x90\x00", "an executable program"),
+    (b"\xD0\xCF\x11\xE0", "an office document"),
+];
+
+/// What a file is that is no text.
+fn binary(bytes: &[u8]) -> Option<&'static str> {
+    if let Some((_, kind)) = MAGIC.iter().find(|(magic, _)| bytes.starts_with(magic)) {
+        return Some(kind);
+    }
+    if bytes.starts_with(&[0xFF, 0xFE]) || bytes.starts_with(&[0xFE, 0xFF]) {
+        return None;
+    }
+    let head = &bytes[..bytes.len().min(HEAD)];
+    // Serial lines leave runs of NUL at either end.
+    let start = head.iter().position(|b| *b != 0).unwrap_or(head.len());
+    let end = head.iter().rposition(|b| *b != 0).map_or(start, |n| n + 1);
+    let body = &head[start..end];
+    let control = |b: &&u8| matches!(b, 0..=8 | 0x0B | 0x0E..=0x19 | 0x1B..=0x1F | 0x7F);
+    let controls = body.iter().filter(control).count();
+    (controls >= 16 && controls * 20 > body.len()).then_some("binary data")
 }
 
 fn read_bytes(path: &Path) -> Result<Vec<u8>, (gr_text::Code, Vec<String>)> {
@@ -130,9 +170,9 @@ pub fn is_latin1(d: &Decoded) -> bool {
     d.encoding == Encoding::Latin1
 }
 
-/// All programs below `folder`, in order: files whose extension belongs to a dialect. Hidden ones are left out.
+/// All programs below `folder`, in order: files that are `wanted`. Hidden ones are left out.
 /// Folders that can't be read come back.
-pub fn walk(folder: &Path, extensions: &[&str], found: &mut Vec<PathBuf>) -> Vec<(PathBuf, std::io::Error)> {
+pub fn walk(folder: &Path, wanted: &dyn Fn(&Path) -> bool, found: &mut Vec<PathBuf>) -> Vec<(PathBuf, std::io::Error)> {
     let listed = std::fs::read_dir(folder).and_then(|list| list.map(|e| e.map(|e| e.path())).collect::<Result<Vec<_>, _>>());
     let mut entries = match listed {
         Ok(entries) => entries,
@@ -147,13 +187,25 @@ pub fn walk(folder: &Path, extensions: &[&str], found: &mut Vec<PathBuf>) -> Vec
         }
         // A link to a folder could lead in circles.
         if path.is_dir() && !path.is_symlink() {
-            closed.extend(walk(&path, extensions, found));
-        } else if let Some(ext) = path.extension().and_then(|e| e.to_str())
-            && extensions.iter().any(|x| x.eq_ignore_ascii_case(ext))
-            && path.is_file()
-        {
+            closed.extend(walk(&path, wanted, found));
+        } else if path.is_file() && wanted(&path) {
             found.push(path);
         }
     }
     closed
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn texts_and_others() {
+        assert_eq!(binary(b"PK\x03\x04rest"), Some("a ZIP archive"));
+        let noise: Vec<u8> = (0..4000u32).map(|i| (i.wrapping_mul(2_654_435_761) >> 24) as u8).collect();
+        assert_eq!(binary(&noise), Some("binary data"));
+        for text in [&b"G0 X1\0\n"[..], b"", b"\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0%\nG0\n", b"(\xFCber)\r\n\x1A", b"\xFF\xFEG\0001\0"] {
+            assert_eq!(binary(text), None, "{text:?}");
+        }
+    }
 }

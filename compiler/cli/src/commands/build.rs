@@ -10,7 +10,7 @@ use gr_text::{Severity, code};
 
 use super::check::{Checked, show};
 use super::complain;
-use crate::emit::{Built, Goal, TargetOptions, build, stem};
+use crate::emit::{Artifact, Built, Goal, TargetOptions, build, stem};
 use crate::exit::Exit;
 use crate::options::{BuildArgs, Global};
 use crate::output::{Pending, depfile, to_stdout, write_with};
@@ -145,10 +145,12 @@ impl<'a> Round<'a> {
         if several && out.is_none_or(|o| !is_folder(o)) {
             return Err("several programs need a folder: -o FOLDER/".into());
         }
+        let mut options = self.args.options.clone();
+        options.reference = options.reference.or(station.project.as_ref().and_then(|p| p.file.project.reference));
         let job = |source: &PathBuf| Job {
             source: source.clone(),
             target,
-            options: self.args.options.clone(),
+            options: options.clone(),
             goal: out.map(|o| if is_folder(o) { o.join(file_name(source, target)) } else { o.to_path_buf() }),
         };
         Ok(self.args.files.iter().map(job).collect())
@@ -161,7 +163,9 @@ impl<'a> Round<'a> {
         }
         for row in project.file.targets.iter().filter(|t| self.args.target.as_ref().is_none_or(|id| *id == t.target)) {
             let target = target(&row.target)?;
-            let options = options_of(&row.options).map_err(|e| format!("{}: target {}: {e}", project.path.display(), row.target))?;
+            let mut options = options_of(&row.options).map_err(|e| format!("{}: target {}: {e}", project.path.display(), row.target))?;
+            options.reference = options.reference.or(project.file.project.reference);
+            options.reference_config = options.reference_config.map(|p| project.path_of(&p));
             let patterns = if row.sources.is_empty() { &project.file.project.sources } else { &row.sources };
             let sources = project.files(patterns);
             if sources.is_empty() {
@@ -221,20 +225,21 @@ impl<'a> Round<'a> {
         };
         let mut read = vec![job.source.clone()];
         read.extend(station.files.iter().chain(&built.subs).cloned());
-        if let Some(same) = read.iter().find(|r| same_file(r, goal)) {
+        let beside = |a: &Artifact| goal.with_file_name(format!("{}{}", stem(goal), a.suffix));
+        let path_of = |a: &Artifact| if a.suffix.is_empty() { goal.clone() } else { beside(a) };
+        let mut goals: Vec<PathBuf> = built.artifacts.iter().map(path_of).collect();
+        if built.written.is_some() {
+            goals.insert(0, goal.clone());
+        }
+        if let Some(same) = read.iter().find(|r| goals.iter().any(|g| same_file(r, g))) {
             let name = same.display().to_string();
             complain(&mut self.renderer, &mut self.sources, &name, code::FILE_OVERWRITES_SOURCE, std::slice::from_ref(&name));
             return self.fail(Exit::Findings);
         }
-        self.rules.push_str(&depfile(goal, &read));
+        self.rules.push_str(&depfile(&goals, &read));
         self.written.extend(built.written.map(|p| (goal.clone(), p)));
         for artifact in built.artifacts {
-            let path = if artifact.suffix.is_empty() {
-                goal.clone()
-            } else {
-                goal.with_file_name(format!("{}{}", stem(goal), artifact.suffix))
-            };
-            self.results.push((path, artifact.bytes));
+            self.results.push((path_of(&artifact), artifact.bytes));
         }
     }
 

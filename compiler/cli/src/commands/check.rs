@@ -8,11 +8,12 @@ use std::sync::mpsc;
 use gr_driver::{Options, Session};
 use gr_text::{Code, Diagnostic, FileId, Severity, Span, code};
 
+use crate::exchange;
 use crate::exit::Exit;
 use crate::options::{CheckArgs, Global};
 use crate::progress::Progress;
 use crate::render::Renderer;
-use crate::setup::{Station, extensions, station};
+use crate::setup::{Station, is_program, station};
 use crate::sources::{Sources, read, reason, walk};
 
 /// What came of one file.
@@ -108,7 +109,7 @@ fn programs(
             continue;
         }
         let before = files.len();
-        let closed = walk(path, &extensions(station.dialect), &mut files);
+        let closed = walk(path, &is_program(station.dialect), &mut files);
         for (at, e) in &closed {
             let name = at.display().to_string();
             super::complain(renderer, sources, &name, code::FILE_UNREADABLE, &[name.clone(), reason(e)]);
@@ -211,8 +212,8 @@ pub fn unreadable(name: &str, code: Code, args: &[String]) -> Checked {
 }
 
 fn checked(name: &str, path: &Path, text: &str, station: &Station) -> Checked {
-    if super::exchange::is_exchange(path, text) {
-        return super::exchange::check(name, text, &station.lints);
+    if exchange::is_exchange(path, text) {
+        return exchange::check(name, text, path, station);
     }
     if station.undeclared(path, text) {
         return syntax_only(name, text, station);

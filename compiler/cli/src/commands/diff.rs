@@ -143,6 +143,7 @@ pub fn verify(global: &Global, args: &VerifyArgs) -> Exit {
             return if checked.unreadable { Exit::Io } else { Exit::Findings };
         }
     };
+    let table = built.table;
     let Some(main) = built.artifacts.into_iter().next() else {
         built.found.iter().for_each(|d| renderer.show(&built.sources, d));
         renderer.finish(false);
@@ -151,6 +152,10 @@ pub fn verify(global: &Global, args: &VerifyArgs) -> Exit {
     let text = String::from_utf8_lossy(&main.bytes).into_owned();
     let mut setup = unit.setup.clone();
     setup.dialect = args.options.to.as_deref().and_then(Dialect::find).unwrap_or_else(Dialect::linuxcnc);
+    if let Some(table) = &table {
+        setup.tools = crate::exchange::tool_table(table);
+        setup.machine_units = gr_canon::Units::Mm;
+    }
     let b = motion_of("<translation>", text, &setup);
     let tolerance = Tolerance { length: allowed(args), rate: 1e-3, ..Tolerance::default() };
     let mut result = diff(&a.program, &b.program, &tolerance);

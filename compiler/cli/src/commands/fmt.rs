@@ -7,12 +7,12 @@ use gr_gcode::{Case, Form, FormatOptions, Keyword, LeadingZeros, LineKind, Node,
 use gr_spec::{Dialect, Family};
 use gr_text::{Decoded, Encoding, Span, code};
 
-use super::exchange::is_exchange;
+use crate::exchange::is_exchange;
 use crate::exit::Exit;
 use crate::options::{CaseArg, FmtArgs, Global, LintArgs, RenumberArgs, SetupArgs, StyleArgs, ZerosArg};
 use crate::output::{to_stdout, write_all};
 use crate::render::Renderer;
-use crate::setup::{Station, extensions, station};
+use crate::setup::{self, Station, station};
 use crate::sources::{Sources, read, reason, walk};
 
 pub fn run(global: &Global, args: &FmtArgs) -> Exit {
@@ -26,7 +26,7 @@ pub fn run(global: &Global, args: &FmtArgs) -> Exit {
         let mut files = vec![path.clone()];
         if path.is_dir() {
             files.clear();
-            let closed = walk(path, &extensions(work.station.dialect), &mut files);
+            let closed = walk(path, &setup::is_program(work.station.dialect), &mut files);
             if closed.is_empty() && files.is_empty() {
                 work.complain(path, code::PROJECT_NOTHING_TO_DO, &[path.display().to_string()]);
                 exit = exit.max(Exit::Findings);

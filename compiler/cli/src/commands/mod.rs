@@ -4,12 +4,13 @@ pub mod build;
 pub mod check;
 pub mod completions;
 pub mod diff;
-pub mod exchange;
 pub mod explain;
+pub mod filter;
 pub mod fmt;
 pub mod init;
 pub mod machine;
 pub mod preview;
+pub mod preview_serve;
 pub mod rs274;
 pub mod target;
 

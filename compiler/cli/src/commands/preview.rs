@@ -1,4 +1,4 @@
-//! `gcc-robot preview part.ngc -o part.svg`
+//! `gcc-robot preview part.ngc -o part.svg`; served pages: see `preview_serve`
 
 use std::path::Path;
 
@@ -6,7 +6,7 @@ use gr_backends::plot::{Options, Show};
 use gr_text::{Severity, code};
 
 use super::check::{Checked, show};
-use crate::emit::{picture, stem};
+use crate::emit::{picture, stem, tool_rows};
 use crate::exit::Exit;
 use crate::options::{Global, LintArgs, PreviewArgs, ViewArg};
 use crate::output::write_all;
@@ -16,6 +16,9 @@ use crate::setup::station;
 use crate::sources::{Sources, reason};
 
 pub fn run(global: &Global, args: &PreviewArgs) -> Exit {
+    let Some(goal) = args.output.as_ref().filter(|_| !args.serve) else {
+        return super::preview_serve::run(global, args);
+    };
     let mut renderer = global.renderer(false);
     let mut sources = Sources::default();
     let Some(station) = station(&args.setup, &LintArgs::default(), Path::new("."), &mut sources, &mut renderer) else {
@@ -23,8 +26,9 @@ pub fn run(global: &Global, args: &PreviewArgs) -> Exit {
         return Exit::Findings;
     };
     let progress = Progress::new(global.quiet, format!("drawing {}", args.file.display()));
-    let motion = match load(&args.file, &station).and_then(|unit| motion(&unit, None)) {
-        Ok((motion, _)) => motion,
+    let unit = load(&args.file, &station);
+    let (unit, motion) = match unit.and_then(|unit| motion(&unit, station.machine.as_ref()).map(|(motion, _)| (unit, motion))) {
+        Ok(made) => made,
         Err(checked) => {
             drop(progress);
             show(&mut renderer, &checked);
@@ -33,8 +37,9 @@ pub fn run(global: &Global, args: &PreviewArgs) -> Exit {
         }
     };
     let bad = motion.found.iter().any(|d| d.severity == Severity::Error);
-    let kind = args.output.extension().map_or(String::new(), |e| e.to_string_lossy().to_ascii_lowercase());
-    let made = picture(&motion.program, &kind, &options(args));
+    let kind = goal.extension().map_or(String::new(), |e| e.to_string_lossy().to_ascii_lowercase());
+    let plot = Options { text: unit.text.to_string(), tools: tool_rows(&motion, &unit), ..options(args) };
+    let made = picture(&motion.program, &kind, &plot);
     drop(progress);
     show(&mut renderer, &Checked { sources: motion.sources, found: motion.found, more: 0, unreadable: false });
     let exit = match made {
@@ -43,7 +48,7 @@ pub fn run(global: &Global, args: &PreviewArgs) -> Exit {
             eprintln!("{text}");
             Exit::Usage
         }
-        Ok(bytes) => match write_all(&[(args.output.clone(), bytes)]) {
+        Ok(bytes) => match write_all(&[(goal.clone(), bytes)]) {
             Ok(()) => Exit::Ok,
             Err((path, e)) => {
                 let name = path.display().to_string();

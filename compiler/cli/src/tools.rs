@@ -1,0 +1,179 @@
+//! Which tool of the machine's table is the tool that a STEP-NC file describes: the same diameter, and a remark
+//! that names no other type or edge radius.
+
+use gr_interp::ToolTable;
+use gr_planner::{Loaded, Tool};
+use gr_text::{Diagnostic, FileId, code};
+
+/// Diameters in a table have four decimals, of an inch at worst.
+const DIAMETER: f64 = 0.005;
+/// Edge radii are written in tenths.
+const RADIUS: f64 = 0.05;
+
+/// A tool table and what its numbers mean.
+pub struct Table<'a> {
+    /// As the user named it.
+    pub name: String,
+    /// Its rows.
+    pub rows: &'a ToolTable,
+    /// mm per unit of the table.
+    pub unit: f64,
+}
+
+/// Tools of the table for all tools of a file.
+///
+/// # Errors
+/// Tools that the table does not have.
+pub fn assign(tools: &[Tool], table: &Table<'_>, file: FileId) -> (Vec<Loaded>, Vec<Diagnostic>) {
+    let mut loaded = Vec::new();
+    let mut found = Vec::new();
+    for tool in tools {
+        let fits = |r: &&gr_interp::Tool| r.number > 0 && &*r.comment != gr_interp::ASSUMED;
+        let mut scored: Vec<(u32, &gr_interp::Tool)> =
+            table.rows.rows.iter().skip(1).filter(fits).filter_map(|r| Some((fit(tool, r, table.unit)?, r))).collect();
+        scored.sort_by_key(|(score, row)| (std::cmp::Reverse(*score), row.number));
+        let Some((best, row)) = scored.first().copied() else {
+            found.push(missing(tool, table, file));
+            continue;
+        };
+        let equal = scored.iter().filter(|(score, r)| *score == best && r.number != row.number).count();
+        if equal > 0 {
+            let args = [(equal + 1).to_string(), title(tool), row.number.to_string()];
+            found.push(Diagnostic::new(code::TOOL_TABLE_SEVERAL_TOOLS, file, tool.origin.span, &args));
+        }
+        let number = u32::try_from(row.number).unwrap_or_default();
+        loaded.push(Loaded { tool: tool.number, number, length: Some(row.offset[2] * table.unit) });
+    }
+    (loaded, found)
+}
+
+fn missing(tool: &Tool, table: &Table<'_>, file: FileId) -> Diagnostic {
+    let args = [table.name.clone(), title(tool)];
+    let d = Diagnostic::new(code::TOOL_TABLE_NO_SUCH_TOOL, file, tool.origin.span, &args);
+    let same = |r: &&gr_interp::Tool| (r.diameter * table.unit - tool.diameter).abs() < DIAMETER;
+    match table.rows.rows.iter().skip(1).find(same) {
+        Some(r) => d.note(format!("T{} has this diameter, but its remark says `{}`", r.number, r.comment.trim())),
+        None => d,
+    }
+}
+
+/// For people: type, diameter, edge radius.
+pub fn title(tool: &Tool) -> String {
+    let kind = tool.kind.to_ascii_lowercase().replace('_', " ");
+    let radius = if tool.edge_radius > 0.0 { format!(" R{}", tool.edge_radius) } else { String::new() };
+    format!("{kind} D{}{radius}", tool.diameter)
+}
+
+/// Tools that were numbered `T7` by whoever wrote the file keep their numbers, if all of them are.
+pub fn own_numbers(tools: &[Tool]) -> Vec<Loaded> {
+    let number = |t: &Tool| t.name.strip_prefix('T').and_then(|n| n.parse::<u32>().ok()).filter(|n| *n < 100_000);
+    let all: Option<Vec<u32>> = tools.iter().map(number).collect();
+    let Some(numbers) = all else { return Vec::new() };
+    let mut seen = numbers.clone();
+    seen.sort_unstable();
+    seen.dedup();
+    if seen.len() < numbers.len() {
+        return Vec::new();
+    }
+    tools.iter().zip(numbers).map(|(t, number)| Loaded { tool: t.number, number, length: None }).collect()
+}
+
+/// How well a row fits a tool; none: not at all.
+fn fit(tool: &Tool, row: &gr_interp::Tool, unit: f64) -> Option<u32> {
+    if (row.diameter * unit - tool.diameter).abs() > DIAMETER {
+        return None;
+    }
+    let kind = match kind_in(&row.comment) {
+        None => 1,
+        Some(k) if k == dense(&tool.kind) => 3,
+        Some(k) if family(&k) == family(&dense(&tool.kind)) => 2,
+        Some(_) => return None,
+    };
+    let ball = dense(&tool.kind).starts_with("BALL");
+    let radius = match radius_in(&row.comment) {
+        Some(r) if (r - tool.edge_radius).abs() < RADIUS => 2,
+        Some(_) if !ball => return None,
+        None if tool.edge_radius > 0.0 && !ball => 0,
+        _ => 1,
+    };
+    Some(kind * 4 + radius)
+}
+
+fn dense(text: &str) -> String {
+    text.chars().filter(char::is_ascii_alphanumeric).map(|c| c.to_ascii_uppercase()).collect()
+}
+
+/// Types as the standard and as machinists call them; tools of one row do the same work.
+const FAMILIES: [&[&str]; 12] = [
+    &["ENDMILL", "FACEMILL", "SHELLMILL", "SLOTDRILL", "FLATENDMILL"],
+    &["BALLENDMILL", "BALLNOSEENDMILL", "BALLNOSE", "BALLMILL"],
+    &["BULLNOSEENDMILL", "BULLNOSE", "CORNERRADIUS", "TOROID"],
+    &["TWISTDRILL", "SPADEDRILL", "DRILL", "CARBIDEDRILL"],
+    &["CENTERDRILL", "CENTREDRILL", "SPOTDRILL", "SPOTTINGDRILL"],
+    &["COUNTERSINK", "COUNTERSINKINGTOOL", "CHAMFER", "CHAMFERMILL"],
+    &["COUNTERBORE", "COUNTERBORINGTOOL"],
+    &["REAMER", "REAMING", "TAPEREDREAMER"],
+    &["TAPPINGTOOL", "TAP", "TAPEREDTAP"],
+    &["BORINGTOOL", "BORINGBAR", "BORINGHEAD"],
+    &["TSLOTMILL", "SLOTMILL", "SIDEMILL", "WOODRUFFKEYSEATMILL", "DOVETAILMILL"],
+    &["TAPEREDENDMILL", "THREADMILL"],
+];
+
+fn family(kind: &str) -> Option<usize> {
+    FAMILIES.iter().position(|f| f.contains(&kind))
+}
+
+/// The type that a remark names: the longest name in it.
+fn kind_in(remark: &str) -> Option<String> {
+    let text = dense(remark);
+    let names = FAMILIES.iter().flat_map(|f| f.iter()).filter(|n| text.contains(**n));
+    names.max_by_key(|n| n.len()).map(|n| (*n).to_string())
+}
+
+/// The edge radius that a remark names: `R2`, `r0.5`.
+fn radius_in(remark: &str) -> Option<f64> {
+    let mut words = remark.split([' ', ',', ';', '\t']);
+    words.find_map(|w| w.strip_prefix(['R', 'r'])?.trim_start_matches('=').parse::<f64>().ok())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn tool(kind: &str, diameter: f64, edge_radius: f64) -> Tool {
+        Tool {
+            origin: Default::default(),
+            name: String::new(),
+            kind: kind.into(),
+            diameter,
+            tip_angle: None,
+            cutting_length: None,
+            edge_radius,
+            length: None,
+            teeth: None,
+            right_handed: None,
+            pitch: None,
+            number: 1,
+        }
+    }
+
+    fn chosen(t: Tool, text: &str, unit: f64) -> Option<u32> {
+        let (rows, _) = gr_interp::read_tools(text, FileId(1));
+        let table = Table { name: "t.tbl".into(), rows: &rows, unit };
+        assign(&[t], &table, FileId(0)).0.first().map(|l| l.number)
+    }
+
+    #[test]
+    fn type_diameter_and_radius_decide() {
+        let table = "T3 P1 D6 ;center drill\nT5 P2 D6 ;end mill 6 mm\nT7 P3 D6 ;twist drill\nT9 P4 D4\nT11 P5 D6 ;ball nose R3\nT12 P6 D6 ;bull nose R0.5\nT13 P7 D6 ;bull nose R1\n";
+        assert_eq!(chosen(tool("TWIST_DRILL", 6.0, 0.0), table, 1.0), Some(7));
+        assert_eq!(chosen(tool("CENTER_DRILL", 6.0, 0.0), table, 1.0), Some(3));
+        assert_eq!(chosen(tool("FACEMILL", 6.0, 0.0), table, 1.0), Some(5));
+        assert_eq!(chosen(tool("BALL_ENDMILL", 6.0, 3.0), table, 1.0), Some(11));
+        assert_eq!(chosen(tool("BULLNOSE_ENDMILL", 6.0, 1.0), table, 1.0), Some(13));
+        assert_eq!(chosen(tool("BALL_ENDMILL", 4.0, 2.0), table, 1.0), Some(9));
+        assert_eq!(chosen(tool("REAMER", 6.0, 0.0), table, 1.0), None);
+        assert_eq!(chosen(tool("TWIST_DRILL", 6.01, 0.0), table, 1.0), None);
+        assert_eq!(chosen(tool("TWIST_DRILL", 6.35, 0.0), "T1 P1 D0.25 ;1/4 drill\n", 25.4), Some(1));
+    }
+}
