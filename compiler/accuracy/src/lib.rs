@@ -6,12 +6,18 @@
 //! | `grade` | standard tolerances of lengths |
 //! | `material` | materials and cutting force |
 //! | `error` | the errors at one place of the machine |
+//! | `map` | a quantity over the work space |
+//! | `place` | where a part is best put |
+//! | `compensate` | correction for known deviations |
 
 // `!(x <= limit)` is meant: a value that is not a number must fail the test.
 #![allow(clippy::neg_cmp_op_on_partial_ord)]
 
+pub mod compensate;
 pub mod error;
 pub mod grade;
+pub mod map;
 pub mod material;
+pub mod place;
 
 pub use error::{Budget, BudgetOptions, Errors, Sensitivity, Spread, closed_form};

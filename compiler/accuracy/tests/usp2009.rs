@@ -210,3 +210,62 @@ proptest! {
         }
     }
 }
+
+/// A machine built with the symmetric deviations: what is left over after one step of compensation (as the model of
+/// the thesis) and after all.
+#[test]
+fn compensation() {
+    use gr_accuracy::compensate::{compensated, real_place};
+    use gr_machine::math::Frame;
+    let m = machine();
+    let k = legs(&m);
+    let g = golden();
+    let (nominal, real) = (m.kinematics(), m.deviated(&SYMMETRIC));
+    for (p, key) in [
+        ([800.0, 0.0, 0.0], "compensation_(800.0, 0.0, 0.0)"),
+        ([735.0, -400.0, 0.0], "compensation_(735.0, -400.0, 0.0)"),
+        ([950.0, 150.0, 240.0], "compensation_(950.0, 150.0, 240.0)"),
+    ] {
+        let want = &g["extensions"][key];
+        let error = |command: V3| {
+            let got = real_place(&*nominal, &*real, &Frame::shift(command), &[]).unwrap();
+            [0, 1, 2].map(|i| (got[i] - p[i]) * 1e3)
+        };
+        let first = geometric(k, k.place_of(p), &SYMMETRIC);
+        let raw = error(p);
+        let once = error([0, 1, 2].map(|i| p[i] - first[i]));
+        for i in 0..3 {
+            close(raw[i], numbers(&want["raw_um"])[i], 1e-6, "raw");
+            close(first[i] * 1e3, numbers(&want["first_order_um"])[i], 1e-9, "first order");
+            close(once[i], numbers(&want["residual_um"])[i], 1e-6, "left over");
+        }
+        let command = compensated(&m, &SYMMETRIC, &Frame::shift(p), &[]).unwrap();
+        assert!(norm(error(command.position)) < 1e-6, "{:?}", error(command.position));
+    }
+}
+
+/// The rectangles of stock that fit, and the volume.
+#[test]
+fn rectangles_and_volume() {
+    use gr_accuracy::map::{Probe, volume};
+    use gr_accuracy::place::rectangle;
+    let m = machine();
+    let probe = Probe::new(&m);
+    let span = |h: i32| -> Vec<f64> { (-h / 20..=h / 20).map(|i| f64::from(i) * 20.0).collect() };
+    // Known: x 700 to 910, y ±273; x 700 to 890, y ±265; x 670 to 900, y ±125, from a coarser search in y.
+    for (heights, from, to, half) in
+        [(vec![0.0], 700.0, 910.0, 273.0), (span(240), 700.0, 890.0, 265.0), (span(480), 670.0, 900.0, 125.0)]
+    {
+        let got = rectangle(&probe, &heights).unwrap();
+        assert_eq!((got.0, got.1), (from, to));
+        assert!((half..half + 2.0).contains(&got.2), "{got:?}");
+        let all = |d: f64| {
+            [from - d, to + d].iter().all(|x| heights.iter().all(|z| {
+                probe.reaches([*x, got.2 + d, *z]) && probe.reaches([*x, -got.2 - d, *z])
+            }))
+        };
+        assert!(all(0.0) && !all(20.0));
+    }
+    let v = volume(&probe, 68, 120) / 1e6;
+    assert!((v - 212.3).abs() < 1.0, "{v}");
+}

@@ -1,0 +1,529 @@
+//! Maps over the work space: a quantity on a grid in a plane of the base.
+
+use crate::error::{Budget, Sensitivity, Spread};
+use gr_machine::math::{Frame, V3, eigenvalues, norm};
+use gr_machine::{Chain, Control, Kinematics, Machine, Opw, TwoLegs, differential};
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// What a map shows.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Quantity {
+    /// Where the tool can go: 1.
+    Workspace,
+    /// Condition number of the velocities of the tool point.
+    Condition,
+    /// Distance from a singularity: least over greatest singular value, 0 to 1.
+    Singularity,
+    /// Error by the joints, µm.
+    Kinematic(Part),
+    /// Error by the geometry, µm.
+    Geometric(Part),
+    /// Deflection under a force, µm.
+    Elastic(Part),
+    /// Kinematic + geometric + elastic, the longest of each, µm.
+    Total,
+    /// Stiffness in the softest direction, N/µm.
+    Stiffness,
+}
+
+/// Which part of an error.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Part {
+    /// Along an axis of the base: 0, 1, 2.
+    Axis(usize),
+    /// Its length.
+    Length,
+}
+
+impl Quantity {
+    /// Its name on the command line, and the other way round.
+    pub const NAMES: [(&'static str, Quantity); 17] = [
+        ("workspace", Quantity::Workspace),
+        ("condition", Quantity::Condition),
+        ("singularity", Quantity::Singularity),
+        ("kinematic", Quantity::Kinematic(Part::Length)),
+        ("kinematic-x", Quantity::Kinematic(Part::Axis(0))),
+        ("kinematic-y", Quantity::Kinematic(Part::Axis(1))),
+        ("kinematic-z", Quantity::Kinematic(Part::Axis(2))),
+        ("geometric", Quantity::Geometric(Part::Length)),
+        ("geometric-x", Quantity::Geometric(Part::Axis(0))),
+        ("geometric-y", Quantity::Geometric(Part::Axis(1))),
+        ("geometric-z", Quantity::Geometric(Part::Axis(2))),
+        ("elastic", Quantity::Elastic(Part::Length)),
+        ("elastic-x", Quantity::Elastic(Part::Axis(0))),
+        ("elastic-y", Quantity::Elastic(Part::Axis(1))),
+        ("elastic-z", Quantity::Elastic(Part::Axis(2))),
+        ("total", Quantity::Total),
+        ("stiffness", Quantity::Stiffness),
+    ];
+
+    /// Name on the command line.
+    pub fn name(self) -> &'static str {
+        Quantity::NAMES.iter().find(|(_, q)| *q == self).map_or("", |(n, _)| n)
+    }
+
+    /// Its unit; empty for a plain number.
+    pub fn unit(self) -> &'static str {
+        match self {
+            Quantity::Workspace | Quantity::Condition | Quantity::Singularity => "",
+            Quantity::Stiffness => "N/µm",
+            _ => "µm",
+        }
+    }
+
+    /// What the machine file must say for it.
+    pub fn needs(self) -> (bool, bool, bool) {
+        match self {
+            Quantity::Kinematic(_) => (true, false, false),
+            Quantity::Geometric(_) => (false, true, false),
+            Quantity::Elastic(_) | Quantity::Stiffness => (false, false, true),
+            Quantity::Total => (true, true, false),
+            _ => (false, false, false),
+        }
+    }
+}
+
+/// A plane of the base: the axis square to it and where it lies, mm.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Plane {
+    /// 0 = X, 1 = Y, 2 = Z.
+    pub axis: usize,
+    /// Its place on that axis, mm.
+    pub at: f64,
+}
+
+impl Plane {
+    /// Indices of the axes drawn to the right and up.
+    pub fn axes(self) -> (usize, usize) {
+        match self.axis {
+            0 => (1, 2),
+            1 => (0, 2),
+            _ => (0, 1),
+        }
+    }
+}
+
+/// What is wanted.
+#[derive(Clone, Debug)]
+pub struct Request {
+    /// What is drawn.
+    pub quantity: Quantity,
+    /// Where.
+    pub plane: Plane,
+    /// Nodes to the right and up.
+    pub size: (usize, usize),
+    /// Least and greatest coordinates to the right and up, mm; none = the whole work space.
+    pub window: Option<[(f64, f64); 2]>,
+    /// Force on the tool, N, for deflections.
+    pub force: V3,
+    /// Signs of the joint errors; none = the worst pattern.
+    pub signs: Option<Vec<f64>>,
+    /// Deviations of the geometry with their signs, mm or rad; none = the worst pattern of the budget.
+    pub deviations: Option<Vec<f64>>,
+}
+
+/// A map: row by row from the bottom; not a number = out of reach.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Map {
+    /// What it shows.
+    pub quantity: Quantity,
+    /// Where.
+    pub plane: Plane,
+    /// Nodes to the right and up.
+    pub size: (usize, usize),
+    /// Coordinates of the first and the last node to the right and up, mm.
+    pub window: [(f64, f64); 2],
+    /// Values.
+    pub values: Vec<f32>,
+}
+
+/// The range of a map, its extremes and their places.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Summary {
+    /// Nodes within reach.
+    pub nodes: usize,
+    /// Their area, mm².
+    pub area: f64,
+    /// Least value and its place (right, up), mm.
+    pub least: (f64, [f64; 2]),
+    /// Greatest value and its place.
+    pub greatest: (f64, [f64; 2]),
+    /// Mean value.
+    pub mean: f64,
+    /// Extent of the nodes within reach, to the right and up, mm.
+    pub extent: [(f64, f64); 2],
+}
+
+impl Map {
+    /// Distance of the nodes, mm.
+    pub fn step(&self) -> [f64; 2] {
+        let n = [self.size.0, self.size.1];
+        [0, 1].map(|i| (self.window[i].1 - self.window[i].0) / (n[i].max(2) - 1) as f64)
+    }
+    /// Place of a node.
+    pub fn place(&self, i: usize, j: usize) -> [f64; 2] {
+        let step = self.step();
+        [self.window[0].0 + i as f64 * step[0], self.window[1].0 + j as f64 * step[1]]
+    }
+    /// Extremes; none when nothing is within reach.
+    pub fn summary(&self) -> Option<Summary> {
+        let mut out: Option<Summary> = None;
+        let mut sum = 0.0;
+        for (n, v) in self.values.iter().enumerate().filter(|(_, v)| !v.is_nan()) {
+            let p = self.place(n % self.size.0, n / self.size.0);
+            let v = f64::from(*v);
+            let s = out.get_or_insert(Summary {
+                nodes: 0,
+                area: 0.0,
+                least: (v, p),
+                greatest: (v, p),
+                mean: 0.0,
+                extent: [(p[0], p[0]), (p[1], p[1])],
+            });
+            s.nodes += 1;
+            sum += v;
+            if v < s.least.0 {
+                s.least = (v, p);
+            }
+            if v > s.greatest.0 {
+                s.greatest = (v, p);
+            }
+            for (e, c) in s.extent.iter_mut().zip(p) {
+                *e = (e.0.min(c), e.1.max(c));
+            }
+        }
+        let step = self.step();
+        out.map(|s| Summary { area: s.nodes as f64 * step[0] * step[1], mean: sum / s.nodes as f64, ..s })
+    }
+    /// As a table: one row per node within reach.
+    pub fn csv(&self) -> String {
+        use std::fmt::Write as _;
+        let (a, b) = self.plane.axes();
+        let unit = self.quantity.unit();
+        let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
+        let name = |i: usize| ["x", "y", "z"][i];
+        let mut out = format!("{} mm,{} mm,{}{unit}\n", name(a), name(b), self.quantity.name());
+        for (n, v) in self.values.iter().enumerate().filter(|(_, v)| !v.is_nan()) {
+            let [x, y] = self.place(n % self.size.0, n / self.size.0);
+            let _ = writeln!(out, "{x:.4},{y:.4},{v}");
+        }
+        out
+    }
+}
+
+/// Looks at a machine at places of its work space, with the tool in one direction.
+pub struct Probe<'a> {
+    machine: &'a Machine,
+    kinematics: Box<dyn Kinematics>,
+    /// Turn of the tool in the base.
+    turn: gr_machine::math::M3,
+    start: Vec<f64>,
+}
+
+impl<'a> Probe<'a> {
+    /// With the tool turned as at the machine's start.
+    pub fn new(machine: &'a Machine) -> Probe<'a> {
+        let start = machine.start_joints.clone().unwrap_or_default();
+        Probe { machine, kinematics: machine.kinematics(), turn: machine.start.frame().turn, start }
+    }
+
+    /// With the tool's axis pointing straight down (the flange's Z along −Z of the base).
+    pub fn downward(machine: &'a Machine) -> Probe<'a> {
+        let mut probe = Probe::new(machine);
+        if probe.kinematics.control() == Control::Full && machine.joints.len() >= 6 {
+            probe.turn = gr_machine::math::rot_y(std::f64::consts::PI);
+        }
+        probe
+    }
+
+    /// Joint values for a place, within all limits; the nearest to the start.
+    pub fn joints(&self, p: V3) -> Option<Vec<f64>> {
+        if let Chain::Opw(k) = &self.machine.chain {
+            return self.opw(k, p).map(|q| q.to_vec());
+        }
+        let frame = Frame { turn: self.turn, position: p };
+        let all = self.kinematics.inverse_frame(&frame).ok()?;
+        let good = all.into_iter().map(|s| s.joints).filter(|q| {
+            self.machine.outside(q).is_empty() && self.kinematics.violations(q).is_empty()
+        });
+        good.min_by(|a, b| self.far(a).total_cmp(&self.far(b)))
+    }
+
+    fn far(&self, q: &[f64]) -> f64 {
+        q.iter().zip(self.start.iter().chain(std::iter::repeat(&0.0))).map(|(a, b)| (a - b) * (a - b)).sum()
+    }
+
+    fn opw(&self, k: &Opw, p: V3) -> Option<[f64; 6]> {
+        let all = k.solve(&Frame { turn: self.turn, position: p });
+        let mut best: Option<(f64, [f64; 6])> = None;
+        for (i, q) in all.joints.iter().enumerate().filter(|(i, _)| all.good >> i & 1 == 1) {
+            let far = self.far(q);
+            let inside = self.machine.joints.iter().zip(q).all(|(j, v)| j.allows(*v));
+            // The coupled joint has limits of its own on the controller.
+            if inside && best.is_none_or(|(b, _)| far < b) {
+                if self.machine.cell.coupling.is_some() && !self.machine.outside(q).is_empty() {
+                    continue;
+                }
+                best = Some((far, *q));
+            }
+            let _ = i;
+        }
+        best.map(|(_, q)| q)
+    }
+
+    /// Whether the tool can be put there.
+    pub fn reaches(&self, p: V3) -> bool {
+        match &self.machine.chain {
+            Chain::TwoLegs(k) => legs_reach(k, k.place_of(p)),
+            _ => self.joints(p).is_some(),
+        }
+    }
+
+    /// What moves the tool there; none where it can't be put.
+    pub fn sensitivity(&self, p: V3, geometry: bool) -> Option<Sensitivity> {
+        match &self.machine.chain {
+            Chain::TwoLegs(k) => {
+                let at = k.place_of(p);
+                if !legs_reach(k, at) {
+                    return None;
+                }
+                Sensitivity::of_two_legs(self.machine, k, at)
+            }
+            _ if geometry => Sensitivity::new(self.machine, &self.joints(p)?, [0.0; 3]).ok(),
+            Chain::Opw(k) => {
+                let q = self.opw(k, p)?;
+                let columns = differential::opw(k, &q);
+                Some(self.bare(&q, &columns))
+            }
+            _ => {
+                let q = self.joints(p)?;
+                let columns = differential::velocity(self.machine, &q).ok()?;
+                Some(self.bare(&q, &columns))
+            }
+        }
+    }
+
+    /// Without the geometry's part.
+    fn bare(&self, q: &[f64], columns: &[[f64; 6]]) -> Sensitivity {
+        let stiff = self.machine.cell.stiffness.as_ref();
+        Sensitivity {
+            joints: columns.iter().map(|c| [c[0], c[1], c[2]]).collect(),
+            geometry: Vec::new(),
+            stiffness: q.iter().enumerate().map(|(i, v)| stiff.and_then(|s| s.joint(i, *v))).collect(),
+        }
+    }
+
+    /// The part of the base the tool can reach, roughly: least and greatest X, Y and Z, mm.
+    pub fn extent(&self) -> [(f64, f64); 3] {
+        if let Chain::TwoLegs(k) = &self.machine.chain {
+            let (s, yaw) = (&k.shape, k.shape.yaw.0.abs().max(k.shape.yaw.1.abs()));
+            let side = s.arm.1 * libm::sin(yaw);
+            return [(s.arm.0 * libm::cos(yaw), s.arm.1), (-side, side), s.column];
+        }
+        let mut out = [(f64::INFINITY, f64::NEG_INFINITY); 3];
+        let spread = |j: &gr_machine::Joint| {
+            let wide = if j.kind == gr_machine::JointKind::Revolute { std::f64::consts::PI } else { 500.0 };
+            (j.min.unwrap_or(-wide), j.max.unwrap_or(wide))
+        };
+        for n in 1..4000u32 {
+            let q: Vec<f64> = self
+                .machine
+                .joints
+                .iter()
+                .enumerate()
+                .map(|(i, j)| {
+                    let (low, high) = spread(j);
+                    low + (high - low) * halton(n, [2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37][i % 12])
+                })
+                .collect();
+            if let Ok(f) = self.kinematics.forward_frame(&q) {
+                for (o, p) in out.iter_mut().zip(f.position) {
+                    *o = (o.0.min(p), o.1.max(p));
+                }
+            }
+        }
+        out.map(|(a, b)| if a <= b { (a, b) } else { (-1000.0, 1000.0) })
+    }
+
+    fn value(&self, p: V3, request: &Request, budget: &Budget) -> Option<f64> {
+        if request.quantity == Quantity::Workspace {
+            return self.reaches(p).then_some(1.0);
+        }
+        let geometry = matches!(request.quantity, Quantity::Geometric(_) | Quantity::Total);
+        let s = self.sensitivity(p, geometry)?;
+        let um = 1e3;
+        Some(match request.quantity {
+            Quantity::Workspace => 1.0,
+            Quantity::Condition => 1.0 / share(&s.joints).max(1e-12),
+            Quantity::Singularity => share(&s.joints),
+            Quantity::Kinematic(part) => match (&request.signs, &budget.joints) {
+                (Some(signs), Some(sizes)) => {
+                    let signed: Vec<f64> = sizes.iter().zip(signs).map(|(a, b)| a * b).collect();
+                    um * fixed(&s.joints, &signed, part)
+                }
+                (_, sizes) => um * worst(&s.joints, sizes.as_ref()?, part),
+            },
+            Quantity::Geometric(part) => match &request.deviations {
+                Some(d) => um * fixed(&s.geometry, d, part),
+                None => um * worst(&s.geometry, budget.geometry.as_ref()?, part),
+            },
+            Quantity::Elastic(part) => {
+                let d = s.deflection(request.force)?;
+                um * if let Part::Axis(i) = part { d[i] } else { norm(d) }
+            }
+            Quantity::Total => {
+                let elastic = s.deflection(request.force).map_or(0.0, norm);
+                let of = |c: &[V3], b: &Option<Vec<f64>>| b.as_ref().map_or(0.0, |b| worst(c, b, Part::Length));
+                um * (of(&s.joints, &budget.joints) + of(&s.geometry, &budget.geometry) + elastic)
+            }
+            Quantity::Stiffness => {
+                let c = s.compliance()?;
+                let most = eigenvalues(c.iter().map(|r| r.to_vec()).collect()).into_iter().fold(0.0, f64::max);
+                1e-3 / most
+            }
+        })
+    }
+}
+
+/// The fast form of `TwoLegs::broken(at).is_empty()`.
+fn legs_reach(k: &TwoLegs, at: V3) -> bool {
+    let s = &k.shape;
+    let within = |v: f64, (low, high): (f64, f64)| v >= low && v <= high;
+    if !(within(at[1], s.yaw) && within(at[0], s.arm) && within(at[2], s.column)) {
+        return false;
+    }
+    let h = k.lengths(at);
+    within(h[0], s.legs[0]) && within(h[1], s.legs[1]) && k.broken(at).is_empty()
+}
+
+fn halton(mut n: u32, base: u32) -> f64 {
+    let (mut share, mut out) = (1.0, 0.0);
+    while n > 0 {
+        share /= f64::from(base);
+        out += share * f64::from(n % base);
+        n /= base;
+    }
+    out
+}
+
+/// Least over greatest singular value of the velocities of the tool point.
+fn share(columns: &[V3]) -> f64 {
+    let mut square = [[0.0; 3]; 3];
+    for c in columns {
+        for i in 0..3 {
+            for j in 0..3 {
+                square[i][j] += c[i] * c[j];
+            }
+        }
+    }
+    // A planar machine has two directions; the third says nothing of it.
+    let flat = square[2][2] == 0.0;
+    let size = if flat { 2 } else { 3 };
+    let values = eigenvalues(square[..size].iter().map(|r| r[..size].to_vec()).collect());
+    let most = values.iter().fold(0.0f64, |m, v| m.max(*v));
+    let least = values.iter().fold(f64::INFINITY, |m, v| m.min(*v));
+    if most > 0.0 { libm::sqrt((least / most).max(0.0)) } else { 0.0 }
+}
+
+fn worst(columns: &[V3], sizes: &[f64], part: Part) -> f64 {
+    match part {
+        Part::Axis(i) => columns.iter().zip(sizes).map(|(c, s)| (c[i] * s).abs()).sum(),
+        Part::Length => Spread::new(columns, sizes).longest,
+    }
+}
+
+fn fixed(columns: &[V3], sizes: &[f64], part: Part) -> f64 {
+    let mut sum = [0.0; 3];
+    for (c, s) in columns.iter().zip(sizes) {
+        (0..3).for_each(|i| sum[i] += c[i] * s);
+    }
+    if let Part::Axis(i) = part { sum[i] } else { norm(sum) }
+}
+
+/// Draws up a map, on all cores; `progress` hears how many rows of how many are done.
+pub fn map(probe: &Probe<'_>, budget: &Budget, request: &Request, progress: &(dyn Fn(usize, usize) + Sync)) -> Map {
+    let (a, b) = request.plane.axes();
+    let extent = probe.extent();
+    let window = request.window.unwrap_or([extent[a], extent[b]]);
+    let (nx, ny) = request.size;
+    let mut out =
+        Map { quantity: request.quantity, plane: request.plane, size: request.size, window, values: Vec::new() };
+    out.values = vec![f32::NAN; nx * ny];
+    let step = out.step();
+    let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
+    let rows: Vec<std::sync::Mutex<&mut [f32]>> = out.values.chunks_mut(nx.max(1)).map(std::sync::Mutex::new).collect();
+    let work = || {
+        loop {
+            let j = next.fetch_add(1, Ordering::Relaxed);
+            let Some(row) = rows.get(j) else { break };
+            let Ok(mut row) = row.lock() else { break };
+            for (i, cell) in row.iter_mut().enumerate() {
+                let mut p = [0.0; 3];
+                p[request.plane.axis] = request.plane.at;
+                p[a] = window[0].0 + i as f64 * step[0];
+                p[b] = window[1].0 + j as f64 * step[1];
+                if let Some(v) = probe.value(p, request, budget) {
+                    *cell = v as f32;
+                }
+            }
+            progress(done.fetch_add(1, Ordering::Relaxed) + 1, ny);
+        }
+    };
+    let threads = std::thread::available_parallelism().map_or(1, usize::from).min(16);
+    std::thread::scope(|s| {
+        (1..threads).for_each(|_| {
+            s.spawn(work);
+        });
+        work();
+    });
+    drop(rows);
+    out
+}
+
+/// Volume of the work space, mm³, by layers of a grid.
+pub fn volume(probe: &Probe<'_>, layers: usize, nodes: usize) -> f64 {
+    let extent = probe.extent();
+    let height = (extent[2].1 - extent[2].0) / layers.max(1) as f64;
+    let budget = Budget { joints: None, geometry: None, unsaid: Vec::new() };
+    (0..layers)
+        .map(|i| {
+            let request = Request {
+                quantity: Quantity::Workspace,
+                plane: Plane { axis: 2, at: extent[2].0 + (i as f64 + 0.5) * height },
+                size: (nodes, nodes),
+                window: None,
+                force: [0.0; 3],
+                signs: None,
+                deviations: None,
+            };
+            map(probe, &budget, &request, &|_, _| {}).summary().map_or(0.0, |s| s.area) * height
+        })
+        .sum()
+}
+
+/// Mean movement of the tool point per unit of each number of the geometry, over the nodes within reach: by axis and
+/// in length, mm per mm or rad.
+pub fn mean_sensitivity(probe: &Probe<'_>, plane: Plane, size: (usize, usize)) -> Vec<(String, [f64; 4])> {
+    let names = probe.machine.parameters();
+    let mut sums = vec![[0.0; 4]; names.len()];
+    let mut count = 0usize;
+    let (a, b) = plane.axes();
+    let extent = probe.extent();
+    for j in 0..size.1 {
+        for i in 0..size.0 {
+            let mut p = [0.0; 3];
+            p[plane.axis] = plane.at;
+            let at = |e: (f64, f64), n: usize, of: usize| e.0 + (e.1 - e.0) * n as f64 / (of.max(2) - 1) as f64;
+            p[a] = at(extent[a], i, size.0);
+            p[b] = at(extent[b], j, size.1);
+            let Some(s) = probe.sensitivity(p, true) else { continue };
+            count += 1;
+            for (sum, c) in sums.iter_mut().zip(&s.geometry) {
+                (0..3).for_each(|k| sum[k] += c[k].abs());
+                sum[3] += norm(*c);
+            }
+        }
+    }
+    let mean = |s: [f64; 4]| s.map(|v| v / count.max(1) as f64);
+    names.into_iter().zip(sums).map(|(p, s)| (p.name, mean(s))).collect()
+}
