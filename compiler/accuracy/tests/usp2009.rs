@@ -252,19 +252,20 @@ fn rectangles_and_volume() {
     let m = machine();
     let probe = Probe::new(&m);
     let span = |h: i32| -> Vec<f64> { (-h / 20..=h / 20).map(|i| f64::from(i) * 20.0).collect() };
-    // Known: x 700 to 910, y ±273; x 700 to 890, y ±265; x 670 to 900, y ±125, from a coarser search in y.
+    // Known from a coarser search: inside, and not with 20 mm more on a side. Ours are no smaller.
     for (heights, from, to, half) in
         [(vec![0.0], 700.0, 910.0, 273.0), (span(240), 700.0, 890.0, 265.0), (span(480), 670.0, 900.0, 125.0)]
     {
         let got = rectangle(&probe, &heights).unwrap();
-        assert_eq!((got.0, got.1), (from, to));
-        assert!((half..half + 2.0).contains(&got.2), "{got:?}");
-        let all = |d: f64| {
-            [from - d, to + d].iter().all(|x| heights.iter().all(|z| {
-                probe.reaches([*x, got.2 + d, *z]) && probe.reaches([*x, -got.2 - d, *z])
-            }))
+        let all = |from: f64, to: f64, half: f64| {
+            (0..=20).all(|i| {
+                let x = from + (to - from) * f64::from(i) / 20.0;
+                heights.iter().all(|z| probe.reaches([x, half, *z]) && probe.reaches([x, -half, *z]))
+            })
         };
-        assert!(all(0.0) && !all(20.0));
+        assert!(all(from, to, half) && all(got.0, got.1, got.2));
+        assert!(!all(from, to, half + 20.0) && !all(got.0, got.1, got.2 + 20.0));
+        assert!((got.1 - got.0) * got.2 >= (to - from) * half, "{got:?}");
     }
     let v = volume(&probe, 68, 120) / 1e6;
     assert!((v - 212.3).abs() < 1.0, "{v}");
