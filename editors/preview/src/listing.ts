@@ -33,12 +33,10 @@ export class Listing {
 
   mark(line: number, scroll: boolean) {
     this.marked = line;
-    if (scroll) {
-      const y = line * HEIGHT * this.ratio();
-      const top = this.element.scrollTop;
-      if (y < top || y > top + this.element.clientHeight - HEIGHT) {
-        this.element.scrollTop = y - this.element.clientHeight / 2;
-      }
+    const visible = this.element.clientHeight / HEIGHT;
+    const first = this.element.scrollTop / (HEIGHT * this.ratio());
+    if (scroll && (line < first || line > first + visible - 2)) {
+      this.element.scrollTop = (line - visible / 2) * HEIGHT * this.ratio();
     }
     this.draw();
   }

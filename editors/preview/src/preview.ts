@@ -488,11 +488,11 @@ export class Preview extends HTMLElement {
       this.queued = 0;
       this.frames.push(now);
       if (this.frames.length > 240) this.frames.shift();
-      this.paint(moving);
+      this.paint(moving, now);
     });
   }
 
-  private paint(moving: boolean) {
+  private paint(moving: boolean, now: number) {
     this.drawTime();
     this.measured();
     this.labels.draw(this.scene, this.camera, this.theme, {
@@ -502,7 +502,7 @@ export class Preview extends HTMLElement {
       until: this.until(),
     });
     if (!this.renderer) return;
-    const whole = this.renderer.quick(this.picture());
+    const whole = this.renderer.quick(this.picture(), now);
     if (whole) return;
     this.rest = window.setTimeout(
       () => {

@@ -2,7 +2,7 @@
 // vertex counts). Everything is drawn off screen and copied when a picture is complete: a large path is drawn
 // over several frames while the page stays alive.
 
-import { BUDGET, reduce } from "./lod";
+import { BUDGET, levels } from "./lod";
 import type { Scene } from "./scene";
 
 export type Color = [number, number, number];
@@ -86,7 +86,10 @@ export class Renderer {
   private readonly samples: number;
   private size = [0, 0];
   private count = 0;
-  private chosen: Uint32Array | null = null;
+  /** Points that are drawn while the camera moves, finest first, one after the other in `reduced`. */
+  private levels: Uint32Array[] = [];
+  private level = 0;
+  private lastQuick = 0;
   private waiting = 0;
   private step = BUDGET;
 
@@ -138,14 +141,21 @@ export class Renderer {
     const gl = this.gl;
     this.stop();
     this.count = scene.count;
-    this.chosen = reduce(scene);
+    this.levels = levels(scene);
+    this.level = Math.min(this.level, Math.max(this.levels.length - 1, 0));
     gl.bindBuffer(gl.ARRAY_BUFFER, this.places);
     gl.bufferData(gl.ARRAY_BUFFER, scene.positions, gl.STATIC_DRAW);
     gl.bindBuffer(gl.ARRAY_BUFFER, this.kinds);
     gl.bufferData(gl.ARRAY_BUFFER, scene.kinds, gl.STATIC_DRAW);
     gl.bindVertexArray(this.path);
     gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this.reduced);
-    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, this.chosen ?? new Uint32Array(), gl.STATIC_DRAW);
+    const all = new Uint32Array(this.levels.reduce((sum, l) => sum + l.length, 0));
+    let n = 0;
+    for (const level of this.levels) {
+      all.set(level, n);
+      n += level.length;
+    }
+    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, all, gl.STATIC_DRAW);
   }
 
   /** Makes the drawing surface as large as the canvas is shown. */
@@ -170,16 +180,26 @@ export class Renderer {
   }
 
   /** A quick picture: at most `BUDGET` segments. Returns whether it shows the whole path. */
-  quick(picture: Picture): boolean {
+  quick(picture: Picture, now: number): boolean {
     this.stop();
     this.begin(picture);
-    if (!this.chosen) {
+    const whole = this.levels.length === 0;
+    if (whole) {
       this.strip(picture, 0, this.count);
     } else {
-      this.thin(picture, this.chosen);
+      this.adapt(now);
+      this.thin(picture);
     }
-    this.finish(picture, this.chosen ? this.chosen.length - 1 : this.count - 1, !this.chosen);
-    return !this.chosen;
+    this.finish(picture, (whole ? this.count : this.levels[this.level].length) - 1, whole);
+    return whole;
+  }
+
+  /** Fewer segments when frames of a movement come late, more when they come early. */
+  private adapt(now: number) {
+    const passed = now - this.lastQuick;
+    this.lastQuick = now;
+    if (passed > 50 && passed < 400) this.level = Math.min(this.level + 1, this.levels.length - 1);
+    else if (passed < 18 && passed > 0) this.level = Math.max(this.level - 1, 0);
   }
 
   /** The whole path, a part of it per frame. */
@@ -247,8 +267,11 @@ export class Renderer {
     }
   }
 
-  private thin(picture: Picture, chosen: Uint32Array) {
+  /** The reduced path. */
+  private thin(picture: Picture) {
     const gl = this.gl;
+    const chosen = this.levels[this.level];
+    const offset = this.levels.slice(0, this.level).reduce((sum, l) => sum + l.length, 0);
     gl.bindVertexArray(this.path);
     gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this.reduced);
     let border = chosen.length;
@@ -258,7 +281,7 @@ export class Renderer {
     }
     const draw = (a: number, b: number) => {
       const first = Math.max(a - 1, 0);
-      if (b - first > 1) gl.drawElements(gl.LINE_STRIP, b - first, gl.UNSIGNED_INT, 4 * first);
+      if (b - first > 1) gl.drawElements(gl.LINE_STRIP, b - first, gl.UNSIGNED_INT, 4 * (offset + first));
     };
     this.shade(picture, false);
     draw(0, border);

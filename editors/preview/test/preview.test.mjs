@@ -56,10 +56,16 @@ async function show(address, { theme = "light", width = 1280, height = 720 } = {
 }
 
 const settled = (page) =>
-  until(page, "the whole path", () => {
-    const s = document.querySelector("gcc-robot-preview")?.statistics();
-    return s && s.points > 0 && s.whole && !s.busy;
-  }, null, 60000);
+  until(
+    page,
+    "the whole path",
+    () => {
+      const s = document.querySelector("gcc-robot-preview")?.statistics();
+      return s && s.points > 0 && s.whole && !s.busy;
+    },
+    null,
+    60000,
+  );
 
 const statistics = (page) => page.evaluate(() => document.querySelector("gcc-robot-preview").statistics());
 const project = (page, place) => page.evaluate((p) => document.querySelector("gcc-robot-preview").project(...p), place);
@@ -147,11 +153,16 @@ test("measuring tells the distance of two points", async () => {
   const page = await open("measure.ngc", SQUARE);
   await look(page, "top");
   await page.getByRole("button", { name: "measure" }).click();
-  for (const place of [[10, 0, 0], [30, 40, 0]]) {
+  for (const place of [
+    [10, 0, 0],
+    [30, 40, 0],
+  ]) {
     const [x, y] = await project(page, place);
     await page.mouse.click(x, y);
-    await page.waitForTimeout(60);
   }
+  await until(page, "the distance", () =>
+    document.querySelector("gcc-robot-preview").shadowRoot.querySelector(".note").textContent.includes("ΔX"),
+  );
   const note = await page.locator(".note").textContent();
   const [, length, dx, dy] = note.match(/([\d.]+) mm\nΔX ([-\d.]+) {2}ΔY ([-\d.]+)/).map(Number);
   assert.ok(Math.abs(length - Math.hypot(20, 40)) < 0.3 && Math.abs(dx - 20) < 0.3 && Math.abs(dy - 40) < 0.3, note);
@@ -212,7 +223,9 @@ function million() {
   for (let i = 0; i < 1_000_000; i++) {
     const a = i / 97;
     const r = 10 + i / 9000;
-    out.push(`${i % 1000 === 0 ? "G0" : "G1"} X${(r * Math.cos(a)).toFixed(3)} Y${(r * Math.sin(a)).toFixed(3)} Z${(-i / 40000).toFixed(3)}`);
+    out.push(
+      `${i % 1000 === 0 ? "G0" : "G1"} X${(r * Math.cos(a)).toFixed(3)} Y${(r * Math.sin(a)).toFixed(3)} Z${(-i / 40000).toFixed(3)}`,
+    );
   }
   out.push("M2", "");
   return out.join("\n");
@@ -223,21 +236,25 @@ test("a million segments: load, orbit, rest", { timeout: 240_000 }, async () => 
   const first = await statistics(page);
   assert.ok(first.points >= 1_000_000 && first.segments >= 1_000_000, `${first.points} points`);
 
-  // Orbit by hand for two seconds; frames are those the component drew.
-  await page.mouse.move(500, 360);
-  await page.mouse.down();
-  const begun = await page.evaluate(() => performance.now());
-  let steps = 0;
-  while ((await page.evaluate(() => performance.now())) - begun < 2000) {
-    steps++;
-    await page.mouse.move(500 + (steps % 60) * 4, 360 + (steps % 7));
-  }
-  const moving = await statistics(page);
-  const end = await page.evaluate(() => performance.now());
-  const frames = moving.frames.filter((t) => t >= begun && t <= end).length;
-  const fps = frames / ((end - begun) / 1000);
+  // Orbit for two seconds, one step per frame.
+  const { frames, ms, moving } = await page.evaluate(
+    () =>
+      new Promise((resolve) => {
+        const preview = document.querySelector("gcc-robot-preview");
+        const begun = performance.now();
+        let frames = 0;
+        const step = () => {
+          const ms = performance.now() - begun;
+          if (ms > 2000) return resolve({ frames, ms, moving: preview.statistics() });
+          frames++;
+          preview.orbit(4, frames % 7 ? 1 : -6);
+          requestAnimationFrame(step);
+        };
+        requestAnimationFrame(step);
+      }),
+  );
+  const fps = frames / (ms / 1000);
   assert.ok(!moving.whole && moving.segments <= 100_000, `${moving.segments} segments while moving`);
-  await page.mouse.up();
   const rested = Date.now();
   await settled(page);
   const rest = Date.now() - rested;
@@ -252,7 +269,9 @@ test("a million segments: load, orbit, rest", { timeout: 240_000 }, async () => 
     const at = (k) => (10 + k / 9000) * [Math.cos, Math.sin][d](k / 97);
     return (at(i - 1) + at(i)) / 2;
   });
-  await page.evaluate((l) => { document.querySelector("gcc-robot-preview").line = l; }, line - 1);
+  await page.evaluate((l) => {
+    document.querySelector("gcc-robot-preview").line = l;
+  }, line - 1);
   await page.waitForTimeout(100);
   await settled(page);
   assert.ok(has(await colors(page, [...mid, -i / 40000], 2), MARK), "the segment of a line is where it should be");
@@ -310,7 +329,9 @@ test("served for an editor: cursor, choice and edits go both ways", async () => 
 
   const sent = Date.now();
   server.say({ text: SQUARE.replace("G1 X40", "G1 X40 Y0 Z-5") });
-  await until(page, "the edited text", () => [...document.querySelector("gcc-robot-preview").shadowRoot.querySelectorAll(".row")].some((r) => r.textContent.includes("Z-5")));
+  await until(page, "the edited path", () =>
+    document.querySelector("gcc-robot-preview").shadowRoot.querySelector(".facts").textContent.includes("× 5 mm"),
+  );
   console.log(`# edit to picture: ${Date.now() - sent} ms`);
   await settled(page);
   assert.ok(has(await colors(page, [20, 0, 0]), FEED));
@@ -332,7 +353,9 @@ test("served: a changed file is drawn again, errors are told", async () => {
   await settled(page);
   assert.ok(has(await colors(page, [20, 20, 0], 2), FEED), "the diagonal is there");
   writeFileSync(source, SQUARE.replace("J20", "J19"));
-  await until(page, "the error", () => document.querySelector("gcc-robot-preview").shadowRoot.querySelector(".warning").textContent.includes("line 4"));
+  await until(page, "the error", () =>
+    document.querySelector("gcc-robot-preview").shadowRoot.querySelector(".warning").textContent.includes("line 4"),
+  );
   await page.close();
   server.child.kill();
 });
@@ -347,15 +370,33 @@ test("served: only with the token, only to this computer, only what belongs to i
   const base = `http://${url.host}`;
   assert.equal(await status(server.url), 200);
   assert.equal(await status(`${server.url}path`), 200);
-  for (const path of ["/", "/path", "/0000/", `${url.pathname}../path`, `${url.pathname}%2e%2e/etc/passwd`, `${url.pathname}../../../../etc/passwd`, `${url.pathname}guarded.ngc`]) {
+  for (const path of [
+    "/",
+    "/path",
+    "/0000/",
+    `${url.pathname}../path`,
+    `${url.pathname}%2e%2e/etc/passwd`,
+    `${url.pathname}../../../../etc/passwd`,
+    `${url.pathname}guarded.ngc`,
+  ]) {
     const [status_] = await new Promise((resolve) => {
-      const r = request({ host: url.hostname, port: url.port, path }, (a) => { a.resume(); resolve([a.statusCode]); });
+      const r = request({ host: url.hostname, port: url.port, path }, (a) => {
+        a.resume();
+        resolve([a.statusCode]);
+      });
       r.end();
     });
     assert.ok(status_ === 404 || status_ === 403, `${path}: ${status_}`);
   }
-  assert.equal(await status(server.url, { headers: { host: "evil.example" } }), 403, "a name that leads here from elsewhere");
-  assert.equal(await status(`${server.url}choose`, { method: "POST", body: "3", headers: { origin: "http://evil.example" } }), 403);
+  assert.equal(
+    await status(server.url, { headers: { host: "evil.example" } }),
+    403,
+    "a name that leads here from elsewhere",
+  );
+  assert.equal(
+    await status(`${server.url}choose`, { method: "POST", body: "3", headers: { origin: "http://evil.example" } }),
+    403,
+  );
   assert.equal(await status(`${base}${url.pathname}choose`, { method: "POST", body: "not a number" }), 400);
   assert.equal(await status(server.url, { method: "DELETE" }), 405);
   server.child.kill();
