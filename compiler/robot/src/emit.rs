@@ -262,11 +262,14 @@ impl<'a> Emit<'a> {
 
     /// How deep the tool sags below both ends of a joint move.
     fn sweep(&self, g: &Gathered, m: &Move, here: Option<&Here>, from: &Joints, to: &Joints, findings: &mut Findings<'_>) {
-        let Some(h) = here.filter(|_| m.source.is_some() && self.solver.control == gr_machine::Control::Full) else { return };
+        if here.is_none() || m.source.is_none() || self.solver.control != gr_machine::Control::Full {
+            return;
+        }
         let frame = g.frames[usize::from(m.frame)].frame;
         let tool = g.tools[usize::from(m.tool)].frame;
         let back = frame.inverse();
-        let start = back.apply(g.frames[usize::from(h.frame)].frame.apply(h.position));
+        // The tool may have been changed since: its point of now, where the arm stood.
+        let Some(start) = self.solver.forward(from).map(|f| back.apply(f.then(&tool).position)) else { return };
         let least = start[2].min(m.position[2]);
         let mut lowest = least;
         for k in 1..16 {

@@ -174,7 +174,8 @@ impl<'a> Gather<'a> {
             self.op(&view);
         }
         if !self.ended {
-            self.end(cursor.state(), None);
+            let (pose, state) = (*cursor.pose(), *cursor.state());
+            self.end(&pose, &state);
         }
         self.zones();
     }
@@ -198,7 +199,7 @@ impl<'a> Gather<'a> {
             }
             Op::PathMode(_) => self.path_said = true,
             Op::End => {
-                self.end(view.state, Some(view.source));
+                self.end(view.start, view.state);
                 self.ended = true;
             }
             _ => self.action(view),
@@ -229,8 +230,11 @@ impl<'a> Gather<'a> {
             Op::InputWait { index, digital, wait, timeout } => self.input(index, digital, wait, timeout),
             Op::UserM { code, p, .. } => self.word(&format!("M{code}"), Some(p)),
             Op::Note(Note::Message, text) => self.act(Action::Message(text.to_string())),
+            Op::Note(_, text) if text.starts_with("interpreter:") => {}
             Op::Note(_, text) => self.act(Action::Comment(text.to_string())),
             Op::Begin { text, .. } if !text.is_empty() => self.act(Action::Comment(text.to_string())),
+            // The shuttle that M30 and M60 move; M60 stops the program besides.
+            Op::Stop(Stop::Pallet) => {}
             Op::Stop(stop) => self.act(Action::Pause { optional: stop == Stop::Optional }),
             _ => {}
         }
@@ -502,7 +506,7 @@ impl<'a> Gather<'a> {
             ours: false,
             source: Some(self.source),
         };
-        if first && self.options.approach > 0.0 && self.machine.kind == Kind::Robot {
+        if first && self.comes_from_above() {
             let above = self.above(position, turn);
             self.push(Move { position: above, ours: true, source: None, zone: Zone::Stop, ..m });
             return self.push(Move { way: Way::Line, speed: self.rapid_speed(), length: self.options.approach, ..m });
@@ -532,11 +536,13 @@ impl<'a> Gather<'a> {
     fn rapid_speed(&self) -> f64 {
         self.machine.cell.rapid_speed.unwrap_or(RAPID)
     }
+    fn comes_from_above(&self) -> bool {
+        self.options.approach > 0.0 && self.machine.kind == Kind::Robot && self.control != Control::Position && !self.planar
+    }
     /// A place straight above along the tool.
     fn above(&self, position: [f64; 3], turn: u32) -> [f64; 3] {
         let m = &self.out.turns[turn as usize];
-        let sign = if self.machine.kind == Kind::Robot && self.control != Control::Position && !self.planar { -1.0 } else { 1.0 };
-        [0, 1, 2].map(|i| position[i] + sign * m[i][2] * self.options.approach)
+        [0, 1, 2].map(|i| position[i] - m[i][2] * self.options.approach)
     }
 
     fn rapid(&mut self, view: &View<'_, '_>) {
@@ -720,25 +726,21 @@ impl<'a> Gather<'a> {
         }
     }
 
-    /// Retract, everything off, home.
-    fn end(&mut self, state: &State, source: Option<Source>) {
+    /// Retract, everything off.
+    fn end(&mut self, pose: &Pose, state: &State) {
         if self.waiting && !self.out.items.iter().any(|i| matches!(i, Item::Move(_))) {
-            // A program of rapids alone that never said all coordinates.
-            self.waiting = false;
+            // Rapids alone that left a coordinate where it was.
+            self.go_to(pose, state);
         }
         let last = self.out.items.iter().rev().find_map(|i| if let Item::Move(m) = i { Some(*m) } else { None });
-        if let Some(m) = last.filter(|_| self.options.approach > 0.0 && self.machine.kind == Kind::Robot) {
+        if let Some(m) = last.filter(|_| self.comes_from_above()) {
             let above = self.above(m.position, m.turn);
             let speed = self.rapid_speed();
             let length = self.options.approach;
             self.push(Move { way: Way::Line, position: above, speed, length, rapid: true, ours: true, zone: Zone::Stop, source: None, ..m });
         }
         let made = self.cells.off();
-        let _ = state;
         self.made(made);
-        if let Some(source) = source {
-            self.source = source;
-        }
     }
 
     /// Zones: at most half of both neighbours, none before actions and where a cut and a rapid meet.

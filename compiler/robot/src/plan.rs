@@ -34,6 +34,7 @@ pub fn plan(program: &Program, machine: &Machine, sources: &dyn Sources, options
         solver: Solver::new(machine),
         limits: Limits::new(machine),
         speeds: speeds(machine),
+        told: std::collections::BTreeSet::new(),
     };
     planner.run()
 }
@@ -56,6 +57,7 @@ struct Planner<'a> {
     solver: Solver,
     limits: Limits,
     speeds: Joints,
+    told: std::collections::BTreeSet<Option<(u32, u32)>>,
 }
 
 impl Planner<'_> {
@@ -140,11 +142,9 @@ impl Planner<'_> {
 
     fn leave_out(&mut self, i: usize, last: bool) {
         let which = if last { "last" } else { "first" };
-        let source = self.g.items.iter().find_map(|i| if let Item::Move(Move { source: Some(s), .. }) = i { Some(*s) } else { None });
+        let sourced = |i: &Item| if let Item::Move(Move { source: Some(s), .. }) = i { Some(*s) } else { None };
+        let source = if last { self.g.items.iter().rev().find_map(sourced) } else { self.g.items.iter().find_map(sourced) };
         let args = [format!("{}", self.options.approach), which.to_string()];
-        if let Some((file, line)) = source.map(|s| (s.file, s.line)) {
-            let _ = (file, line);
-        }
         self.findings.say(code::ROBOT_NO_APPROACH, source, &args);
         let Item::Move(m) = self.g.items.remove(i) else { return };
         if m.way == Way::Joint
@@ -167,7 +167,7 @@ impl Planner<'_> {
                     k += 1;
                 }
                 Err(fault) => {
-                    if self.without_ours(chain) || self.divided(chain, &fault) {
+                    if self.without_ours(chain, &fault) || self.divided(chain, &fault) {
                         list = chains(&self.g.items);
                         continue;
                     }
@@ -175,10 +175,8 @@ impl Planner<'_> {
                     k += 1;
                     if fault.item < chain.last && !self.full() {
                         // What comes after is told too, as if the machine stood there.
-                        list.insert(k, Chain { first: fault.item, last: chain.last });
-                        if fault.item == chain.first {
-                            list[k].first = self.next_move(fault.item).unwrap_or(chain.last);
-                        }
+                        let first = self.next_move(fault.item).unwrap_or(chain.last);
+                        list.insert(k, Chain { first, last: chain.last });
                     }
                     if self.full() {
                         break;
@@ -196,10 +194,15 @@ impl Planner<'_> {
         (after + 1..self.g.items.len()).find(|i| matches!(self.g.items[*i], Item::Move(_)))
     }
 
-    /// Tries again without approach and retract.
-    fn without_ours(&mut self, chain: Chain) -> bool {
-        let found = (chain.first..=chain.last).rev().find(|i| matches!(&self.g.items[*i], Item::Move(m) if m.ours));
-        let Some(i) = found else { return false };
+    /// Tries again without the approach or retract that failed.
+    fn without_ours(&mut self, chain: Chain, fault: &Fault) -> bool {
+        let is_ours = |i: usize| matches!(&self.g.items[i], Item::Move(m) if m.ours);
+        // An approach with no configuration in common with what follows fails in what follows.
+        let approach = is_ours(chain.first) && self.next_move(chain.first) == Some(fault.item);
+        let i = if approach { chain.first } else { fault.item };
+        if !is_ours(i) {
+            return false;
+        }
         let last = self.next_move(i).is_none();
         self.leave_out(i, last);
         true
@@ -232,6 +235,10 @@ impl Planner<'_> {
         let m = *m;
         let at = show(fault.position);
         let source = fault.source.or(m.source);
+        // The first point that fails explains those after it.
+        if !self.told.insert(source.map(|s| (s.file.0, s.line))) {
+            return;
+        }
         let first = match &self.g.items[chain.first] {
             Item::Move(f) => f.source.map_or(0, |s| s.line + 1),
             Item::Do(_) => 0,

@@ -1,0 +1,138 @@
+//! Programs planned for machines of the library and for the cell of the examples.
+
+use gr_ir::{FileId, Texts};
+use gr_machine::{Machine, builtin};
+use gr_robot::{Action, Options, Planned, plan};
+use gr_text::Diagnostic;
+
+fn cell() -> Machine {
+    let text = include_str!("../../../docs/examples/irb2400-cell.toml");
+    gr_machine::parse(FileId(0), text).expect("the example is good")
+}
+
+fn motion(text: &str) -> gr_ir::Program {
+    let setup = gr_interp::Setup { tools: gr_interp::assumed_tools(), ..gr_interp::Setup::default() };
+    gr_driver::lower("part.ngc", text.into(), &setup, None).program
+}
+
+fn planned(text: &str, machine: &Machine) -> Result<Planned, Vec<Diagnostic>> {
+    let texts = Texts::new([(FileId(0), text)]);
+    plan(&motion(text), machine, &texts, &Options::default())
+}
+
+fn messages(found: &[Diagnostic], text: &str) -> String {
+    let line = |d: &Diagnostic| {
+        let at = d.primary().1.start as usize;
+        let n = text.get(..at).map_or(0, |t| t.matches('\n').count()) + 1;
+        format!("{} line {n}: {}\n", d.code.def().code, d.message)
+    };
+    found.iter().map(line).collect()
+}
+
+/// A program as one line per step, joints in degrees.
+fn told(p: &Planned) -> String {
+    let mut out = String::new();
+    let joints = |i: u32| {
+        let t = &p.program.targets[i as usize];
+        let q: Vec<String> = p.program.machine.joints.iter().zip(t.joints).map(|(j, v)| if j.kind == gr_machine::JointKind::Revolute { format!("{:.2}", v.to_degrees()) } else { format!("{v:.3}") }).collect();
+        format!("{:?} [{}] b{}", t.position.map(|v| (v * 1e3).round() / 1e3 + 0.0), q.join(" "), t.branch)
+    };
+    for s in &p.program.steps {
+        let line = s.source.map_or("   -".into(), |s| format!("{:4}", s.line + 1));
+        let what = match &s.action {
+            Action::Joint { to, speed, zone } => format!("joint {} at {speed} {zone:?}", joints(*to)),
+            Action::Linear { to, speed, zone, rapid } => format!("{} {} at {speed:.3} {zone:?}", if *rapid { "rapid" } else { "line" }, joints(*to)),
+            Action::Arc { to, angle, speed, zone, .. } => format!("arc {:.1}° {} at {speed:.3} {zone:?}", angle.to_degrees(), joints(*to)),
+            other => format!("{other:?}"),
+        };
+        out += &format!("{line} {what}\n");
+    }
+    out
+}
+
+#[test]
+fn the_example_part() {
+    let text = include_str!("../../../docs/examples/bracket.ngc");
+    let p = planned(text, &cell()).unwrap_or_else(|e| panic!("{}", messages(&e, text)));
+    insta::assert_snapshot!("bracket", told(&p));
+    insta::assert_snapshot!("bracket_summary", format!("{}{:#?}", messages(&p.warnings, text), p.summary));
+}
+
+/// Forward kinematics of every target lead back to its pose.
+#[test]
+fn joints_lead_to_poses() {
+    let text = include_str!("../../../docs/examples/bracket.ngc");
+    let p = planned(text, &cell()).unwrap_or_else(|e| panic!("{}", messages(&e, text))).program;
+    let k = p.machine.kinematics();
+    let (mut tool, mut frame) = (0usize, 0usize);
+    let mut seen = 0;
+    for s in &p.steps {
+        let to = match s.action {
+            Action::UseTool(t) => {
+                tool = usize::from(t);
+                continue;
+            }
+            Action::UseFrame(f) => {
+                frame = usize::from(f);
+                continue;
+            }
+            Action::Joint { to, .. } | Action::Linear { to, .. } | Action::Arc { to, .. } => to,
+            _ => continue,
+        };
+        let t = &p.targets[to as usize];
+        let at = p.frames[frame].frame.inverse().then(&k.forward_frame(&t.joints[..6]).unwrap()).then(&p.tools[tool].frame);
+        let miss = (0..3).map(|i| (at.position[i] - t.position[i]).abs()).fold(0.0, f64::max);
+        assert!(miss < 1e-9, "{miss} at {t:?}");
+        let [w, x, y, z] = t.quaternion;
+        let axis = [2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)];
+        let turn = (0..3).map(|i| (at.turn[i][2] - axis[i]).abs()).fold(0.0, f64::max);
+        assert!(turn < 1e-12, "{turn}");
+        assert!(p.machine.outside(&t.joints[..6]).is_empty());
+        seen += 1;
+    }
+    assert!(seen > 60);
+}
+
+fn faults(text: &str, machine: &Machine) -> String {
+    match planned(text, machine) {
+        Ok(p) => format!("planned\n{}", messages(&p.warnings, text)),
+        Err(e) => messages(&e, text),
+    }
+}
+
+#[test]
+fn what_goes_wrong() {
+    let cell = cell();
+    let mut out = String::new();
+    let rows = [
+        ("out of reach", "T1 M6\nG0 X0 Y0 Z20\nG1 X3000 F500\nG1 X0\nG1 Y5000\nM30\n"),
+        ("unknown tool", "T7 M6\nG0 X0 Y0 Z20\nM30\n"),
+        ("no meaning", "T1 M6\nG0 X0 Y0 Z20\nG38.2 Z0 F100\nM30\n"),
+        ("rotary", "T1 M6\nG0 X0 Y0 Z20\nG1 X50 A20 F600\nM30\n"),
+        ("joint speed", "T1 M6\nG0 X0 Y0 Z20\nG1 X400 F900000\nM30\n"),
+        ("spindle speed", "T1 M6\nS30000 M3\nG0 X0 Y0 Z20\nM30\n"),
+        ("run time", "T1 M6\nG0 X0 Y0 Z20\nM66 P0 L3 Q1\nG1 X#5399 F100\nM30\n"),
+        ("outputs", "T1 M6\nM62 P3\nM64 P1\nG0 X0 Y0 Z20\nM30\n"),
+    ];
+    for (name, text) in rows {
+        out += &format!("{name}:\n{}", faults(text, &cell));
+    }
+    insta::assert_snapshot!("what_goes_wrong", out);
+}
+
+#[test]
+fn other_machines() {
+    let mut out = String::new();
+    let flat = "G0 X50 Y50 Z0 F100\nG1 X60 Y60 C-60 F500\nM30\n";
+    out += &format!("planar:\n{}", faults(flat, &builtin("ufmg/plano-3r").unwrap()));
+    let line = "G0 X850 Y0 Z0\nG1 X900 Y100 Z50 F500\nM30\n";
+    out += &format!("2UPS+PRP:\n{}", faults(line, &builtin("usp/2ups-prp").unwrap()));
+    let far = "G0 X850 Y0 Z0\nG1 X1500 Y0 F500\nG1 X850\nG1 X10 Y0\nG1 X850\nG1 X900 C20\nM30\n";
+    out += &format!("2UPS+PRP, faults:\n{}", faults(far, &builtin("usp/2ups-prp").unwrap()));
+    let lean = "G0 X10 Y10 Z300\nG1 X20 A30 F500\nM30\n";
+    let scara = gr_machine::parse(FileId(0), "format = 1\nid = \"shop/scara\"\nextends = \"adept/one\"\n[frames.table]\nposition = [300, 300, 745]\n").unwrap();
+    out += &format!("scara:\n{}", faults(lean, &scara));
+    out += &format!("mill:\n{}", faults("G0 X10 Y10 Z50\nG1 X20 F500\nG2 X40 I10\nM30\n", &builtin("generic/mill3").unwrap()));
+    out += &format!("five axes:\n{}", faults("G0 X10 Y10 Z50\nG1 X20 A10 C20 F500\nM30\n", &builtin("generic/mill5-ac-table").unwrap()));
+    insta::assert_snapshot!("other_machines", out);
+}
