@@ -460,7 +460,7 @@ impl<'m> Lints<'m, '_> {
         }
         for (n, (d, op)) in smallest {
             let Some(feature) = self.model.at(n) else { continue };
-            let Some(radius) = feature.length("planar_radius") else { continue };
+            let Some(radius) = feature.length("orthogonal_radius") else { continue };
             if radius < d / 2.0 {
                 let v = op.attr("its_tool").map_or(op.keyword_span(), Val::span);
                 let args = vec![show(d), show(radius), feature.id().to_string()];
@@ -551,9 +551,9 @@ impl<'m> Lints<'m, '_> {
     fn radii(&mut self, feature: Node<'m>) {
         let flat = feature.node("bottom_condition").is_some_and(|b| b.is_a("planar_pocket_bottom_condition"));
         if flat
-            && feature.attr("planar_radius").is_none()
-            && let Some(v) = feature.attr("orthogonal_radius")
-            && let Some(r) = feature.length("orthogonal_radius")
+            && feature.attr("orthogonal_radius").is_none()
+            && let Some(v) = feature.attr("planar_radius")
+            && let Some(r) = feature.length("planar_radius")
             && r > 0.0
         {
             self.add(code::STEP_RADIUS_SWAPPED, feature, v.span(), vec![show(r)]);

@@ -110,11 +110,30 @@ impl Emitter<'_> {
                 return self.home(view, code);
             }
         }
+        if self.straight_first(view) {
+            return;
+        }
         if self.displaced {
             return self.come_back(view);
         }
         let words = self.axis_words(view.start, view.end, view.source, &[]);
         self.motion_block(0, &words, &[]);
+    }
+
+    /// A plan begins by going to a safe height: nobody knows where the machine stands over the part by then, so the
+    /// other axes wait for the next move. Says whether it was that.
+    fn straight_first(&mut self, view: &View<'_, '_>) -> bool {
+        let (a, b) = (&view.start.axes, &view.end.axes);
+        let alone = (0..9).all(|i| i == 2 || a[i] == b[i]);
+        let unknown = !self.anchored[0] && !self.anchored[1];
+        if !alone || !unknown || self.words(view.source).is_some() || view.source.line == crate::from_line::INSERTED {
+            return false;
+        }
+        let (text, said) = self.w.axis(2, b[2]);
+        self.set(2, said);
+        self.displaced = false;
+        self.motion_block(0, &[format!("Z{text}")], &[]);
+        true
     }
 
     /// The first rapid after a tool change elsewhere: across at the height of the change, then to its own height.
