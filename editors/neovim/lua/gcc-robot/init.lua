@@ -56,7 +56,7 @@ function M.config(root)
     name = "gcc-robot",
     cmd = { found, "lsp" },
     root_dir = root,
-    settings = { ["gcc-robot"] = M.options.settings },
+    settings = { gccRobot = M.options.settings },
     init_options = M.options.settings,
     on_attach = M.options.on_attach,
   }
@@ -102,7 +102,7 @@ local function enable_by_name()
   end
   vim.lsp.config("gcc_robot", {
     cmd = { found, "lsp" },
-    settings = { ["gcc-robot"] = M.options.settings },
+    settings = { gccRobot = M.options.settings },
     init_options = M.options.settings,
     on_attach = M.options.on_attach,
   })

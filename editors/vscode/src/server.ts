@@ -1,0 +1,106 @@
+// The gcc-robot program: where it is, and the language client that talks to it.
+
+import { existsSync } from "node:fs";
+import { homedir } from "node:os";
+import { delimiter, join } from "node:path";
+import * as vscode from "vscode";
+import { LanguageClient, RevealOutputChannelOn, State } from "vscode-languageclient/node";
+
+export const LANGUAGES = ["gcode", "p21"];
+const SECTION = "gccRobot";
+
+function executable(): string {
+  return process.platform === "win32" ? "gcc-robot.exe" : "gcc-robot";
+}
+
+/** The program: as set, in the extension, on the PATH, where cargo puts it. */
+export function program(context: vscode.ExtensionContext): string | undefined {
+  const set = vscode.workspace.getConfiguration(SECTION).get<string>("server.path")?.trim();
+  if (set) {
+    const path = set.startsWith("~/") ? join(homedir(), set.slice(2)) : set;
+    return path.includes("/") || path.includes("\\") ? (existsSync(path) ? path : undefined) : path;
+  }
+  const folders = (process.env.PATH ?? "").split(delimiter).filter(Boolean);
+  const places = [join(context.extensionPath, "server"), ...folders, join(homedir(), ".cargo", "bin")];
+  return places.map((folder) => join(folder, executable())).find((path) => existsSync(path));
+}
+
+function settings(): unknown {
+  return JSON.parse(JSON.stringify(vscode.workspace.getConfiguration(SECTION)));
+}
+
+export class Server implements vscode.Disposable {
+  client: LanguageClient | undefined;
+  /** What waits for a server, whenever one is started. */
+  private readonly waiting: ((client: LanguageClient) => void)[] = [];
+
+  constructor(private readonly context: vscode.ExtensionContext) {}
+
+  /** Called with every client that is started. */
+  onClient(then: (client: LanguageClient) => void) {
+    this.waiting.push(then);
+    if (this.client) then(this.client);
+  }
+
+  async start() {
+    await this.stop();
+    const command = program(this.context);
+    if (!command) {
+      await missing();
+      return;
+    }
+    const client = new LanguageClient(
+      SECTION,
+      "gcc-robot",
+      { command, args: ["lsp"] },
+      {
+        documentSelector: [
+          ...LANGUAGES.map((language) => ({ scheme: "file", language })),
+          ...LANGUAGES.map((language) => ({ scheme: "untitled", language })),
+          { scheme: "file", pattern: "**/gcc-robot.toml" },
+          { scheme: "file", language: "toml", pattern: "**/*machine*.toml" },
+          { scheme: "file", pattern: "**/*.tbl" },
+        ],
+        initializationOptions: settings(),
+        synchronize: {
+          configurationSection: SECTION,
+          fileEvents: vscode.workspace.createFileSystemWatcher("**/*.{ngc,nc,tbl,var,ini,toml,NGC,NC,TBL,VAR,INI}"),
+        },
+        revealOutputChannelOn: RevealOutputChannelOn.Never,
+      },
+    );
+    this.client = client;
+    for (const then of this.waiting) then(client);
+    try {
+      await client.start();
+    } catch (problem) {
+      void vscode.window.showErrorMessage(`gcc-robot: ${command} lsp did not start: ${problem}`);
+    }
+  }
+
+  async stop() {
+    const client = this.client;
+    this.client = undefined;
+    if (client?.state === State.Running) await client.stop();
+  }
+
+  dispose() {
+    void this.stop();
+  }
+
+  /** The running client; says so when there is none. */
+  running(): LanguageClient | undefined {
+    if (this.client?.state === State.Running) return this.client;
+    void vscode.window.showWarningMessage("gcc-robot: the language server is not running.");
+    return undefined;
+  }
+}
+
+async function missing() {
+  const set = "Name it in the settings";
+  const chosen = await vscode.window.showErrorMessage(
+    "The program gcc-robot was not found on the PATH. Install it with `cargo install --path compiler/cli` in a clone of the project.",
+    set,
+  );
+  if (chosen === set) await vscode.commands.executeCommand("workbench.action.openSettings", `${SECTION}.server.path`);
+}
