@@ -1,0 +1,92 @@
+//! Names a controller accepts: made of letters, digits and `_`, short enough, unique, not reserved.
+
+use std::collections::BTreeSet;
+
+/// What names look like in a language.
+#[derive(Clone, Copy)]
+pub(crate) struct Rule {
+    /// At most so many characters.
+    pub longest: usize,
+    /// Reserved words, upper case.
+    pub reserved: &'static [&'static str],
+    /// Capital letters only.
+    pub upper: bool,
+}
+
+/// The names given so far. Capitals don't tell names apart.
+pub(crate) struct Names {
+    rule: Rule,
+    taken: BTreeSet<String>,
+}
+
+impl Names {
+    pub(crate) fn new(rule: Rule) -> Names {
+        Names { rule, taken: BTreeSet::new() }
+    }
+
+    /// A name as near to the wanted one as the language allows; `prefix` where that begins with no letter.
+    pub(crate) fn give(&mut self, wanted: &str, prefix: &str) -> String {
+        let mut base: String = wanted.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
+        if !base.starts_with(|c: char| c.is_ascii_alphabetic()) {
+            base = format!("{prefix}{base}");
+        }
+        if self.rule.upper {
+            base.make_ascii_uppercase();
+        }
+        base.truncate(self.rule.longest);
+        let mut name = base.clone();
+        for n in 2u64.. {
+            if self.free(&name) {
+                break;
+            }
+            let tail = format!("_{n}");
+            name = base[..base.len().min(self.rule.longest.saturating_sub(tail.len()))].to_string() + &tail;
+        }
+        self.taken.insert(name.to_ascii_uppercase());
+        name
+    }
+
+    fn free(&self, name: &str) -> bool {
+        let upper = name.to_ascii_uppercase();
+        !self.taken.contains(&upper) && !self.rule.reserved.contains(&upper.as_str()) && !predefined(&upper)
+    }
+}
+
+/// `V100`, `Z50`, `P12` …: the data that controllers come with are called so.
+fn predefined(upper: &str) -> bool {
+    let mut rest = upper.chars();
+    matches!(rest.next(), Some('V' | 'Z' | 'P' | 'R')) && upper.len() > 1 && rest.all(|c| c.is_ascii_digit())
+}
+
+/// Whether a name that exists on the controller (a signal, a routine) can be written as it is.
+pub(crate) fn plain(name: &str) -> bool {
+    name.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_' || c == '$')
+        && name.chars().all(|c| c.is_ascii_alphanumeric() || matches!(c, '_' | '$' | '.' | ':'))
+}
+
+/// The number in a signal's name: `5`, `DO[5]`, `OT#(5)`, `$OUT[5]`, `out_5`.
+pub(crate) fn number(name: &str) -> Option<u32> {
+    let mut groups = name.split(|c: char| !c.is_ascii_digit()).filter(|g| !g.is_empty());
+    let (one, more) = (groups.next()?, groups.next());
+    if more.is_some() { None } else { one.parse().ok() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names() {
+        let mut n = Names::new(Rule { longest: 8, reserved: &["MODULE"], upper: false });
+        assert_eq!(n.give("module", "p"), "module_2");
+        assert_eq!(n.give("flansch-größe", "p"), "flansch_");
+        assert_eq!(n.give("flansch größe", "p"), "flansc_2");
+        assert_eq!(n.give("10mm", "t"), "t10mm");
+        assert_eq!(n.give("v100", "t"), "v100_2");
+        assert_eq!(n.give("", "t"), "t");
+        assert_eq!(number("OT#(5)"), Some(5));
+        assert_eq!(number("doSpindle"), None);
+        assert_eq!(number("a1b2"), None);
+        assert!(plain("doSpindle") && !plain("do spindle") && !plain("x;y"));
+    }
+}

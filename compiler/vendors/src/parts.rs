@@ -1,0 +1,95 @@
+//! Text of a program in parts: a part is closed when the controller would take no more of it.
+
+/// Lines of a program, cut into parts.
+pub(crate) struct Parts {
+    /// The part in work.
+    pub text: String,
+    lines: u64,
+    points: u64,
+    most: (u64, u64, u64),
+    done: Vec<String>,
+    end: &'static str,
+}
+
+impl Parts {
+    /// Parts of at most so many lines, points and bytes; `end` ends a line.
+    pub(crate) fn new(lines: u64, points: Option<u64>, bytes: Option<u64>, end: &'static str) -> Parts {
+        let most = (lines.max(20), points.unwrap_or(u64::MAX).max(10), bytes.unwrap_or(u64::MAX).max(4000));
+        Parts { text: String::new(), lines: 0, points: 0, most, done: Vec::new(), end }
+    }
+    /// Ends the line that was appended to `text`.
+    pub(crate) fn end_line(&mut self) {
+        self.text.push_str(self.end);
+        self.lines += 1;
+    }
+    /// Appends a line.
+    pub(crate) fn line(&mut self, line: &str) {
+        self.text.push_str(line);
+        self.end_line();
+    }
+    /// Counts points used.
+    pub(crate) fn points(&mut self, count: u64) {
+        self.points += count;
+    }
+    /// Lines of the part in work.
+    pub(crate) fn lines(&self) -> u64 {
+        self.lines
+    }
+    /// Whether the next statements (at most so many lines and two points) still have room.
+    pub(crate) fn full(&self, lines: u64) -> bool {
+        self.lines + lines > self.most.0 || self.points + 2 > self.most.1 || self.text.len() as u64 + 400 > self.most.2
+    }
+    /// Closes the part in work.
+    pub(crate) fn cut(&mut self) {
+        self.done.push(std::mem::take(&mut self.text));
+        (self.lines, self.points) = (0, 0);
+    }
+    /// All parts.
+    pub(crate) fn finish(mut self) -> Vec<String> {
+        if !self.text.is_empty() || self.done.is_empty() {
+            self.cut();
+        }
+        self.done
+    }
+}
+
+/// Lines of a program that is never split: too many are an error.
+pub(crate) struct Lines {
+    /// The text.
+    pub text: String,
+    count: u64,
+    indent: &'static str,
+    remark: &'static str,
+}
+
+impl Lines {
+    /// With so much in front of each line, and what begins a remark.
+    pub(crate) fn new(indent: &'static str, remark: &'static str) -> Lines {
+        Lines { text: String::new(), count: 0, indent, remark }
+    }
+    /// Appends a line, with the number of the source line where one is due.
+    pub(crate) fn line(&mut self, cx: &mut crate::walk::Cx, text: &str) {
+        self.text.push_str(self.indent);
+        self.text.push_str(text);
+        if let Some(line) = cx.remark {
+            self.text.push_str(&format!(" {} {line}", self.remark));
+        }
+        self.text.push_str("\r\n");
+        self.count += 1;
+        let limits = &cx.machine.cell.controller;
+        let over = |most: Option<u64>, now: u64| most.is_some_and(|m| now > m);
+        if over(limits.lines, self.count) || over(limits.bytes, self.text.len() as u64) {
+            let most = limits.lines.unwrap_or(0).max(limits.bytes.unwrap_or(0));
+            let args = ["more".to_string(), "lines or bytes".into(), most.to_string(), cx.traits.title.into()];
+            cx.say(gr_text::code::VENDOR_PROGRAM_TOO_LONG, &args);
+        }
+    }
+    /// Appends remarks.
+    pub(crate) fn remark(&mut self, cx: &mut crate::walk::Cx, text: &str) {
+        let text = cx.ascii(text);
+        for piece in crate::walk::wrapped(&text, 100) {
+            let line = format!("{} {piece}", self.remark);
+            self.line(cx, &line);
+        }
+    }
+}

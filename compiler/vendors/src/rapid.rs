@@ -1,0 +1,351 @@
+//! ABB RAPID: program modules (IRC5, OmniCore) and the `.pgf` file that lists them.
+//!
+//! Facts: robtarget, confdata, speeddata and zonedata as in ABB's *RAPID Instructions, Functions and Data types*
+//! (3HAC050917); quadrants as in *Basic Characteristics RAPID*. Speeds and zones are data of the program's own: the
+//! controller's come in steps.
+
+use crate::name::{Names, Rule};
+use crate::number::{down, num, short, single};
+use crate::parts::Parts;
+use crate::walk::{Arms, Body, Cx, Op, Traits, Value, any_error, walk, wrapped};
+use crate::{Language, Options, Output, OutputFile, orient};
+use gr_ir::Sources;
+use gr_machine::math::Frame;
+use gr_robot::{RobotProgram, Target};
+use std::collections::BTreeMap;
+use std::fmt::Write;
+
+pub(crate) struct Rapid;
+
+static TRAITS: Traits = Traits { title: "ABB RAPID", arms: Arms::Spherical, arcs: true, trailing: true, unverified: "" };
+
+/// Reserved words (*RAPID Kernel*, 3HAC050946) and data that every system has.
+const RESERVED: &[&str] = &[
+    "ALIAS", "AND", "BACKWARD", "CASE", "CONNECT", "CONST", "DEFAULT", "DIV", "DO", "ELSE", "ELSEIF", "ENDFOR", "ENDFUNC", "ENDIF",
+    "ENDMODULE", "ENDPROC", "ENDRECORD", "ENDTEST", "ENDTRAP", "ENDWHILE", "ERROR", "EXIT", "FALSE", "FOR", "FROM", "FUNC", "GOTO",
+    "IF", "INOUT", "LOCAL", "MOD", "MODULE", "NOSTEPIN", "NOT", "NOVIEW", "OR", "PERS", "PROC", "RAISE", "READONLY", "RECORD",
+    "RETRY", "RETURN", "STEP", "SYSMODULE", "TASK", "TEST", "THEN", "TO", "TRAP", "TRUE", "TRYNEXT", "UNDO", "VAR", "VIEWONLY",
+    "WHILE", "WITH", "XOR", "FINE", "VMAX", "TOOL0", "WOBJ0", "LOAD0", "MAIN", "BASE", "USER",
+];
+
+/// Lines of a module: what ABB's reference post processors keep to.
+const LINES: u64 = 5000;
+
+impl Language for Rapid {
+    fn id(&self) -> &'static str {
+        "rapid"
+    }
+
+    fn emit(&self, program: &RobotProgram, sources: &dyn Sources, options: &Options) -> Output {
+        let mut names = Names::new(Rule { longest: 32, reserved: RESERVED, upper: false });
+        let module = names.give(&program.name, "P");
+        let tools: Vec<String> = program.tools.iter().map(|t| names.give(&t.name, "t")).collect();
+        let frames: Vec<String> = program.frames.iter().map(|f| names.give(&f.name, "w")).collect();
+        let limits = &program.machine.cell.controller;
+        let mut w = Writer {
+            parts: Parts::new(limits.lines.unwrap_or(LINES).saturating_sub(4), limits.points, limits.bytes, "\r\n"),
+            names,
+            tools,
+            frames,
+            tail: (None, String::new()),
+            speeds: BTreeMap::new(),
+            zones: BTreeMap::new(),
+            turn: (([0.0; 4]), String::new()),
+        };
+        let mut out = walk(program, sources, options, &TRAITS, &mut w);
+        if !any_error(&out.findings) {
+            out.files = w.files(&module, program);
+        }
+        out
+    }
+}
+
+struct Writer {
+    parts: Parts,
+    names: Names,
+    tools: Vec<String>,
+    frames: Vec<String>,
+    /// `,tool\WObj:=frame;` of the tool and frame in use.
+    tail: (Option<(usize, usize)>, String),
+    /// Declared speeds and zones: value as text → name.
+    speeds: BTreeMap<String, String>,
+    zones: BTreeMap<String, String>,
+    /// The last quaternion and its text.
+    turn: ([f64; 4], String),
+}
+
+impl Writer {
+    fn files(self, module: &str, program: &RobotProgram) -> Vec<OutputFile> {
+        let mut head = format!("%%%\r\n  VERSION:1\r\n  LANGUAGE:ENGLISH\r\n%%%\r\nMODULE {module}\r\n");
+        for (tool, name) in program.tools.iter().zip(&self.tools) {
+            // A load of no mass or at the flange is refused: the least that is taken stands for "not known".
+            let center = tool.frame.position.map(|v| v / 2.0);
+            let center = if center.iter().all(|v| v.abs() < 0.001) { [0.0, 0.0, 0.001] } else { center };
+            let mass = tool.mass.unwrap_or(0.001).max(0.001);
+            if tool.mass.is_none() {
+                let _ = write!(head, "  ! {name}: mass and center of gravity are not known, set them before running\r\n");
+            }
+            let _ = write!(
+                head,
+                "  PERS tooldata {name}:=[TRUE,{},[{},{},[1,0,0,0],0,0,0]];\r\n",
+                pose(&tool.frame),
+                num(mass, 3),
+                list(&center, 3)
+            );
+        }
+        for (frame, name) in program.frames.iter().zip(&self.frames) {
+            let _ = write!(head, "  TASK PERS wobjdata {name}:=[FALSE,TRUE,\"\",{},[[0,0,0],[1,0,0,0]]];\r\n", pose(&frame.frame));
+        }
+        for (value, name) in by_name(&self.speeds) {
+            let _ = write!(head, "  CONST speeddata {name}:={value};\r\n");
+        }
+        for (value, name) in by_name(&self.zones) {
+            let _ = write!(head, "  CONST zonedata {name}:={value};\r\n");
+        }
+        let mut names = self.names;
+        let parts = self.parts.finish();
+        let start = "    ConfJ\\On;\r\n    ConfL\\Off;\r\n    SingArea\\Wrist;\r\n";
+        let mut files = Vec::new();
+        let mut list = vec![format!("{module}.mod")];
+        head += &format!("  PROC main()\r\n{start}");
+        if let [one] = parts.as_slice() {
+            head += one;
+        } else {
+            for (i, part) in parts.iter().enumerate() {
+                let inner = names.give(&format!("{module}_{:03}", i + 1), "P");
+                let routine = names.give(&format!("r{module}_{:03}", i + 1), "P");
+                head += &format!("    {routine};\r\n");
+                let text = format!("%%%\r\n  VERSION:1\r\n  LANGUAGE:ENGLISH\r\n%%%\r\nMODULE {inner}\r\n  PROC {routine}()\r\n{part}  ENDPROC\r\nENDMODULE\r\n");
+                list.push(format!("{inner}.mod"));
+                files.push(OutputFile::new(format!("{inner}.mod"), text));
+            }
+        }
+        head += "  ENDPROC\r\nENDMODULE\r\n";
+        files.push(OutputFile::new(format!("{module}.mod"), head));
+        let modules: String = list.iter().map(|m| format!("\t<Module>{m}</Module>\r\n")).collect();
+        let index = format!("<?xml version=\"1.0\" encoding=\"ISO-8859-1\" ?>\r\n<Program>\r\n{modules}</Program>\r\n");
+        files.push(OutputFile::new(format!("{module}.pgf"), index));
+        files
+    }
+
+    fn line(&mut self, text: &str) {
+        self.parts.text.push_str("    ");
+        self.parts.line(text);
+    }
+
+    fn target(&mut self, cx: &Cx, t: &Target) {
+        if self.turn.1.is_empty() || self.turn.0 != t.quaternion {
+            self.turn = (t.quaternion, unit(&t.quaternion));
+        }
+        let out = &mut self.parts.text;
+        out.push('[');
+        push_list(out, &t.position, cx.decimals());
+        out.push(',');
+        out.push_str(&self.turn.1);
+        out.push(',');
+        let n = cx.machine.joints.len().min(t.joints.len());
+        let serial = cx.machine.cell.coupling.is_none();
+        let (q1, q4, q5, q6) = (t.joints[0], t.joints[3], t.joints[4], t.joints[5]);
+        // The fourth field numbers the eight ways of a serial arm; an arm with a parallelogram can't turn its elbow.
+        let way = if serial && n == 6 {
+            let p = cx.posture(t);
+            4 * u8::from(p.behind) + 2 * u8::from(!p.forward) + u8::from(q5 < 0.0)
+        } else {
+            0
+        };
+        let _ = write!(out, "[{},{},{},{way}],", quadrant(q1), quadrant(q4), quadrant(q6));
+        external(out, cx, t);
+        out.push(']');
+    }
+
+    fn speed(&mut self, mm: f64, turn: f64, prefix: &str) -> String {
+        let value = format!("[{},{},5000,1000]", single(mm), single(turn));
+        let next = self.speeds.len() + 1;
+        if let Some(name) = self.speeds.get(&value) {
+            return name.clone();
+        }
+        let name = self.names.give(&format!("v{prefix}{next}"), "v");
+        self.speeds.insert(value, name.clone());
+        name
+    }
+
+    fn zone(&mut self, zone: Option<f64>) -> String {
+        let Some(r) = zone.map(down).filter(|r| *r >= 0.001) else { return "fine".into() };
+        let (r, tenth) = (num(r, 6), num(r / 10.0, 6));
+        let value = format!("[FALSE,{r},{r},{r},{tenth},{r},{tenth}]");
+        let next = self.zones.len() + 1;
+        if let Some(name) = self.zones.get(&value) {
+            return name.clone();
+        }
+        let name = self.names.give(&format!("zP{next}"), "z");
+        self.zones.insert(value, name.clone());
+        name
+    }
+
+    fn finish(&mut self, cx: &Cx, speed: &str, zone: &str) {
+        let key = (cx.tool, cx.frame);
+        if self.tail.0 != Some(key) {
+            let tool = self.tools.get(cx.tool).map_or("tool0", String::as_str);
+            let frame = self.frames.get(cx.frame).map_or("wobj0", String::as_str);
+            self.tail = (Some(key), format!(",{tool}\\WObj:={frame};"));
+        }
+        let out = &mut self.parts.text;
+        out.push(',');
+        out.push_str(speed);
+        out.push(',');
+        out.push_str(zone);
+        out.push_str(&self.tail.1);
+        if let Some(line) = cx.remark {
+            let _ = write!(out, " ! {line}");
+        }
+        self.parts.end_line();
+    }
+
+    fn motion(&mut self, cx: &Cx, word: &str, targets: &[&Target], speed: &str, zone: &str) {
+        if self.parts.full(2) {
+            self.parts.cut();
+        }
+        self.parts.text.push_str("    ");
+        self.parts.text.push_str(word);
+        for (i, t) in targets.iter().enumerate() {
+            self.parts.text.push(if i == 0 { ' ' } else { ',' });
+            self.target(cx, t);
+        }
+        self.parts.points(targets.len() as u64);
+        self.finish(cx, speed, zone);
+    }
+}
+
+impl Body for Writer {
+    fn op(&mut self, cx: &mut Cx, op: Op) {
+        match op {
+            Op::Line(number, text) => {
+                let text = cx.ascii(text);
+                self.line(&format!("! {number}: {text}"));
+            }
+            Op::Home(t) => {
+                let speed = self.joint_speed(cx, 1.0);
+                let mut text = format!("MoveAbsJ [{},", list(&cx.degrees(t), 5));
+                external(&mut text, cx, t);
+                self.parts.text.push_str("    ");
+                self.parts.text.push_str(&text);
+                self.parts.text.push_str("]\\NoEOffs");
+                self.finish(cx, &speed, "fine");
+            }
+            Op::Joint { to, share, zone } => {
+                let (speed, zone) = (self.joint_speed(cx, share), self.zone(zone));
+                self.motion(cx, "MoveJ", &[to], &speed, &zone);
+            }
+            Op::Linear { to, speed, zone } => {
+                let (speed, zone) = (self.speed(speed, 500.0, "F"), self.zone(zone));
+                self.motion(cx, "MoveL", &[to], &speed, &zone);
+            }
+            Op::Arc { via, to, speed, zone } => {
+                let (speed, zone) = (self.speed(speed, 500.0, "F"), self.zone(zone));
+                self.motion(cx, "MoveC", &[via, to], &speed, &zone);
+            }
+            // Tool and frame are arguments of every move.
+            Op::Tool(_) | Op::Frame(_) | Op::End => {}
+            Op::Set { name, value, word } => {
+                let name = cx.known(name, word);
+                match value {
+                    Value::Digital(on) => self.line(&format!("SetDO {name},{};", u8::from(on))),
+                    Value::Analog(v) => self.line(&format!("SetAO {name},{};", num(v, 6))),
+                }
+            }
+            Op::Call { name, value } => {
+                let name = cx.known(name, "routine");
+                self.line(&value.map_or(format!("{name};"), |v| format!("{name} {};", num(v, 6))));
+            }
+            Op::Wait { name, on, timeout } => {
+                let name = cx.known(name, "wait");
+                let most = timeout.map_or(String::new(), |t| format!("\\MaxTime:={}", num(t, 3)));
+                self.line(&format!("WaitDI {name},{}{most};", u8::from(on)));
+            }
+            Op::Dwell(s) => self.line(&format!("WaitTime\\InPos,{};", num(s, 3))),
+            Op::Message(text) => {
+                let text = cx.ascii(text);
+                for piece in wrapped(&text, 80) {
+                    self.line(&format!("TPWrite \"{}\";", piece.replace('\\', "/").replace('"', "\"\"")));
+                }
+            }
+            Op::Comment(text) => {
+                let text = cx.ascii(text);
+                self.line(&format!("! {text}"));
+            }
+            Op::Pause => self.line("Stop;"),
+        }
+        if cx.failed() {
+            self.parts.text.clear();
+        }
+    }
+}
+
+impl Writer {
+    /// Joint moves are told a speed of the tool too; a full one is that of the fastest predefined data.
+    fn joint_speed(&mut self, cx: &Cx, share: f64) -> String {
+        let full = cx.machine.cell.rapid_speed.unwrap_or(1000.0);
+        self.speed((full * share).max(0.1), (500.0 * share).max(0.1), "J")
+    }
+}
+
+fn by_name(table: &BTreeMap<String, String>) -> Vec<(&String, &String)> {
+    let mut rows: Vec<_> = table.iter().collect();
+    rows.sort_by_key(|(_, name)| (name.len(), *name));
+    rows
+}
+
+fn quadrant(angle: f64) -> i32 {
+    // A ten-thousandth of a degree below zero is zero as far as any controller can tell.
+    libm::floor((angle.to_degrees() + 1e-4) / 90.0) as i32
+}
+
+fn push_list(out: &mut String, values: &[f64], decimals: usize) {
+    out.push('[');
+    for (i, v) in values.iter().enumerate() {
+        if i > 0 {
+            out.push(',');
+        }
+        short(out, *v, decimals);
+    }
+    out.push(']');
+}
+
+fn list(values: &[f64], decimals: usize) -> String {
+    let mut out = String::new();
+    push_list(&mut out, values, decimals);
+    out
+}
+
+fn external(out: &mut String, cx: &Cx, t: &Target) {
+    if cx.machine.cell.external.is_empty() {
+        out.push_str("[9E9,9E9,9E9,9E9,9E9,9E9]");
+        return;
+    }
+    let values = cx.external(t);
+    out.push('[');
+    for i in 0..6 {
+        if i > 0 {
+            out.push(',');
+        }
+        match values.get(i) {
+            Some(v) => short(out, *v, 4),
+            None => out.push_str("9E9"),
+        }
+    }
+    out.push(']');
+}
+
+/// A quaternion of eight decimals whose length is 1 again after rounding: the largest part makes up for the others.
+fn unit(q: &[f64; 4]) -> String {
+    let largest = (0..4).max_by(|a, b| q[*a].abs().total_cmp(&q[*b].abs())).unwrap_or(0);
+    let mut parts = q.map(|v| libm::round(v * 1e8) / 1e8);
+    let rest: f64 = (0..4).filter(|i| *i != largest).map(|i| parts[i] * parts[i]).sum();
+    parts[largest] = libm::copysign(libm::sqrt((1.0 - rest).max(0.0)), q[largest]);
+    list(&parts, 8)
+}
+
+fn pose(frame: &Frame) -> String {
+    format!("[{},{}]", list(&frame.position, 4), unit(&orient::quaternion(&frame.turn)))
+}
+

@@ -1,0 +1,81 @@
+//! Universal Robots URScript.
+
+use super::simple::{State, signal};
+use super::{Configuration, Event, Fault, File, Place, after, between, numbers, without_remark};
+use gr_machine::math::{Frame, about, norm, scale};
+
+/// Reads a script.
+pub fn read(files: &[File]) -> Result<Vec<Event>, Fault> {
+    let text = &super::main_file(files, ".script")?.1;
+    let mut s = State::new();
+    // Poses are in the base.
+    s.frame = Some(Frame::IDENTITY);
+    let mut depth = 0;
+    for raw in text.lines() {
+        let line = without_remark(raw, "#");
+        let fault = || raw.to_string();
+        if line.starts_with("while ") || line.starts_with("if ") {
+            depth += 1;
+            if line.starts_with("while ") {
+                s.events.push(Event::Wait(signal(between(line, "in(", ")").ok_or_else(fault)?), line.contains("not ")));
+            }
+            continue;
+        }
+        if depth > 0 {
+            depth -= u32::from(line == "end");
+            continue;
+        }
+        let Some((name, rest)) = line.split_once('(') else { continue };
+        step(&mut s, name, rest).ok_or_else(fault)?;
+    }
+    s.events.pop();
+    Ok(s.events)
+}
+
+/// Meters and rotation vector.
+fn pose(text: &str) -> Option<Frame> {
+    let v = numbers(text);
+    let [x, y, z, a, b, c] = *v.get(..6)? else { return None };
+    let angle = norm([a, b, c]);
+    let turn = if angle > 0.0 { about(scale([a, b, c], 1.0 / angle), angle) } else { Frame::IDENTITY.turn };
+    Some(Frame { turn, position: [x * 1000.0, y * 1000.0, z * 1000.0] })
+}
+
+fn step(s: &mut State, name: &str, rest: &str) -> Option<()> {
+    let poses: Vec<&str> = rest.split("p[").skip(1).filter_map(|p| p.split(']').next()).collect();
+    let speed = || Some(after(rest, ",v=")? * 1000.0);
+    match name {
+        "movej" => {
+            let joints = between(rest, ",[", "]").or_else(|| between(rest, "[", "]"))?;
+            let joints: Vec<f64> = numbers(joints).iter().map(|v| v.to_degrees()).collect();
+            match poses.first() {
+                Some(p) => {
+                    let place = s.place(pose(p)?, Configuration::Near(joints));
+                    s.events.push(Event::Joint(place));
+                }
+                None => s.joint(joints),
+            }
+        }
+        "movel" => {
+            s.speed = speed()?;
+            s.zone = after(rest, ",r=").map(|r| r * 1000.0).filter(|r| *r > 0.0);
+            let place = s.place(pose(poses.first()?)?, Configuration::Same);
+            s.linear(place);
+        }
+        "movec" => {
+            s.speed = speed()?;
+            s.zone = None;
+            let place = |p: &str| -> Option<Place> { Some(s.place(pose(p)?, Configuration::Same)) };
+            let (via, to) = (place(poses.first()?)?, place(poses.get(1)?)?);
+            s.arc(via, to);
+        }
+        "set_tcp" => s.tool = Some(pose(poses.first()?)?),
+        "set_standard_digital_out" => s.set(signal(rest), f64::from(u8::from(rest.contains("True")))),
+        "set_standard_analog_out" => s.set(signal(rest), *numbers(rest).get(1)?),
+        "sleep" => s.events.push(Event::Dwell(numbers(rest)[0])),
+        "textmsg" | "popup" | "set_payload" => {}
+        name if name.starts_with("def ") => {}
+        name => s.events.push(Event::Call(name.into(), numbers(rest).first().copied())),
+    }
+    Some(())
+}
