@@ -3,7 +3,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use gr_ir::{Marker, Note, Op, Program, Stop};
+use gr_ir::{Marker, Note, Op, PathMode, Program, Stop};
 use gr_text::{Diagnostic, FileId, LineIndex, Severity, code};
 
 use crate::emit::Emit;
@@ -12,6 +12,8 @@ use crate::{drill, explicit, mill};
 
 /// Above the part, where the security plane is inside it, mm.
 const ABOVE_STOCK: f64 = 5.0;
+/// The part of the tolerance that the control may use at corners: one in so many.
+const BLEND_SHARE: f64 = 5.0;
 
 /// What can be chosen.
 #[derive(Clone, PartialEq, Debug, Default)]
@@ -88,6 +90,9 @@ pub fn plan(text: &[u8], file: FileId, options: &Options) -> (Option<Planned>, V
     };
     p.e.b.file(file, &options.name);
     p.e.begin();
+    // Controls round corners as they please unless they are told how far they may go.
+    let share = p.tolerance / BLEND_SHARE;
+    p.e.push(Op::PathMode(PathMode::Blend(share)));
     p.security = highest(&process);
     p.elements(&process.elements);
     let security = p.security;

@@ -58,6 +58,8 @@ pub enum Order {
 pub struct Clear {
     /// Tool radius, mm.
     pub radius: f64,
+    /// How far from its axis the tool leaves a clean floor, mm: its radius, or less with a rounded edge.
+    pub clean: f64,
     /// Distance between passes, mm: tool diameter × (1 − overlap). At most the diameter.
     pub stepover: f64,
     /// Left on every wall, mm.
@@ -83,6 +85,7 @@ impl Clear {
     pub fn new(radius: f64, stepover: f64, strategy: Strategy) -> Self {
         Self {
             radius,
+            clean: radius,
             stepover,
             allowance: 0.0,
             strategy,
@@ -160,6 +163,7 @@ struct Job<'a> {
     what: &'a Clear,
     /// Radius and allowance.
     inset: f64,
+    clean: f64,
     step: f64,
     room: Vec<Region>,
 }
@@ -187,7 +191,8 @@ impl<'a> Job<'a> {
         if size.x.max(size.y) / step > MANY {
             return Err(Error::TooManyPasses);
         }
-        Ok(Self { region, what, inset, step, room: room(region, inset)? })
+        let clean = positive(what.clean, "clean radius")?.min(r);
+        Ok(Self { region, what, inset, clean, step, room: room(region, inset)? })
     }
 
     /// Is the outline followed counterclockwise, and do the walls come last?
@@ -280,7 +285,7 @@ impl<'a> Job<'a> {
     /// middles, when the step is more than the radius. None of it is thicker than the radius, so that following its
     /// edge takes all of it.
     fn left_over(&self, k: usize, next: &[Region]) -> Result<Vec<Region>, Error> {
-        let r = self.what.radius;
+        let r = self.clean;
         if self.step <= r + 1e-9 {
             return Ok(Vec::new());
         }
@@ -351,7 +356,7 @@ impl<'a> Job<'a> {
         }
         // With a step of at most the radius the last bit of a turn is cut by its neighbours.
         let bit = last.path.segs().last().map_or(0.0, Seg::len);
-        if self.step <= self.what.radius + 1e-9 && bit <= 1.5 * self.step {
+        if self.step <= self.clean + 1e-9 && bit <= 1.5 * self.step {
             let shorter = last.path.part(0.0, last.path.length() - bit);
             if let Some((shorter, found)) = shorter.and_then(|s| self.extended(&s, next).map(|f| (s, f))) {
                 last.path = shorter;
@@ -359,7 +364,7 @@ impl<'a> Job<'a> {
             }
         }
         let length = last.path.length();
-        if self.step > self.what.radius + 1e-9 || length < 4.0 * self.step {
+        if self.step > self.clean + 1e-9 || length < 4.0 * self.step {
             return None;
         }
         let path = next.starting_near(last.path.end());
@@ -403,6 +408,7 @@ impl<'a> Job<'a> {
             region: &self.region.rotated(-angle),
             what: self.what,
             inset: self.inset,
+            clean: self.clean,
             step: self.step,
             room: self.room.iter().map(|r| r.rotated(-angle)).collect(),
         };

@@ -44,6 +44,8 @@ struct Job<'a> {
     radius: f64,
     /// Edge radius of the tool, at most its radius.
     edge: f64,
+    /// How far from its axis it leaves a clean floor, within the tolerance.
+    clean: f64,
     /// Distance between passes.
     by: f64,
     axial: f64,
@@ -129,9 +131,21 @@ fn job<'a>(e: &mut Emit<'_>, step: &'a Workingstep, m: &'a Milling, feature: &'a
     let retract = o.retract.filter(|r| *r > 0.0).unwrap_or(usual);
     o.technology.feed?;
     // What a rounded edge leaves standing between two passes stays within the tolerance.
-    let scallop = 2.0 * (radius - edge) + 2.0 * libm::sqrt(given.tolerance * (2.0 * edge - given.tolerance).max(0.0));
-    let by = if edge > 0.0 && m.bottom { by.min(scallop.max(radius * 1e-2)) } else { by };
-    Some(Job { step, m, feature, radius, edge, by, axial, depth, bottom, retract, tolerance: given.tolerance, tells: given.tells })
+    let clean = (radius - edge + libm::sqrt(given.tolerance * (2.0 * edge - given.tolerance).max(0.0))).clamp(radius * 5e-3, radius);
+    let by = if m.bottom { by.min(2.0 * clean) } else { by };
+    // A rounded edge deeper than the cut is narrower at the top of the wall than the tool: it may come nearer.
+    let upright = match &feature.shape {
+        Shape::Pocket { slope, planar_radius, bosses, .. } | Shape::OpenPocket { slope, planar_radius, bosses, .. } => {
+            *slope == 0.0 && planar_radius.unwrap_or(0.0) == 0.0 && bosses.iter().all(|b| b.slope == 0.0 && b.top <= 0.0)
+        }
+        Shape::Step { wall, radius, bosses, .. } => *wall == 0.0 && *radius == 0.0 && bosses.iter().all(|b| b.slope == 0.0 && b.top <= 0.0),
+        Shape::Hole { final_diameter, bottom, .. } => final_diameter.is_none() && matches!(bottom, HoleBottom::Flat | HoleBottom::Through),
+        Shape::Outside { .. } => true,
+        Shape::Boss(b) => b.slope == 0.0,
+        _ => false,
+    };
+    let radius = if upright && bottom < edge { radius - edge + libm::sqrt(bottom * (2.0 * edge - bottom)) } else { radius };
+    Some(Job { step, m, feature, radius, edge, clean, by, axial, depth, bottom, retract, tolerance: given.tolerance, tells: given.tells })
 }
 
 /// From the radial depth and the overlap: the smaller of the two.
@@ -203,6 +217,7 @@ impl Job<'_> {
     }
     fn clearing(&self) -> Done<tp::Clear> {
         let mut c = tp::Clear::new(self.radius, self.by, self.strategy()?);
+        c.clean = self.clean;
         c.allowance = self.m.allowance_side;
         c.cut_mode = self.cut_mode();
         if let Some(s) = &self.m.strategy {
@@ -218,7 +233,10 @@ impl Job<'_> {
     }
     /// One level between two heights, however thick.
     fn level(&self, top: f64, bottom: f64) -> tp::Depth {
-        tp::Depth { step: (bottom - top).max(1e-6), ..self.heights(top, bottom) }
+        let step = (bottom - top).max(1e-6);
+        // Where only walls are cut, nothing is known to be empty above a place further in.
+        let safe = RUN_OUT.min(self.retract) - if self.m.bottom { top } else { 0.0 };
+        tp::Depth { step, safe, ..self.heights(top, bottom) }
     }
     fn entry(&self, open: bool) -> Done<tp::Entry> {
         let to = |a: &Approach, way_in: bool| -> Done<tp::Approach> {

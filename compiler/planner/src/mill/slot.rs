@@ -91,8 +91,7 @@ impl Job<'_> {
         let entry = self.entry(open)?;
         if cut.steady {
             for (a, b) in self.narrowed(cut.across(floor)) {
-                let passes = self.slot_passes(line, a, b, ends, closed)?;
-                moves.extend(tp::motion(&passes, &self.heights(0.0, floor), &entry, None, self.radius).map_err(words)?);
+                self.across_level(line, (a, b), ends, closed, &self.heights(0.0, floor), &entry, moves)?;
             }
             return self.some(moves);
         }
@@ -101,8 +100,7 @@ impl Job<'_> {
         for k in 1..=count as usize {
             let y = if k as f64 == count { floor } else { floor * k as f64 / count };
             for (a, b) in self.narrowed(cut.across(y)) {
-                let passes = self.slot_passes(line, a, b, ends, closed)?;
-                moves.extend(tp::motion(&passes, &self.level(above, y), &entry, None, self.radius).map_err(words)?);
+                self.across_level(line, (a, b), ends, closed, &self.level(above, y), &entry, moves)?;
             }
             if self.m.finish {
                 self.walls_between(cut, line, ends, closed, above, y, moves)?;
@@ -110,6 +108,26 @@ impl Job<'_> {
             above = y;
         }
         self.some(moves)
+    }
+
+    #[allow(clippy::too_many_arguments)]
+    fn across_level(&self, line: &Path2, (a, b): (f64, f64), ends: &[SlotEnd], closed: bool, heights: &tp::Depth, entry: &tp::Entry, moves: &mut Moves) -> Done<()> {
+        let passes = self.slot_passes(line, a, b, ends, closed)?;
+        let room = self.room(line, a, b, ends, closed);
+        // Where the tool may be is not known of every course: then it goes down along its axis.
+        let entry = if room.is_some() { entry.clone() } else { tp::Entry::default() };
+        moves.extend(tp::motion(&passes, heights, &entry, room.as_ref(), self.radius).map_err(words)?);
+        Ok(())
+    }
+
+    /// Where the tool may be for approaches: the slot as wide as it is on this level, far out at open ends.
+    fn room(&self, line: &Path2, a: f64, b: f64, ends: &[SlotEnd], closed: bool) -> Option<Region> {
+        let line = shifted(line, (a + b) / 2.0).ok()?;
+        let half = (b - a).max(0.0) / 2.0 + self.radius;
+        if closed {
+            return tp::profile::sweep(&line, half, half, tp::profile::End::Round, tp::profile::End::Round).ok();
+        }
+        self.blind(&line, half, ends, 2.0 * (self.radius + RUN_OUT)).ok()
     }
 
     fn some(&self, moves: &Moves) -> Done<()> {
@@ -125,7 +143,7 @@ impl Job<'_> {
     #[allow(clippy::too_many_arguments)]
     fn walls_between(&self, cut: &Cut, line: &Path2, ends: &[SlotEnd], closed: bool, above: f64, y: f64, moves: &mut Moves) -> Done<()> {
         let mut at = above;
-        let entry = self.entry(true)?;
+        let entry = tp::Entry::default();
         for _ in 0..MOST {
             if cut.moves_in(at, y) <= self.tolerance || y - at <= self.tolerance {
                 return Ok(());
@@ -172,7 +190,7 @@ impl Job<'_> {
         let open = ends.is_empty() || ends.iter().all(|e| *e == SlotEnd::Open);
         if !closed && b - a > 1e-5 && !open {
             let half = width / 2.0 + self.m.allowance_side;
-            let region = self.blind(line, half, ends)?;
+            let region = self.blind(line, half, ends, self.radius + RUN_OUT)?;
             return Ok(tp::clear(&region, &self.clearing()?).map_err(words)?.passes);
         }
         let mut what = tp::Contour::new(self.radius);
@@ -182,9 +200,8 @@ impl Job<'_> {
     }
 
     /// The outline of a slot with a closed end, out in the air at open ones.
-    fn blind(&self, line: &Path2, half: f64, ends: &[SlotEnd]) -> Done<Region> {
+    fn blind(&self, line: &Path2, half: f64, ends: &[SlotEnd], out: f64) -> Done<Region> {
         let (a, b) = (line.start(), line.end());
-        let out = self.radius + RUN_OUT;
         let end = |i: usize| *ends.get(i).or(ends.first()).unwrap_or(&SlotEnd::Open);
         let reach = |e: SlotEnd| if e == SlotEnd::Open { out } else { 0.0 };
         if line.segs().len() != 1 || (line.length() - a.dist(b)).abs() > 1e-6 {
@@ -238,7 +255,7 @@ impl Job<'_> {
         }
         let [(a, b)] = cut.across(floor)[..] else { return };
         let Ok(line) = shifted(line, (a + b) / 2.0) else { return };
-        if let Ok(region) = self.blind(&line, (b - a) / 2.0 + self.radius, ends) {
+        if let Ok(region) = self.blind(&line, (b - a) / 2.0 + self.radius, ends, self.radius + RUN_OUT) {
             let (p, q) = (line.start(), line.end());
             let near = (b - a) / 2.0 + 2.0 * self.radius;
             let is_open = |i: usize| ends.get(i).or(ends.first()) == Some(&SlotEnd::Open);
@@ -249,7 +266,7 @@ impl Job<'_> {
     /// Along the middle line, once for each place of the tool in the section: offset and height of its tip.
     fn along_section(&self, line: &Path2, ends: &[SlotEnd], closed: bool, places: Vec<(f64, f64)>, moves: &mut Moves) -> Done<()> {
         let middle = self.ended(line, ends, closed)?;
-        let entry = self.entry(ends.is_empty() || ends.contains(&SlotEnd::Open))?;
+        let entry = tp::Entry::default();
         for (i, (x, z)) in places.iter().enumerate() {
             let way = shifted(&middle, *x)?;
             let way = if i % 2 == 1 { way.reversed() } else { way };

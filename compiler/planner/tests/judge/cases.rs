@@ -16,6 +16,7 @@ pub struct Case {
     pub tolerance: f64,
     pub surface: Box<dyn Fn(f64, f64, f64) -> f64>,
     pub cover: bool,
+    pub floors: Vec<f64>,
 }
 
 pub const BLOCK: [f64; 3] = [60.0, 40.0, 12.0];
@@ -53,6 +54,7 @@ pub fn case(name: &str, part: Part, tool_r: f64, floor: f64, surface: impl Fn(f6
         tolerance: 0.011,
         surface: Box::new(surface),
         cover: true,
+        floors: Vec::new(),
     }
 }
 
@@ -74,7 +76,9 @@ pub fn judge(c: &Case) -> Judged {
     assert!(exchange.faults.is_empty(), "{}: {:?}\n{text}", c.name, exchange.faults);
     let (planned, out) = plan(text.as_bytes(), FileId(0), &Options::default());
     let verdict = planned.as_ref().map_or_else(Verdict::default, |p| {
-        Judge::new(c.block, c.low, c.high, c.h).run(p, &c.surface, c.floor, c.tolerance, c.cover)
+        let mut j = Judge::new(c.block, c.low, c.high, c.h);
+        j.floors = c.floors.clone();
+        j.run(p, &c.surface, c.floor, c.tolerance, c.cover)
     });
     Judged { planned, verdict, out }
 }

@@ -64,6 +64,8 @@ pub struct Judge {
     y0: f64,
     pub z: Vec<f64>,
     block: [f64; 3],
+    /// Heights at which floors lie, where walls are upright: 2½D work puts a tool on no others. Empty: any.
+    pub floors: Vec<f64>,
 }
 
 const AIR: f64 = -1e9;
@@ -75,7 +77,7 @@ impl Judge {
     pub fn new(block: [f64; 3], low: [f64; 2], high: [f64; 2], h: f64) -> Judge {
         let (x0, y0) = (low[0] + 0.37 * h, low[1] + 0.41 * h);
         let (nx, ny) = (((high[0] - x0) / h) as usize + 1, ((high[1] - y0) / h) as usize + 1);
-        let mut j = Judge { h, nx, ny, x0, y0, z: vec![AIR; nx * ny], block };
+        let mut j = Judge { h, nx, ny, x0, y0, z: vec![AIR; nx * ny], block, floors: Vec::new() };
         for i in 0..nx * ny {
             let (x, y) = j.at(i);
             if x >= 0.0 && y >= 0.0 && x <= block[0] && y <= block[1] {
@@ -227,11 +229,19 @@ impl Judge {
             let goal: Vec<f64> = (0..self.z.len())
                 .map(|i| {
                     let (x, y) = self.at(i);
-                    surface(x, y, -s.side - tolerance - 0.75 * self.h).max(floor + s.bottom)
+                    // A wall begins up to a cell further out than it is drawn.
+                    surface(x, y, -s.side - tolerance - 1.1 * self.h).max(floor + s.bottom)
                 })
                 .collect();
             let disc = self.disc(s);
-            let stands = self.over(&goal, &disc, |tip, over, goal| tip.max(goal - over), f64::NEG_INFINITY);
+            let mut stands = self.over(&goal, &disc, |tip, over, goal| tip.max(goal - over), f64::NEG_INFINITY);
+            if !self.floors.is_empty() {
+                let mut floors: Vec<f64> = self.floors.iter().map(|f| f.max(floor + s.bottom)).collect();
+                floors.sort_by(f64::total_cmp);
+                for tip in &mut stands {
+                    *tip = floors.iter().copied().find(|f| *tip <= f + 1e-6).unwrap_or(f64::INFINITY);
+                }
+            }
             let left = self.over(&stands, &disc, |left, over, tip| left.min(tip + over), f64::INFINITY);
             for (r, l) in reach.iter_mut().zip(left) {
                 *r = r.min(l);

@@ -49,7 +49,12 @@ impl Mill {
 }
 
 pub fn r(v: f64) -> String {
-    format!("{v:?}")
+    let text = format!("{v:?}");
+    match text.split_once('e') {
+        Some((m, e)) if m.contains('.') => format!("{m}E{e}"),
+        Some((m, e)) => format!("{m}.E{e}"),
+        None => text,
+    }
 }
 
 impl Part {
