@@ -1,214 +1,399 @@
-//! The thread that owns the session.
+//! The thread that owns the database: applies what the client says in the order it was said, hands out views to
+//! workers, and has diagnostics found when nothing else is waiting.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
-use std::sync::mpsc::{Receiver, TryRecvError};
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
 
-use gr_driver::{Options, Session};
-use gr_gcode::FormatOptions;
-use gr_interp::Setup;
-use gr_spec::Dialect;
-use gr_text::{FileId, Span};
+use gr_driver::Session;
+use gr_text::{Diagnostic, Span};
 use tower_lsp::ls_types as lsp;
 
-use crate::protocol::{Lines, diagnostic};
+use crate::documents::{Document, Kind, OpenFile, View, kind_of};
+use crate::host::{Host, Station};
+use crate::protocol;
+use crate::settings::Settings;
+use crate::text::{Columns, Text};
+use crate::workspace::Workspace;
 
 /// What the thread is asked to do.
 pub enum Message {
     /// A document was opened.
-    Open { uri: lsp::Uri, text: String },
+    Open { uri: lsp::Uri, language: String, version: i32, text: String },
     /// … edited.
-    Change { uri: lsp::Uri, changes: Vec<lsp::TextDocumentContentChangeEvent> },
+    Change { uri: lsp::Uri, version: i32, changes: Vec<lsp::TextDocumentContentChangeEvent> },
     /// … closed.
     Close { uri: lsp::Uri },
-    /// A question; the answer travels in the closure.
-    Ask(Box<dyn FnOnce(&mut Analysis) + Send>),
+    /// Files on disk changed.
+    Disk { paths: Vec<PathBuf> },
+    /// The client counts columns in bytes, and asks for diagnostics itself.
+    Client { columns: Columns },
+    /// Settings.
+    Settings(Box<Settings>),
+    /// Folders.
+    Folders { added: Vec<PathBuf>, removed: Vec<PathBuf> },
+    /// A question about a document; `None` when it is not open.
+    Ask { uri: lsp::Uri, work: Box<dyn FnOnce(Option<View>) + Send> },
+    /// A question about the server.
+    AskAll { work: Box<dyn FnOnce(&Analysis) + Send> },
+    /// Diagnostics of a version were found.
+    Found { uri: lsp::Uri, version: i32, found: Option<Arc<Vec<Diagnostic>>> },
 }
 
-/// Diagnostics that are ready to be published.
-pub struct Published {
-    pub uri: lsp::Uri,
-    pub diagnostics: Vec<lsp::Diagnostic>,
+/// What goes to the client without being asked for.
+pub enum Event {
+    /// Diagnostics of a document.
+    Diagnostics { uri: lsp::Uri, version: Option<i32>, diagnostics: Vec<lsp::Diagnostic> },
+    /// Looking at a big document takes a while: began (true) or ended.
+    Busy { uri: lsp::Uri, begins: bool },
+    /// Settings changed what hints and lenses show.
+    Refresh,
 }
 
-struct Document {
-    file: FileId,
-    text: String,
-    dialect: &'static Dialect,
-    stale: bool,
+/// Documents of this size are worth a progress report.
+const BIG: u32 = 4_000_000;
+
+type Job = Box<dyn FnOnce() + Send>;
+
+/// Workers that take one job after the other. A job that fails does not take the worker with it.
+fn workers(count: usize) -> Sender<Job> {
+    let (send, receive) = channel::<Job>();
+    let receive = Arc::new(std::sync::Mutex::new(receive));
+    for _ in 0..count {
+        let receive = receive.clone();
+        std::thread::spawn(move || {
+            loop {
+                let job = receive.lock().unwrap_or_else(std::sync::PoisonError::into_inner).recv();
+                let Ok(job) = job else { return };
+                let _ = std::panic::catch_unwind(std::panic::AssertUnwindSafe(job));
+            }
+        });
+    }
+    send
 }
 
-/// Open documents and the session behind them.
+/// Open documents and the database behind them.
 pub struct Analysis {
     session: Session,
     documents: HashMap<lsp::Uri, Document>,
-    utf8: bool,
+    stations: BTreeMap<PathBuf, Arc<Station>>,
+    columns: Columns,
+    settings: Arc<Settings>,
+    workspace: Arc<Workspace>,
+    host: Arc<dyn Host>,
+    /// Files of stations whose findings were published.
+    told: BTreeMap<PathBuf, Vec<PathBuf>>,
+    reads: Sender<Job>,
+    checks: Sender<Job>,
+    own: Sender<Message>,
 }
 
 impl Analysis {
-    pub fn new() -> Analysis {
-        Analysis { session: Session::new(), documents: HashMap::new(), utf8: false }
-    }
-
-    /// Columns are counted in bytes from now on.
-    pub fn count_bytes(&mut self) {
-        self.utf8 = true;
+    /// Nothing is open. `own` leads back to this thread.
+    pub fn new(host: Arc<dyn Host>, own: Sender<Message>) -> Analysis {
+        Analysis {
+            session: Session::new(),
+            documents: HashMap::new(),
+            stations: BTreeMap::new(),
+            columns: Columns::default(),
+            settings: Arc::default(),
+            workspace: Arc::default(),
+            host,
+            told: BTreeMap::new(),
+            reads: workers(2),
+            checks: workers(1),
+            own,
+        }
     }
 
     /// Works until the queue's other end is gone.
-    pub fn serve(mut self, queue: &Receiver<Message>, publish: impl Fn(Published)) {
+    pub fn serve(mut self, queue: &Receiver<Message>, publish: &(impl Fn(Event) + Clone + Send + 'static)) {
         while let Ok(first) = queue.recv() {
-            self.take(first, &publish);
+            self.take(first, publish);
             loop {
                 match queue.try_recv() {
-                    Ok(next) => self.take(next, &publish),
+                    Ok(next) => self.take(next, publish),
                     Err(TryRecvError::Empty) => break,
                     Err(TryRecvError::Disconnected) => return,
                 }
             }
-            self.publish(&publish);
+            self.check(publish);
         }
     }
 
-    fn take(&mut self, message: Message, publish: &impl Fn(Published)) {
+    fn take(&mut self, message: Message, publish: &(impl Fn(Event) + Clone + Send + 'static)) {
         match message {
-            Message::Open { uri, text } => self.open(uri, text),
-            Message::Change { uri, changes } => self.change(&uri, changes),
-            Message::Close { uri } => {
-                if let Some(document) = self.documents.remove(&uri) {
-                    self.session.close(document.file);
-                    publish(Published { uri, diagnostics: Vec::new() });
+            Message::Open { uri, language, version, text } => self.open(uri, language, version, &text, publish),
+            Message::Change { uri, version, changes } => self.change(&uri, version, changes),
+            Message::Close { uri } => self.close(&uri, publish),
+            Message::Disk { paths } => self.disk(&paths, publish),
+            Message::Client { columns } => self.columns = columns,
+            Message::Settings(settings) => {
+                if *settings != *self.settings {
+                    self.settings = Arc::new(*settings);
+                    self.reload(publish);
+                    publish(Event::Refresh);
                 }
             }
-            Message::Ask(work) => work(self),
+            Message::Folders { added, removed } => {
+                let mut folders = self.workspace.folders();
+                folders.retain(|f| !removed.contains(f));
+                folders.extend(added);
+                folders.sort();
+                folders.dedup();
+                self.workspace.set_folders(folders);
+            }
+            Message::Ask { uri, work } => {
+                let view = self.view(&uri);
+                let _ = self.reads.send(Box::new(move || work(view)));
+            }
+            Message::AskAll { work } => work(self),
+            Message::Found { uri, version, found } => self.found(&uri, version, found, publish),
         }
     }
 
-    fn open(&mut self, uri: lsp::Uri, text: String) {
-        let path = path_of(&uri);
-        let dialect = dialect_of(&path);
-        let mut setup = Setup { dialect, ..Setup::default() };
-        setup.tools = gr_interp::assumed_tools();
-        let file = self.session.open(&path.to_string_lossy(), &text, Options::new(setup));
-        self.documents.insert(uri, Document { file, text, dialect, stale: true });
+    /// Columns of the client.
+    pub fn columns(&self) -> Columns {
+        self.columns
+    }
+    /// Folders.
+    pub fn workspace(&self) -> &Arc<Workspace> {
+        &self.workspace
+    }
+    /// All open documents.
+    pub fn open_files(&self) -> Vec<OpenFile> {
+        let mut all: Vec<OpenFile> = self
+            .documents
+            .values()
+            .map(|d| OpenFile { path: d.path.clone(), uri: d.uri.clone(), text: d.text.clone(), kind: d.kind })
+            .collect();
+        all.sort_by(|a, b| a.path.cmp(&b.path));
+        all
     }
 
-    fn change(&mut self, uri: &lsp::Uri, changes: Vec<lsp::TextDocumentContentChangeEvent>) {
+    /// What a request about a document works on.
+    fn view(&self, uri: &lsp::Uri) -> Option<View> {
+        let document = self.documents.get(uri)?;
+        let session = matches!(document.kind, Kind::Gcode(..)).then(|| self.session.snapshot());
+        let others = self.open_files().into_iter().filter(|o| o.uri != *uri).collect();
+        let (settings, host, workspace) = (self.settings.clone(), self.host.clone(), self.workspace.clone());
+        Some(View::new(document, self.columns, settings, host, workspace, Arc::new(others), session))
+    }
+
+    /// What programs below a folder are run with.
+    fn station(&mut self, path: &Path, publish: &impl Fn(Event)) -> Arc<Station> {
+        let folder = path.parent().unwrap_or(Path::new("")).to_path_buf();
+        if let Some(known) = self.stations.get(&folder) {
+            return known.clone();
+        }
+        let station = Arc::new(self.host.station(path, &self.settings));
+        self.stations.insert(folder.clone(), station.clone());
+        self.tell_station(&folder, &station, publish);
+        station
+    }
+
+    /// Findings in project file, tool table, INI file and machine file: of those that are not open themselves.
+    fn tell_station(&mut self, folder: &Path, station: &Station, publish: &impl Fn(Event)) {
+        let mut by_file: BTreeMap<PathBuf, Vec<lsp::Diagnostic>> = BTreeMap::new();
+        for old in self.told.remove(folder).unwrap_or_default() {
+            by_file.insert(old, Vec::new());
+        }
+        for (path, text, d) in &station.found {
+            let text = Text::new(text);
+            by_file.entry(path.clone()).or_default().push(protocol::diagnostic(d, &text, self.columns, &|_| None));
+        }
+        self.told.insert(folder.to_path_buf(), station.found.iter().map(|f| f.0.clone()).collect());
+        for (path, diagnostics) in by_file {
+            if let Some(uri) = lsp::Uri::from_file_path(&path)
+                && !self.documents.contains_key(&uri)
+            {
+                publish(Event::Diagnostics { uri, version: None, diagnostics });
+            }
+        }
+    }
+
+    fn open(&mut self, uri: lsp::Uri, language: String, version: i32, text: &str, publish: &(impl Fn(Event) + Clone + Send + 'static)) {
+        // A client that opens a document twice means the second text.
+        self.forget(&uri);
+        let path = path_of(&uri);
+        let station = self.station(&path, publish);
+        let kind = kind_of(&path, &language, text).unwrap_or_else(|| {
+            let dialect = (station.dialect_of)(&path, text);
+            Kind::Gcode(self.session.open(&path.to_string_lossy(), text, station.options(dialect)), dialect)
+        });
+        let document = Document {
+            uri: uri.clone(),
+            path,
+            language,
+            version,
+            text: Arc::new(Text::new(text)),
+            kind,
+            station,
+            stale: true,
+            found: Arc::default(),
+            derived: Arc::default(),
+            sent_tokens: Arc::default(),
+        };
+        self.documents.insert(uri, document);
+    }
+
+    fn change(&mut self, uri: &lsp::Uri, version: i32, changes: Vec<lsp::TextDocumentContentChangeEvent>) {
         let Some(document) = self.documents.get_mut(uri) else { return };
         for change in changes {
             let range = match change.range {
                 Some(range) => {
-                    let lines = Lines::new(&document.text, self.utf8);
-                    lines.offset(range.start)..lines.offset(range.end)
+                    let start = document.text.offset(range.start, self.columns);
+                    start..document.text.offset(range.end, self.columns).max(start)
                 }
-                None => 0..document.text.len() as u32,
+                None => 0..document.text.len(),
             };
-            let range = range.start..range.end.max(range.start);
-            document.text.replace_range(range.start as usize..range.end as usize, &change.text);
-            self.session.edit(document.file, range, &change.text);
-        }
-        document.stale = true;
-    }
-
-    fn publish(&mut self, publish: &impl Fn(Published)) {
-        for (uri, document) in &mut self.documents {
-            if !std::mem::take(&mut document.stale) {
-                continue;
+            Arc::make_mut(&mut document.text).edit(range.clone(), &change.text);
+            if let Kind::Gcode(file, _) = document.kind {
+                self.session.edit(file, range, &change.text);
             }
-            let lines = Lines::new(&document.text, self.utf8);
-            let found = self.session.check(document.file).diagnostics;
-            let own = found.iter().filter(|d| d.primary().0 == document.file);
-            let diagnostics = own.map(|d| diagnostic(d, &lines, uri)).collect();
-            publish(Published { uri: uri.clone(), diagnostics });
         }
+        document.version = version;
+        document.derived = Arc::default();
+        document.stale = true;
+        self.look_again(uri);
     }
 
-    pub fn hover(&self, uri: &lsp::Uri, at: lsp::Position) -> Option<lsp::Hover> {
-        let document = self.documents.get(uri)?;
-        let lines = Lines::new(&document.text, self.utf8);
-        let (line, start) = lines.line(at.line);
-        let found = gr_ide::hover(line, lines.offset(at) - start, document.dialect)?;
-        Some(lsp::Hover {
-            contents: lsp::HoverContents::Markup(lsp::MarkupContent { kind: lsp::MarkupKind::Markdown, value: found.text }),
-            range: Some(lines.range(found.span.shifted(start))),
-        })
-    }
-
-    pub fn complete(&self, uri: &lsp::Uri, at: lsp::Position) -> Vec<lsp::CompletionItem> {
-        let Some(document) = self.documents.get(uri) else { return Vec::new() };
-        let lines = Lines::new(&document.text, self.utf8);
-        let (line, start) = lines.line(at.line);
-        let before = &line[..(lines.offset(at) - start) as usize];
-        let items = gr_ide::complete(before, document.dialect).into_iter();
-        items
-            .map(|c| lsp::CompletionItem {
-                label: c.label,
-                detail: Some(c.detail),
-                kind: Some(lsp::CompletionItemKind::KEYWORD),
-                documentation: Some(lsp::Documentation::MarkupContent(lsp::MarkupContent {
-                    kind: lsp::MarkupKind::Markdown,
-                    value: c.documentation,
-                })),
-                ..lsp::CompletionItem::default()
-            })
-            .collect()
-    }
-
-    #[allow(deprecated, reason = "the protocol's struct has a deprecated field without a default")]
-    pub fn symbols(&self, uri: &lsp::Uri) -> Vec<lsp::DocumentSymbol> {
-        let Some(document) = self.documents.get(uri) else { return Vec::new() };
-        let lines = Lines::new(&document.text, self.utf8);
-        let scan = gr_gcode::scan(&document.text, document.dialect);
-        let items = gr_ide::outline(&document.text, &scan).into_iter();
-        items
-            .map(|item| {
-                let (last, start) = lines.line(item.last_line);
-                let selection = lines.range(item.span);
-                let end = lines.position(start + last.len() as u32);
-                lsp::DocumentSymbol {
-                    name: item.name,
-                    detail: None,
-                    kind: match item.kind {
-                        gr_ide::ItemKind::Sub => lsp::SymbolKind::FUNCTION,
-                        gr_ide::ItemKind::Tool => lsp::SymbolKind::CLASS,
-                        gr_ide::ItemKind::Operation => lsp::SymbolKind::STRING,
-                    },
-                    tags: None,
-                    deprecated: None,
-                    range: lsp::Range { start: lsp::Position { line: item.line, character: 0 }, end: end.max(selection.end) },
-                    selection_range: selection,
-                    children: None,
+    /// The dialect may be declared in the first lines, and what the document is by its first characters.
+    fn look_again(&mut self, uri: &lsp::Uri) {
+        let Some(document) = self.documents.get_mut(uri) else { return };
+        let head = document.text.slice(Span::new(0, 4_096));
+        let config = matches!(document.kind, Kind::Config(_) | Kind::Other);
+        let head = if config { document.text.to_string() } else { head };
+        let new = kind_of(&document.path, &document.language, &head);
+        match (document.kind, new) {
+            (Kind::Gcode(file, old), None) => {
+                let dialect = (document.station.dialect_of)(&document.path, &head);
+                if !std::ptr::eq(dialect, old) {
+                    document.kind = Kind::Gcode(file, dialect);
+                    self.session.set_options(file, document.station.options(dialect));
                 }
-            })
-            .collect()
-    }
-
-    pub fn folds(&self, uri: &lsp::Uri) -> Vec<lsp::FoldingRange> {
-        let Some(document) = self.documents.get(uri) else { return Vec::new() };
-        let scan = gr_gcode::scan(&document.text, document.dialect);
-        let folds = gr_ide::folds(&scan).into_iter();
-        folds.map(|f| lsp::FoldingRange { start_line: f.first, end_line: f.last, ..lsp::FoldingRange::default() }).collect()
-    }
-
-    pub fn format(&self, uri: &lsp::Uri) -> Option<Vec<lsp::TextEdit>> {
-        let document = self.documents.get(uri)?;
-        let scan = gr_gcode::scan(&document.text, document.dialect);
-        let new = gr_gcode::format(&document.text, &scan, document.dialect, &FormatOptions::default());
-        if new == document.text {
-            return Some(Vec::new());
+            }
+            (Kind::Gcode(file, _), Some(kind)) => {
+                self.session.close(file);
+                document.kind = kind;
+            }
+            (_, None) => {
+                let dialect = (document.station.dialect_of)(&document.path, &head);
+                let text = document.text.to_string();
+                let file = self.session.open(&document.path.to_string_lossy(), &text, document.station.options(dialect));
+                document.kind = Kind::Gcode(file, dialect);
+            }
+            (_, Some(kind)) => document.kind = kind,
         }
-        let lines = Lines::new(&document.text, self.utf8);
-        let whole = Span::new(0, document.text.len() as u32);
-        Some(vec![lsp::TextEdit { range: lines.range(whole), new_text: new }])
+    }
+
+    fn forget(&mut self, uri: &lsp::Uri) {
+        if let Some(Document { kind: Kind::Gcode(file, _), .. }) = self.documents.remove(uri) {
+            self.session.close(file);
+        }
+    }
+
+    fn close(&mut self, uri: &lsp::Uri, publish: &impl Fn(Event)) {
+        self.forget(uri);
+        publish(Event::Diagnostics { uri: uri.clone(), version: None, diagnostics: Vec::new() });
+    }
+
+    fn disk(&mut self, paths: &[PathBuf], publish: &(impl Fn(Event) + Clone + Send + 'static)) {
+        self.workspace.forget();
+        let known = |p: &PathBuf| {
+            let name = p.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+            let settles = matches!(p.extension().and_then(|e| e.to_str()), Some("toml" | "tbl" | "var" | "ini" | "inc"));
+            name == "gcc-robot.toml" || settles || self.stations.values().any(|s| s.files.contains(p))
+        };
+        if paths.iter().any(known) {
+            self.reload(publish);
+        }
+        if paths.iter().any(|p| crate::workspace::is_program(p)) {
+            self.session.disk_changed();
+            self.documents.values_mut().filter(|d| matches!(d.kind, Kind::Gcode(..))).for_each(|d| {
+                d.stale = true;
+                d.derived = Arc::default();
+            });
+        }
+    }
+
+    /// Everything that programs are run with is read again.
+    fn reload(&mut self, publish: &(impl Fn(Event) + Clone + Send + 'static)) {
+        self.stations.clear();
+        let uris: Vec<lsp::Uri> = self.documents.keys().cloned().collect();
+        for uri in uris {
+            let Some(path) = self.documents.get(&uri).map(|d| d.path.clone()) else { continue };
+            let station = self.station(&path, publish);
+            let Some(document) = self.documents.get_mut(&uri) else { continue };
+            document.station = station;
+            document.stale = true;
+            document.derived = Arc::default();
+            if let Kind::Gcode(file, _) = document.kind {
+                let head = document.text.slice(Span::new(0, 4_096));
+                let dialect = (document.station.dialect_of)(&document.path, &head);
+                document.kind = Kind::Gcode(file, dialect);
+                self.session.set_options(file, document.station.options(dialect));
+            }
+        }
+    }
+
+    /// Has diagnostics of changed documents found.
+    fn check(&mut self, publish: &(impl Fn(Event) + Clone + Send + 'static)) {
+        let stale: Vec<lsp::Uri> = self.documents.values().filter(|d| d.stale).map(|d| d.uri.clone()).collect();
+        for uri in stale {
+            let Some(view) = self.view(&uri) else { continue };
+            if let Some(d) = self.documents.get_mut(&uri) {
+                d.stale = false;
+            }
+            let (own, publish) = (self.own.clone(), publish.clone());
+            let big = view.text.len() > BIG && view.version <= 1;
+            let job = move || {
+                if big {
+                    publish(Event::Busy { uri: view.uri.clone(), begins: true });
+                }
+                let (uri, version) = (view.uri.clone(), view.version);
+                let found = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| crate::features::diagnostics(view)));
+                // Cut short by an edit: the edit has made the document stale again.
+                let found = found.unwrap_or(Ok(Vec::new())).ok().map(Arc::new);
+                if big {
+                    publish(Event::Busy { uri: uri.clone(), begins: false });
+                }
+                let _ = own.send(Message::Found { uri, version, found });
+            };
+            let _ = self.checks.send(Box::new(job));
+        }
+    }
+
+    fn found(&mut self, uri: &lsp::Uri, version: i32, found: Option<Arc<Vec<Diagnostic>>>, publish: &impl Fn(Event)) {
+        let session = &self.session;
+        let Some(document) = self.documents.get_mut(uri) else { return };
+        let Some(found) = found else {
+            // Cut short although nothing changed in this document: another one was edited.
+            document.stale |= document.version == version;
+            return;
+        };
+        if document.version != version {
+            return;
+        }
+        document.found = found;
+        let (text, columns) = (&document.text, self.columns);
+        let other = |file: gr_text::FileId, span: Span| -> Option<lsp::Location> {
+            let path = session.path(file)?;
+            let range = Text::new(&session.any_text(file)?).range(span, columns);
+            Some(lsp::Location { uri: lsp::Uri::from_file_path(&*path)?, range })
+        };
+        let own = if let Kind::Gcode(file, _) = document.kind { file } else { gr_text::FileId(0) };
+        let place = |(file, span): (gr_text::FileId, Span)| {
+            if file == own { Some(lsp::Location { uri: uri.clone(), range: text.range(span, columns) }) } else { other(file, span) }
+        };
+        let shown = document.found.iter().filter(|d| d.primary().0 == own).take(self.settings.most_problems);
+        let diagnostics = shown.map(|d| protocol::diagnostic(d, text, columns, &place)).collect();
+        publish(Event::Diagnostics { uri: uri.clone(), version: Some(version), diagnostics });
     }
 }
 
-fn path_of(uri: &lsp::Uri) -> PathBuf {
+/// The file name of a document.
+pub fn path_of(uri: &lsp::Uri) -> PathBuf {
     uri.to_file_path().map_or_else(|| PathBuf::from(uri.as_str()), |p| p.into_owned())
-}
-
-/// The dialect that an extension suggests.
-fn dialect_of(path: &Path) -> &'static Dialect {
-    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
-    Dialect::all().iter().find(|d| d.extensions.contains(&extension.as_str())).unwrap_or_else(|| Dialect::linuxcnc())
 }

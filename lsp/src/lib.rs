@@ -1,18 +1,36 @@
-//! The language server: a protocol shell. Features are functions of `gr-ide`, diagnostics come from `gr-driver`.
+//! The language server: a protocol shell. Features are functions of `gr-ide`, diagnostics come from `gr-driver`,
+//! project files and targets from the command it is part of ([`host`]).
 //!
-//! Notifications reach a handler in order only until its first `await`, so handlers never wait before they have
-//! put their message on a queue. One thread owns the session, applies edits in the order they arrived, answers
-//! requests between them, and publishes diagnostics when its queue is empty.
+//! | module | job |
+//! |---|---|
+//! | `server` | handlers: a message on the queue, then the answer |
+//! | `analysis` | the thread that owns the database, and its workers |
+//! | `documents` | open documents and the views that requests work on |
+//! | `features` | from requests to features and back |
+//! | `protocol` | shapes of the protocol, and of our own requests |
+//! | `text` | text, positions, edits |
 
 mod analysis;
-mod protocol;
+mod documents;
+mod features;
+pub mod host;
+mod machine;
+pub mod protocol;
 mod server;
+mod settings;
+mod text;
+mod workspace;
+
+use std::sync::Arc;
 
 /// Serves one client on standard input and output until it says `exit`.
-pub fn run() -> std::io::Result<()> {
-    let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).build()?;
-    runtime.block_on(server::serve(tokio::io::stdin(), tokio::io::stdout()));
+pub fn run(host: Arc<dyn host::Host>) -> std::io::Result<()> {
+    let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_time().build()?;
+    runtime.block_on(server::serve(tokio::io::stdin(), tokio::io::stdout(), host));
+    // A worker may still be running a program nobody waits for.
+    runtime.shutdown_background();
     Ok(())
 }
 
 pub use server::serve;
+pub use settings::{Hints, Lints, Settings};

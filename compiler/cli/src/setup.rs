@@ -71,6 +71,12 @@ pub fn station(
     renderer: &mut Renderer,
 ) -> Option<Station> {
     let errors = renderer.tally.errors;
+    let station = assembled(args, lints, from, sources, renderer);
+    (renderer.tally.errors == errors).then_some(station)
+}
+
+/// The same, as far as it goes: what could not be read is left out.
+pub fn assembled(args: &SetupArgs, lints: &LintArgs, from: &Path, sources: &mut Sources, renderer: &mut Renderer) -> Station {
     let mut reader = Reader { sources, renderer, files: Vec::new() };
     let project = reader.project(from);
     let section = project.as_ref().map(|p| &p.file.project);
@@ -105,7 +111,7 @@ pub fn station(
     let lints = reader.levels(lints, project.as_ref());
     let step_units = args.step_units.or(section.and_then(|s| s.step_units)).map(gr_planner::Units::from);
     let Reader { files, .. } = reader;
-    (renderer.tally.errors == errors).then_some(Station { setup, step_units, tools, dialect, machine, files, project, lints })
+    Station { setup, step_units, tools, dialect, machine, files, project, lints }
 }
 
 fn units(args: &SetupArgs, section: Option<&crate::project::Section>) -> Option<Units> {

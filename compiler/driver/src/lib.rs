@@ -8,9 +8,12 @@
 mod check;
 mod db;
 mod disk;
+mod editor;
 mod engine;
 mod hover;
+mod layout;
 mod lazy;
+mod library;
 mod lints;
 mod session;
 mod store;
@@ -20,6 +23,7 @@ mod ufmg;
 
 pub use check::{Check, MOST_OF_A_KIND};
 pub use db::Executed;
+pub use editor::Traced;
 pub use hover::StateAt;
 pub use lazy::Lazy;
 pub use lints::{Level, Rules};

@@ -4,13 +4,13 @@ use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
 
-use gr_gcode::Symbols;
+use gr_gcode::{Parameter, Symbols};
 use gr_interp::Setup;
 use gr_text::{Diagnostic, FileId};
 use salsa::Setter as _;
 
 use crate::check::{self, Check};
-use crate::db::{ChunkText, Database, Db as _, Document, Executed, RunOptions};
+use crate::db::{ChunkText, Database, Db as _, Document, Executed, OpenFiles, RunOptions};
 use crate::hover::{self, StateAt};
 use crate::lints::{Limits, Rules};
 use crate::store::{Store, Texts, chunk_lines};
@@ -44,7 +44,6 @@ struct Open {
 }
 
 /// Open files and everything that is known about them. Not shared between threads: take a [`Snapshot`].
-#[derive(Default)]
 pub struct Session {
     db: Database,
     files: Vec<Option<Open>>,
@@ -62,10 +61,28 @@ impl Texts<ChunkText> for Database {
     }
 }
 
+impl Default for Session {
+    fn default() -> Session {
+        let db = Database::default();
+        OpenFiles::new(&db, Arc::default());
+        Session { db, files: Vec::new() }
+    }
+}
+
 impl Session {
     /// No files.
     pub fn new() -> Session {
         Session::default()
+    }
+
+    /// Programs that call subroutines find open files before those on disk.
+    fn list_open_files(&mut self) {
+        let named = |document: Document| {
+            let path = self.db.disk().path(FileId(document.id(&self.db)))?;
+            Some((crate::library::plain_path(Path::new(&*path)), document))
+        };
+        let files = self.files.iter().flatten().filter_map(|open| named(open.document)).collect();
+        OpenFiles::get(&self.db).set_files(&mut self.db).to(Arc::new(files));
     }
 
     /// Opens a text under a name, or gives an open file a new text and new options.
@@ -83,6 +100,7 @@ impl Session {
         let run = RunOptions::new(&self.db, Arc::new(options), 0);
         let document = Document::new(&self.db, chunks, run, id.0);
         self.files[index] = Some(Open { document, run, store });
+        self.list_open_files();
         id
     }
 
@@ -99,6 +117,7 @@ impl Session {
                 self.db.set(piece.input, "".into());
             }
             open.document.set_chunks(&mut self.db).to(Arc::from([]));
+            self.list_open_files();
         }
     }
 
@@ -206,6 +225,23 @@ impl Snapshot {
     /// Labels, parameters and codes of a file, under its own lines and bytes.
     pub fn symbols(&self, file: FileId) -> Result<Symbols, Cancelled> {
         self.guarded(file, hover::symbols)
+    }
+    /// The file with its tables.
+    pub fn file(&self, file: FileId) -> Result<Arc<gr_gcode::File>, Cancelled> {
+        self.guarded(file, crate::editor::file)
+    }
+    /// Blocks of some lines as execution comes to them for the first time, with the values of some parameters;
+    /// at most `budget` blocks are run.
+    pub fn trace(&self, file: FileId, lines: Range<u32>, wanted: &[Parameter], budget: u32) -> Result<Vec<crate::Traced>, Cancelled> {
+        self.guarded(file, |db, d| crate::editor::trace(db, d, &lines, wanted, budget))
+    }
+    /// Path of a file that the session knows.
+    pub fn path(&self, file: FileId) -> Option<Box<str>> {
+        self.db.disk().path(file)
+    }
+    /// Text of a file that was read from disk because a program calls it.
+    pub fn contents(&self, file: FileId) -> Option<Arc<gr_gcode::File>> {
+        self.db.disk().contents(file)
     }
     fn guarded<T: Default>(&self, file: FileId, work: impl Fn(&Database, Document) -> T) -> Result<T, Cancelled> {
         let Some(Some(document)) = self.documents.get(file.0 as usize) else { return Ok(T::default()) };

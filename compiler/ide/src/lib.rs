@@ -1,10 +1,10 @@
 //! Editor features as plain functions: text, byte offsets and tables in, plain data out. No protocol, no
-//! database, so that tests and other editors can call them. Everything that is told comes from `spec/`.
+//! database, so that tests and other editors can call them. Everything that is told comes from `spec/`, from the
+//! interpreter's run of the program, or from the tables of ISO 14649.
 
-mod complete;
-mod hover;
-mod outline;
+mod data;
+pub mod config;
+pub mod gcode;
+pub mod p21;
 
-pub use complete::{Completion, complete};
-pub use hover::{Hover, hover};
-pub use outline::{Fold, Item, ItemKind, folds, outline};
+pub use data::*;

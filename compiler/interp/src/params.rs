@@ -196,6 +196,14 @@ impl<S: Sink> Interp<'_, S> {
         name.starts_with('_') && (self.predefined(name).is_some() || self.ini_value(name).is_some())
     }
 
+    /// Value of a parameter as the next block would read it: for editors that look into a run.
+    pub fn peek(&mut self, parameter: &gr_gcode::Parameter) -> Option<f64> {
+        match parameter {
+            gr_gcode::Parameter::Number(n) => self.read_param(i32::try_from(*n).ok()?).ok(),
+            gr_gcode::Parameter::Named(name) => self.find_named(name),
+        }
+    }
+
     /// Names that the controller itself keeps.
     fn predefined(&self, name: &str) -> Option<f64> {
         let m = &self.m;

@@ -19,4 +19,4 @@ pub use dialect::{Dialect, dialect};
 pub use lint::lint;
 pub use model::{Model, Node, Val};
 pub use rules::{Decided, Origin, RULES, Rule, broken};
-pub use schema::{Attribute, Edition, Entity, EntityId, Schema, Type, schema};
+pub use schema::{Attribute, Edition, Entity, EntityId, Name, Schema, Type, schema};

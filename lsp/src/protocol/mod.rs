@@ -1,71 +1,20 @@
-//! Everything that knows the shapes of the protocol: positions, diagnostics, edits.
+//! Shapes of the protocol: diagnostics, and data of the features as the client takes it.
 
 pub mod custom;
 
-use gr_text::{Diagnostic, Severity, Span};
+use gr_ide::{ActionKind, CompletionKind, Item, ItemKind, TokenKind};
+use gr_text::{Diagnostic, FileId, Severity, Span};
+use serde_json::json;
 use tower_lsp::ls_types as lsp;
 
-/// Lines of a text, and columns as the client counts them.
-pub struct Lines<'t> {
-    text: &'t str,
-    starts: Vec<u32>,
-    utf8: bool,
-}
+use crate::text::{Columns, Text};
 
-impl<'t> Lines<'t> {
-    pub fn new(text: &'t str, utf8: bool) -> Lines<'t> {
-        let mut starts = vec![0];
-        let bytes = text.as_bytes();
-        for (i, b) in bytes.iter().enumerate() {
-            if *b == b'\n' || (*b == b'\r' && bytes.get(i + 1) != Some(&b'\n')) {
-                starts.push(i as u32 + 1);
-            }
-        }
-        Lines { text, starts, utf8 }
-    }
-    /// Text of a line without its end, and its first byte.
-    pub fn line(&self, line: u32) -> (&'t str, u32) {
-        let start = self.start(line);
-        let end = self.start(line + 1);
-        (self.text[start as usize..end as usize].trim_end_matches(['\n', '\r']), start)
-    }
-    fn start(&self, line: u32) -> u32 {
-        self.starts.get(line as usize).copied().unwrap_or(self.text.len() as u32)
-    }
-    /// Byte of a position; positions past the end of a line or of the text are taken back to it.
-    pub fn offset(&self, p: lsp::Position) -> u32 {
-        let (line, start) = self.line(p.line);
-        if self.utf8 {
-            let mut at = (p.character as usize).min(line.len());
-            while !line.is_char_boundary(at) {
-                at -= 1;
-            }
-            return start + at as u32;
-        }
-        let mut units = 0;
-        for (at, c) in line.char_indices() {
-            if units >= p.character {
-                return start + at as u32;
-            }
-            units += c.len_utf16() as u32;
-        }
-        start + line.len() as u32
-    }
-    pub fn position(&self, offset: u32) -> lsp::Position {
-        let line = self.starts.partition_point(|s| *s <= offset).saturating_sub(1);
-        let start = self.starts[line];
-        let before = self.text.get(start as usize..offset as usize).unwrap_or("");
-        let character = if self.utf8 { before.len() as u32 } else { before.chars().map(|c| c.len_utf16() as u32).sum() };
-        lsp::Position { line: line as u32, character }
-    }
-    pub fn range(&self, span: Span) -> lsp::Range {
-        lsp::Range { start: self.position(span.start), end: self.position(span.end) }
-    }
-}
+/// Where a place of a finding is, in any file.
+pub type Locate<'a> = dyn Fn((FileId, Span)) -> Option<lsp::Location> + 'a;
 
-/// A finding as the protocol has it. Only places in the file itself are pointed at.
-pub fn diagnostic(d: &Diagnostic, lines: &Lines<'_>, uri: &lsp::Uri) -> lsp::Diagnostic {
-    let (file, span) = d.primary();
+/// A finding as the protocol has it.
+pub fn diagnostic(d: &Diagnostic, text: &Text, columns: Columns, locate: &Locate<'_>) -> lsp::Diagnostic {
+    let (_, span) = d.primary();
     let mut message = d.message.clone();
     for note in &d.notes {
         message.push_str(&format!("\nNote: {note}"));
@@ -73,24 +22,124 @@ pub fn diagnostic(d: &Diagnostic, lines: &Lines<'_>, uri: &lsp::Uri) -> lsp::Dia
     if let Some(help) = &d.help {
         message.push_str(&format!("\nHelp: {help}"));
     }
-    let related = d.labels.iter().skip(1).filter(|l| l.file == file && !l.text.is_empty()).map(|l| {
-        lsp::DiagnosticRelatedInformation {
-            location: lsp::Location { uri: uri.clone(), range: lines.range(l.span) },
-            message: l.text.clone(),
-        }
-    });
-    let related: Vec<_> = related.collect();
+    let labels = d.labels.iter().skip(1).filter(|l| !l.text.is_empty()).map(|l| ((l.file, l.span), l.text.clone()));
+    let trace = d.trace.iter().map(|f| ((f.file, f.span), format!("called here: {}", f.name)));
+    let related: Vec<lsp::DiagnosticRelatedInformation> =
+        labels.chain(trace).filter_map(|(at, message)| Some(lsp::DiagnosticRelatedInformation { location: locate(at)?, message })).collect();
+    let def = d.code.def();
     lsp::Diagnostic {
-        range: lines.range(span),
+        range: text.range(visible(span, text), columns),
         severity: Some(match d.severity {
             Severity::Error => lsp::DiagnosticSeverity::ERROR,
             Severity::Warning => lsp::DiagnosticSeverity::WARNING,
             Severity::Hint => lsp::DiagnosticSeverity::HINT,
         }),
-        code: Some(lsp::NumberOrString::String(d.code.def().code.to_string())),
+        code: Some(lsp::NumberOrString::String(def.code.to_string())),
         source: Some("gcc-robot".into()),
         message,
         related_information: (!related.is_empty()).then_some(related),
+        tags: (d.code == gr_spec::code::LINE_NEVER_RUN).then(|| vec![lsp::DiagnosticTag::UNNECESSARY]),
+        data: Some(json!({ "slug": def.slug, "fixes": d.fixes.len() })),
         ..lsp::Diagnostic::default()
+    }
+}
+
+/// A place without width would not be seen: the character before or behind it is taken in.
+fn visible(span: Span, text: &Text) -> Span {
+    if span.end > span.start {
+        return span;
+    }
+    let behind = text.slice(Span::new(span.start, span.start + 4));
+    match behind.chars().next().filter(|c| !matches!(c, '\n' | '\r')) {
+        Some(c) => Span::new(span.start, span.start + c.len_utf8() as u32),
+        None => span,
+    }
+}
+
+/// Symbols of the protocol.
+pub fn symbol_kind(kind: ItemKind) -> lsp::SymbolKind {
+    match kind {
+        ItemKind::Sub => lsp::SymbolKind::FUNCTION,
+        ItemKind::Tool => lsp::SymbolKind::CLASS,
+        ItemKind::Operation => lsp::SymbolKind::STRING,
+        ItemKind::Project => lsp::SymbolKind::PACKAGE,
+        ItemKind::Workplan => lsp::SymbolKind::MODULE,
+        ItemKind::Workingstep => lsp::SymbolKind::METHOD,
+        ItemKind::Feature => lsp::SymbolKind::INTERFACE,
+        ItemKind::MachiningOperation => lsp::SymbolKind::FUNCTION,
+        ItemKind::CuttingTool => lsp::SymbolKind::CONSTANT,
+        ItemKind::Section => lsp::SymbolKind::NAMESPACE,
+        ItemKind::Key => lsp::SymbolKind::KEY,
+    }
+}
+
+/// An outline entry with everything below it.
+#[allow(deprecated, reason = "the protocol's struct has a deprecated field without a default")]
+pub fn symbol(item: &Item, text: &Text, columns: Columns) -> lsp::DocumentSymbol {
+    let selection_range = text.range(item.span, columns);
+    let range = text.range(item.range, columns);
+    let range = lsp::Range { start: range.start.min(selection_range.start), end: range.end.max(selection_range.end) };
+    let children: Vec<lsp::DocumentSymbol> = item.children.iter().map(|c| symbol(c, text, columns)).collect();
+    lsp::DocumentSymbol {
+        name: if item.name.trim().is_empty() { "…".into() } else { item.name.clone() },
+        detail: (!item.detail.is_empty()).then(|| item.detail.clone()),
+        kind: symbol_kind(item.kind),
+        tags: None,
+        deprecated: None,
+        range,
+        selection_range,
+        children: (!children.is_empty()).then_some(children),
+    }
+}
+
+/// Kinds of proposals.
+pub fn completion_kind(kind: CompletionKind) -> lsp::CompletionItemKind {
+    match kind {
+        CompletionKind::Code | CompletionKind::Keyword => lsp::CompletionItemKind::KEYWORD,
+        CompletionKind::Word => lsp::CompletionItemKind::PROPERTY,
+        CompletionKind::Parameter => lsp::CompletionItemKind::VARIABLE,
+        CompletionKind::Function => lsp::CompletionItemKind::FUNCTION,
+        CompletionKind::Sub => lsp::CompletionItemKind::METHOD,
+        CompletionKind::Tool => lsp::CompletionItemKind::CONSTANT,
+        CompletionKind::Snippet => lsp::CompletionItemKind::SNIPPET,
+        CompletionKind::Entity => lsp::CompletionItemKind::CLASS,
+        CompletionKind::Enumeration => lsp::CompletionItemKind::ENUM_MEMBER,
+        CompletionKind::Reference => lsp::CompletionItemKind::REFERENCE,
+        CompletionKind::Value => lsp::CompletionItemKind::VALUE,
+    }
+}
+
+/// Kinds of actions.
+pub fn action_kind(kind: ActionKind) -> lsp::CodeActionKind {
+    match kind {
+        ActionKind::Fix => lsp::CodeActionKind::QUICKFIX,
+        ActionKind::Rewrite => lsp::CodeActionKind::REFACTOR_REWRITE,
+        ActionKind::Inline => lsp::CodeActionKind::REFACTOR_INLINE,
+        ActionKind::Source => lsp::CodeActionKind::SOURCE,
+    }
+}
+
+/// Types of tokens, in the order of the legend.
+pub const TOKEN_TYPES: &[&str] =
+    &["keyword", "macro", "method", "property", "number", "variable", "function", "label", "comment", "operator", "type", "string", "enumMember"];
+
+/// Place of a kind in [`TOKEN_TYPES`].
+pub fn token_type(kind: TokenKind) -> u32 {
+    let name = gr_ide::TOKEN_KINDS[kind as usize];
+    TOKEN_TYPES.iter().position(|t| *t == name).unwrap_or(0) as u32
+}
+
+/// Markdown.
+pub fn markdown(value: String) -> lsp::MarkupContent {
+    lsp::MarkupContent { kind: lsp::MarkupKind::Markdown, value }
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn all_token_kinds_are_in_the_legend() {
+        for name in gr_ide::TOKEN_KINDS {
+            assert!(super::TOKEN_TYPES.contains(&name), "{name}");
+        }
     }
 }

@@ -79,6 +79,7 @@ pub struct Renderer {
     held: Vec<u8>,
     sarif: sarif::Log,
     positions: Positions,
+    collected: Option<Vec<Diagnostic>>,
     /// What was written so far.
     pub tally: Tally,
 }
@@ -93,12 +94,25 @@ impl Renderer {
             held: Vec::new(),
             sarif: sarif::Log::default(),
             positions: Positions::default(),
+            collected: None,
             tally: Tally::default(),
         }
+    }
+    /// Writes nothing; [`Renderer::into_collected`] gives what was found.
+    pub fn collecting() -> Renderer {
+        Renderer { collected: Some(Vec::new()), ..Renderer::new(MessageFormat::Short, false, true) }
+    }
+    /// What was shown to a renderer that writes nothing.
+    pub fn into_collected(self) -> Vec<Diagnostic> {
+        self.collected.unwrap_or_default()
     }
     /// One finding.
     pub fn show(&mut self, sources: &Sources, d: &Diagnostic) {
         self.tally.count(d.severity);
+        if let Some(list) = &mut self.collected {
+            list.push(d.clone());
+            return;
+        }
         let (out, positions) = (&mut self.held, &mut self.positions);
         match self.format {
             MessageFormat::Human => human::write(out, sources, positions, d, self.color),

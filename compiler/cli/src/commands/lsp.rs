@@ -1,0 +1,169 @@
+//! `gcc-robot lsp`: what the language server asks of the command. Project files, machines, plans and targets are read
+//! and made here as `check` and `build` do.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use clap::Parser;
+use gr_lsp::Settings;
+use gr_lsp::host::{Host, Made, MadeFile, OutputJob, Plan, Station};
+use gr_text::{Diagnostic, Encoding, FileId};
+
+use crate::emit::{Artifact, Built, Goal, TargetOptions, build, stem};
+use crate::options::{LintArgs, SetupArgs, UnitArg};
+use crate::pipeline::{Unit, motion};
+use crate::project::Project;
+use crate::render::Renderer;
+use crate::setup::{assembled, modeline};
+use crate::sources::Sources;
+
+/// The command, for the server.
+pub struct Editor;
+
+fn setup_args(settings: &Settings) -> SetupArgs {
+    SetupArgs {
+        dialect: None,
+        machine: settings.machine.clone(),
+        tools: settings.tools.clone(),
+        vars: settings.vars.clone(),
+        ini: settings.ini.clone(),
+        machine_units: match settings.machine_units.as_deref() {
+            Some("inch") => Some(UnitArg::Inch),
+            Some("mm") => Some(UnitArg::Mm),
+            _ => None,
+        },
+        block_delete: settings.block_delete,
+        subs: settings.subs.clone(),
+        step_units: None,
+    }
+}
+
+/// What programs below a folder are run with, and what is wrong with the files that say so.
+fn own_station(path: &Path, settings: &Settings) -> (crate::setup::Station, Sources, Vec<Diagnostic>) {
+    let lints = LintArgs {
+        strict: settings.lints.strict,
+        allow: settings.lints.allow.clone(),
+        warn: settings.lints.warn.clone(),
+        deny: settings.lints.deny.clone(),
+    };
+    let mut sources = Sources::default();
+    let mut renderer = Renderer::collecting();
+    let from = path.parent().unwrap_or(Path::new("."));
+    let station = assembled(&setup_args(settings), &lints, from, &mut sources, &mut renderer);
+    (station, sources, renderer.into_collected())
+}
+
+/// The same again, of a station that was made for the server.
+fn own(station: &Station) -> Option<&crate::setup::Station> {
+    station.own.as_ref()?.downcast_ref()
+}
+
+impl Host for Editor {
+    fn station(&self, path: &Path, settings: &Settings) -> Station {
+        let (station, sources, found) = own_station(path, settings);
+        let found = found.into_iter().filter_map(|d| {
+            let file = sources.get(d.primary().0)?;
+            Some((file.name.clone().into(), file.text.to_string(), d))
+        });
+        let found = found.filter(|(path, ..): &(std::path::PathBuf, String, Diagnostic)| path.is_file()).collect();
+        let chosen = settings.dialect.as_deref().and_then(gr_spec::Dialect::find);
+        let shared = Arc::new(station);
+        let of = shared.clone();
+        Station {
+            setup: shared.setup.clone(),
+            strict: shared.lints.strict,
+            allow: shared.lints.allow.clone(),
+            warn: shared.lints.warn.clone(),
+            deny: shared.lints.deny.clone(),
+            // What the file or the project says goes before the setting; the ending of its name comes last.
+            dialect_of: Arc::new(move |path, text| {
+                let said = modeline(text).is_some() || of.project.as_ref().is_some_and(|p| p.dialect_of(path).is_some());
+                chosen.filter(|_| !said).unwrap_or_else(|| of.dialect_of(path, text))
+            }),
+            machine: shared.machine.clone().map(Arc::new),
+            files: shared.files.clone(),
+            found,
+            own: Some(shared),
+        }
+    }
+
+    fn undeclared(&self, path: &Path, text: &str, settings: &Settings) -> bool {
+        settings.dialect.is_none() && own_station(path, settings).0.undeclared(path, text)
+    }
+
+    fn check_project(&self, path: &Path, text: &str) -> Vec<Diagnostic> {
+        let mut found: Vec<Diagnostic> = Project::parse(path, FileId(0), text).err().map(|d| *d).into_iter().collect();
+        if found.is_empty() {
+            // What its names lead to: dialects, machines, lints and files that are not there. As it is on disk.
+            let (_, sources, more) = own_station(path, &Settings::default());
+            let here = |d: &Diagnostic| sources.get(d.primary().0).is_none_or(|f| Path::new(&f.name) == path || f.text.is_empty());
+            found.extend(more.into_iter().filter(here).map(|mut d| {
+                d.labels.truncate(1);
+                d.labels.iter_mut().for_each(|l| l.file = FileId(0));
+                d
+            }));
+        }
+        found
+    }
+
+    fn check_exchange(&self, path: &Path, text: &str, station: &Station) -> Vec<Diagnostic> {
+        match own(station) {
+            Some(own) => crate::exchange::check(&path.display().to_string(), text, path, own).found,
+            None => gr_step::diagnostics(text, FileId(0)),
+        }
+    }
+
+    fn plan(&self, path: &Path, text: &str, station: &Station) -> Option<Plan> {
+        let unit = Unit::new(path, text.into(), Encoding::Utf8, own(station)?);
+        let (made, _) = motion(&unit, None).ok()?;
+        Some(Plan { program: made.program, stock: None })
+    }
+
+    fn output(&self, job: &OutputJob<'_>) -> Result<Made, String> {
+        if gr_spec::TargetDef::find(job.target).is_none() {
+            return Err(format!("there is no target {}", job.target));
+        }
+        let options = options(job)?;
+        let other = job.machine.map(|machine| {
+            let settings = Settings { machine: Some(machine.to_string()), ..job.settings.clone() };
+            own_station(job.path, &settings).0
+        });
+        let station = other.as_ref().or_else(|| own(job.station)).ok_or("the folder of the program is not known")?;
+        if let Some(machine) = job.machine
+            && station.machine.is_none()
+        {
+            return Err(format!("the machine {machine} can't be read"));
+        }
+        let unit = Unit::new(job.path, job.text.clone(), Encoding::Utf8, station);
+        let goal = Goal { target: job.target, options: &options, machine: station.machine.as_ref(), from_line: None, file: None };
+        match build(&unit, &goal) {
+            Err(checked) => Ok(Made { files: Vec::new(), found: checked.found }),
+            Ok(Err(mistake)) => Err(mistake),
+            Ok(Ok((built, checked))) => Ok(made(job, built, checked.found)),
+        }
+    }
+}
+
+/// Options of targets, read as the command reads them.
+fn options(job: &OutputJob<'_>) -> Result<TargetOptions, String> {
+    #[derive(Parser)]
+    struct Only {
+        #[command(flatten)]
+        target: TargetOptions,
+    }
+    let words = job.options.iter().map(|(name, value)| if value.is_empty() { format!("--{name}") } else { format!("--{name}={value}") });
+    let parsed = Only::try_parse_from(std::iter::once("output".to_string()).chain(words));
+    parsed.map(|o| o.target).map_err(|e| e.to_string().lines().next().unwrap_or("").trim_start_matches("error: ").to_string())
+}
+
+fn made(job: &OutputJob<'_>, built: Built, mut found: Vec<Diagnostic>) -> Made {
+    found.extend(built.found);
+    let extension = gr_spec::TargetDef::find(job.target).map_or("txt", |t| t.extension);
+    let name = stem(job.path);
+    let file = |a: Artifact| MadeFile {
+        name: if a.suffix.is_empty() { format!("{name}.{extension}") } else { format!("{name}{}", a.suffix) },
+        bytes: a.bytes,
+        lines: Vec::new(),
+    };
+    Made { files: built.artifacts.into_iter().map(file).collect(), found }
+}

@@ -1,0 +1,208 @@
+//! Outline, folding, selection.
+
+use gr_gcode::{Form, Keyword};
+use gr_text::Span;
+
+use super::doc::{Doc, LineOf};
+use super::names::{self, label_text};
+use crate::{Fold, Item, ItemKind};
+
+/// Entries of an outline: more would be of no use to anybody and slow editors down.
+pub const MOST_ITEMS: usize = 2_000;
+
+/// Subroutines, tools and operations of a program: tools hold their operations.
+pub fn outline(doc: Doc<'_>) -> Vec<Item> {
+    let subs = names::subs(doc);
+    let end_of = |line: u32| doc.line(line).map_or(doc.len(), |l| l.span().end);
+    let mut items: Vec<Item> = subs
+        .iter()
+        .map(|s| Item {
+            kind: ItemKind::Sub,
+            name: label_text(&s.label),
+            detail: String::new(),
+            range: Span::new(doc.line(s.first).map_or(0, |l| l.span().start), end_of(s.last)),
+            span: s.span,
+            children: Vec::new(),
+        })
+        .collect();
+    let mut left = MOST_ITEMS.saturating_sub(items.len());
+    let mut main: Vec<Item> = Vec::new();
+    for (c, chunk) in doc.file.chunks.iter().enumerate() {
+        if left == 0 {
+            break;
+        }
+        let bytes = chunk.text.as_bytes();
+        let telling = memchr::memchr2(b'(', b';', bytes).is_some() || memchr::memchr2(b'M', b'm', bytes).is_some();
+        if !telling {
+            continue;
+        }
+        let first = doc.file.first_lines[c];
+        for line in doc.lines(first..first + chunk.scan.lines.len() as u32) {
+            let Some(item) = entry(&line) else { continue };
+            let inside = subs.iter().position(|s| (s.first..=s.last).contains(&line.line) && s.last > s.first);
+            match inside {
+                Some(s) if item.kind == ItemKind::Operation => items[s].children.push(item),
+                _ => main.push(item),
+            }
+            left -= 1;
+            if left == 0 {
+                break;
+            }
+        }
+    }
+    items.extend(nested(main, doc.len()));
+    items.sort_by_key(|i| (i.range.start, std::cmp::Reverse(i.range.end)));
+    items
+}
+
+/// Operations go below the tool change before them; a tool lasts until the next.
+fn nested(flat: Vec<Item>, end: u32) -> Vec<Item> {
+    let mut out: Vec<Item> = Vec::new();
+    for item in flat {
+        let start = item.range.start;
+        let tool = out.last().is_some_and(|t| t.kind == ItemKind::Tool);
+        if item.kind == ItemKind::Tool {
+            if let Some(last) = out.last_mut().filter(|_| tool) {
+                close(last, start);
+            }
+            out.push(item);
+        } else if tool {
+            out.last_mut().expect("just looked at").children.push(item);
+        } else {
+            out.push(item);
+        }
+    }
+    if let Some(last) = out.last_mut().filter(|t| t.kind == ItemKind::Tool) {
+        close(last, end);
+    }
+    out
+}
+
+fn close(tool: &mut Item, end: u32) {
+    tool.range.end = end.max(tool.range.end).max(tool.children.last().map_or(0, |c| c.range.end));
+    // Up to the end of the line before the next change.
+    tool.range.end = tool.range.end.saturating_sub(u32::from(end > tool.range.start));
+    tool.range.end = tool.range.end.max(tool.span.end);
+}
+
+fn entry(line: &LineOf<'_>) -> Option<Item> {
+    let words = line.words();
+    if line.has_code(b'm', 60) {
+        let change = words.iter().find(|w| w.letter == b'm' && w.value == 6.0)?;
+        let name = line.literal(b't').map_or_else(|| "tool change".to_string(), |t| format!("T{}", t.value));
+        let detail = words.iter().find(|w| w.form == Form::Comment).map_or(String::new(), |w| comment(line.slice(line.tight(w))));
+        let span = line.tight(change);
+        return Some(Item { kind: ItemKind::Tool, name, detail, range: line.span(), span, children: Vec::new() });
+    }
+    let word = words.first().filter(|w| w.form == Form::Comment && words.len() == 1)?;
+    let span = line.tight(word);
+    let name = comment(line.slice(span));
+    let active = name.split_once(',').is_some_and(|(head, _)| gr_spec::comments().iter().any(|c| c.name.eq_ignore_ascii_case(head.trim())));
+    if name.is_empty() || active {
+        return None;
+    }
+    Some(Item { kind: ItemKind::Operation, name, detail: String::new(), range: line.span(), span, children: Vec::new() })
+}
+
+fn comment(text: &str) -> String {
+    text.trim_matches(['(', ')', ';', ' ', '-', '*', '=', '\t']).to_string()
+}
+
+/// Blocks of O-words and macro loops, tools, runs of comments.
+pub fn folds(doc: Doc<'_>) -> Vec<Fold> {
+    let mut found = Vec::new();
+    let mut open: Vec<(u32, Keyword, String)> = Vec::new();
+    for (c, chunk) in doc.file.chunks.iter().enumerate().filter(|(_, c)| !c.scan.controls.is_empty()) {
+        let first = doc.file.first_lines[c];
+        for s in gr_gcode::symbols(&chunk.text, &chunk.scan).statements {
+            let (line, label) = (s.line + first, label_text(&s.what.label));
+            match s.what.keyword {
+                Keyword::Sub | Keyword::If | Keyword::Repeat | Keyword::Do | Keyword::MacroWhile | Keyword::MacroDo => open.push((line, s.what.keyword, label)),
+                // The `while` that ends a `do` carries its label.
+                Keyword::While if !open.iter().any(|o| o.1 == Keyword::Do && o.2 == label) => open.push((line, Keyword::While, label)),
+                Keyword::Endsub | Keyword::Endif | Keyword::Endrepeat | Keyword::Endwhile | Keyword::While | Keyword::MacroEnd => {
+                    let at = open.iter().rposition(|o| o.2 == label);
+                    if let Some((start, ..)) = at.map(|at| open.remove(at)).filter(|o| o.0 < line) {
+                        found.push(Fold { first: start, last: line, comment: false });
+                    }
+                }
+                _ => {}
+            }
+            if found.len() >= MOST_ITEMS {
+                return found;
+            }
+        }
+    }
+    for item in outline(doc).iter().filter(|i| i.kind == ItemKind::Tool) {
+        let line = |at: u32| doc.line_at(at).map_or(0, |l| l.line);
+        let (first, last) = (line(item.range.start), line(item.range.end));
+        if last > first {
+            found.push(Fold { first, last, comment: false });
+        }
+    }
+    comments(doc, &mut found);
+    found.sort_by_key(|f| (f.first, std::cmp::Reverse(f.last)));
+    found.dedup();
+    found
+}
+
+/// Two or more lines of nothing but comments.
+fn comments(doc: Doc<'_>, found: &mut Vec<Fold>) {
+    let mut run: Option<(u32, u32)> = None;
+    let mut flush = |run: Option<(u32, u32)>| {
+        if let Some((first, last)) = run.filter(|(a, b)| b > a) {
+            found.push(Fold { first, last, comment: true });
+        }
+    };
+    let mut left = MOST_ITEMS;
+    for (c, chunk) in doc.file.chunks.iter().enumerate() {
+        if left == 0 || memchr::memchr2(b'(', b';', chunk.text.as_bytes()).is_none() {
+            continue;
+        }
+        let first = doc.file.first_lines[c];
+        for line in doc.lines(first..first + chunk.scan.lines.len() as u32) {
+            let words = line.words();
+            if words.is_empty() || words.iter().any(|w| w.form != Form::Comment) {
+                continue;
+            }
+            match &mut run {
+                Some((_, last)) if *last + 1 == line.line => *last = line.line,
+                _ => {
+                    flush(run.replace((line.line, line.line)));
+                    left = left.saturating_sub(1);
+                }
+            }
+        }
+    }
+    flush(run);
+}
+
+/// Number, word, block, operation or branch, tool, file: each around the one before.
+pub fn selections(doc: Doc<'_>, offset: u32) -> Vec<Span> {
+    let mut out = Vec::new();
+    let Some(line) = doc.line_at(offset) else { return out };
+    if let Some(word) = line.word_at(offset) {
+        let span = line.tight(word);
+        if word.form == Form::Literal && span.end > span.start + 1 && offset > span.start {
+            out.push(Span::new(span.start + 1, span.end));
+        }
+        out.push(span);
+    }
+    out.push(line.span());
+    let span_of = |first: u32, last: u32| {
+        Span::new(doc.line(first).map_or(0, |l| l.span().start), doc.line(last).map_or(doc.len(), |l| l.span().end))
+    };
+    let mut around: Vec<Span> = folds(doc).iter().filter(|f| (f.first..=f.last).contains(&line.line)).map(|f| span_of(f.first, f.last)).collect();
+    around.sort_by_key(|s| s.end - s.start);
+    out.extend(around);
+    out.push(Span::new(0, doc.len()));
+    let mut last: Option<Span> = None;
+    out.retain(|s| {
+        let grows = last.is_none_or(|l| s.start <= l.start && l.end <= s.end && *s != l);
+        if grows {
+            last = Some(*s);
+        }
+        grows
+    });
+    out
+}

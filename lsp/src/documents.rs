@@ -1,0 +1,277 @@
+//! Open documents, and the views of them that requests work on.
+
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+
+use gr_driver::{Cancelled, Snapshot};
+use gr_gcode::File;
+use gr_ide::config::Schema;
+use gr_ir::Program;
+use gr_ir::measure::{Rates, Report, report};
+use gr_spec::{Dialect, Family};
+use gr_text::{Diagnostic, FileId, LineIndex, Span};
+use tower_lsp::ls_types as lsp;
+
+use crate::host::{Host, Station};
+use crate::settings::Settings;
+use crate::text::{Columns, Text};
+use crate::workspace::Workspace;
+
+/// What a document is.
+#[derive(Clone, Copy, Debug)]
+pub enum Kind {
+    /// A G-code program.
+    Gcode(FileId, &'static Dialect),
+    /// A Part 21 file.
+    Exchange,
+    /// A machine file or the project file.
+    Config(Schema),
+    /// A tool table.
+    Tools,
+    /// Nothing of ours.
+    Other,
+}
+
+/// An exchange file with its tables.
+pub struct Exchange {
+    /// Its text.
+    pub text: String,
+    /// Its tables.
+    pub tables: gr_p21::Exchange,
+    /// Its lines.
+    pub lines: LineIndex,
+}
+
+/// A program that was run as a whole.
+pub struct Motion {
+    /// Its motion.
+    pub program: Program,
+    /// Names of the files it is made of.
+    pub files: Vec<Box<str>>,
+    /// Sums.
+    pub report: Report,
+    /// Raw part, mm.
+    pub stock: Option<[[f64; 3]; 2]>,
+}
+
+/// What is worked out at most once for a version of a document.
+#[derive(Default)]
+pub struct Derived {
+    exchange: OnceLock<Arc<Exchange>>,
+    motion: OnceLock<Option<Arc<Motion>>>,
+    tokens: Mutex<Option<(String, Arc<Vec<lsp::SemanticToken>>)>>,
+}
+
+/// Everything a request needs of a document, at one version. Edits wait while `session` is held: take what is
+/// needed of it first, then [`View::release`].
+pub struct View {
+    /// Name.
+    pub uri: lsp::Uri,
+    /// File name.
+    pub path: PathBuf,
+    /// Version of the client.
+    pub version: i32,
+    /// What it is.
+    pub kind: Kind,
+    /// Text.
+    pub text: Arc<Text>,
+    /// Columns.
+    pub columns: Columns,
+    /// What it is run with.
+    pub station: Arc<Station>,
+    /// Settings.
+    pub settings: Arc<Settings>,
+    /// Diagnostics that were found last, and for which version.
+    pub found: Arc<Vec<Diagnostic>>,
+    /// Worked out once per version.
+    pub derived: Arc<Derived>,
+    /// Last tokens that were sent, over versions.
+    pub sent_tokens: Arc<Derived>,
+    /// The command.
+    pub host: Arc<dyn Host>,
+    /// Folders.
+    pub workspace: Arc<Workspace>,
+    /// The other open documents: path, name, text.
+    pub others: Arc<Vec<OpenFile>>,
+    session: Option<Snapshot>,
+}
+
+/// An open document as others see it.
+#[derive(Clone)]
+pub struct OpenFile {
+    /// File name.
+    pub path: PathBuf,
+    /// Name.
+    pub uri: lsp::Uri,
+    /// Text.
+    pub text: Arc<Text>,
+    /// What it is.
+    pub kind: Kind,
+}
+
+impl View {
+    #[expect(clippy::too_many_arguments, reason = "made in one place")]
+    /// A view.
+    pub fn new(
+        document: &Document,
+        columns: Columns,
+        settings: Arc<Settings>,
+        host: Arc<dyn Host>,
+        workspace: Arc<Workspace>,
+        others: Arc<Vec<OpenFile>>,
+        session: Option<Snapshot>,
+    ) -> View {
+        View {
+            uri: document.uri.clone(),
+            path: document.path.clone(),
+            version: document.version,
+            kind: document.kind,
+            text: document.text.clone(),
+            columns,
+            station: document.station.clone(),
+            settings,
+            found: document.found.clone(),
+            derived: document.derived.clone(),
+            sent_tokens: document.sent_tokens.clone(),
+            host,
+            workspace,
+            others,
+            session,
+        }
+    }
+    /// The database: see the type.
+    pub fn session(&self) -> Option<(&Snapshot, FileId, &'static Dialect)> {
+        match self.kind {
+            Kind::Gcode(file, dialect) => Some((self.session.as_ref()?, file, dialect)),
+            _ => None,
+        }
+    }
+    /// Lets edits through.
+    pub fn release(&mut self) {
+        self.session = None;
+    }
+    /// Tables of the program; releases the database.
+    pub fn program(&mut self) -> Result<Option<(Arc<File>, &'static Dialect)>, Cancelled> {
+        let found = match self.session() {
+            Some((snapshot, file, dialect)) => Some((snapshot.file(file)?, dialect)),
+            None => None,
+        };
+        self.release();
+        Ok(found)
+    }
+    /// Byte of a position.
+    pub fn offset(&self, p: lsp::Position) -> u32 {
+        self.text.offset(p, self.columns)
+    }
+    /// Range of some bytes.
+    pub fn range(&self, span: Span) -> lsp::Range {
+        self.text.range(span, self.columns)
+    }
+    /// The exchange file, parsed at most once per version.
+    pub fn exchange(&self) -> Arc<Exchange> {
+        let made = self.derived.exchange.get_or_init(|| {
+            let text = self.text.to_string();
+            let tables = gr_p21::parse(text.as_bytes());
+            let lines = LineIndex::new(text.as_bytes());
+            Arc::new(Exchange { text, tables, lines })
+        });
+        made.clone()
+    }
+    /// The program's motion, run at most once per version. Release the database first.
+    pub fn motion(&self) -> Option<Arc<Motion>> {
+        self.derived.motion.get_or_init(|| self.run().map(Arc::new)).clone()
+    }
+    fn run(&self) -> Option<Motion> {
+        let rates = Rates::default();
+        match self.kind {
+            Kind::Gcode(_, dialect) if dialect.family != Family::Ufmg2008 => {
+                let text: Arc<str> = self.text.to_string().into();
+                let made = gr_driver::lower(&self.path.to_string_lossy(), text, &self.station.setup_for(dialect), None);
+                let report = report(&made.program, &rates);
+                let files = made.texts.into_iter().map(|(name, _)| name).collect();
+                Some(Motion { program: made.program, files, report, stock: None })
+            }
+            Kind::Exchange => {
+                let exchange = self.exchange();
+                let plan = self.host.plan(&self.path, &exchange.text, &self.station)?;
+                let report = report(&plan.program, &rates);
+                let files = vec![self.path.to_string_lossy().into()];
+                Some(Motion { program: plan.program, files, report, stock: plan.stock })
+            }
+            _ => None,
+        }
+    }
+    /// Remembers tokens that are sent; gives the ones sent before.
+    pub fn swap_tokens(&self, id: &str, tokens: &Arc<Vec<lsp::SemanticToken>>) -> Option<(String, Arc<Vec<lsp::SemanticToken>>)> {
+        let mut last = self.sent_tokens.tokens.lock().unwrap_or_else(PoisonError::into_inner);
+        last.replace((id.to_string(), tokens.clone()))
+    }
+    /// Text and name of any file of the workspace, open or on disk.
+    pub fn file_at(&self, path: &Path) -> Option<(lsp::Uri, Arc<File>)> {
+        let dialect = if let Kind::Gcode(_, d) = self.kind { d } else { Dialect::linuxcnc() };
+        if let Some(open) = self.others.iter().find(|o| o.path == path) {
+            let file = gr_driver::scan_file(&path.to_string_lossy(), &open.text.to_string(), dialect);
+            return Some((open.uri.clone(), Arc::new(file)));
+        }
+        Some((lsp::Uri::from_file_path(path)?, self.workspace.file(path, dialect)?))
+    }
+    /// The other G-code programs of the workspace, open or on disk.
+    pub fn other_programs(&self) -> Vec<(PathBuf, lsp::Uri, Arc<File>)> {
+        let mut paths = self.workspace.programs();
+        paths.extend(self.others.iter().filter(|o| matches!(o.kind, Kind::Gcode(..))).map(|o| o.path.clone()));
+        paths.sort();
+        paths.dedup();
+        let other = paths.into_iter().filter(|p| *p != self.path);
+        other.filter_map(|p| self.file_at(&p).map(|(uri, file)| (p, uri, file))).collect()
+    }
+}
+
+/// An open document.
+pub struct Document {
+    /// Name.
+    pub uri: lsp::Uri,
+    /// File name.
+    pub path: PathBuf,
+    /// Language the client says it is in.
+    pub language: String,
+    /// Version of the client.
+    pub version: i32,
+    /// Text.
+    pub text: Arc<Text>,
+    /// What it is.
+    pub kind: Kind,
+    /// What it is run with.
+    pub station: Arc<Station>,
+    /// Diagnostics have to be found anew.
+    pub stale: bool,
+    /// Diagnostics that were found last.
+    pub found: Arc<Vec<Diagnostic>>,
+    /// Worked out once per version.
+    pub derived: Arc<Derived>,
+    /// See [`View::sent_tokens`].
+    pub sent_tokens: Arc<Derived>,
+}
+
+/// What a document is, by its language, name and beginning.
+pub fn kind_of(path: &Path, language: &str, text: &str) -> Option<Kind> {
+    let name = path.file_name().map(|n| n.to_string_lossy().to_lowercase()).unwrap_or_default();
+    let ending = path.extension().map(|n| n.to_string_lossy().to_lowercase()).unwrap_or_default();
+    let start: String = text.chars().filter(|c| *c > ' ' && *c != '\u{FEFF}').take(16).collect();
+    if start.starts_with("ISO-10303-21") || language == "p21" || matches!(ending.as_str(), "p21" | "stpnc") {
+        return Some(Kind::Exchange);
+    }
+    if matches!(ending.as_str(), "stp" | "step") {
+        let ours = start.starts_with("HEADER") || start.starts_with("DATA;") || start.starts_with("/*") || start.is_empty();
+        return Some(if ours { Kind::Exchange } else { Kind::Other });
+    }
+    if ending == "tbl" {
+        return Some(Kind::Tools);
+    }
+    if ending == "toml" || language == "toml" {
+        return Some(Schema::of(&name, text).map_or(Kind::Other, Kind::Config));
+    }
+    if matches!(ending.as_str(), "ini" | "var" | "md" | "txt" | "json") && language != "gcode" {
+        return Some(Kind::Other);
+    }
+    None
+}

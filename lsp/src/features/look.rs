@@ -1,0 +1,378 @@
+//! Reading: hover, hints, symbols, folding, selection, tokens, lenses, links.
+
+use std::sync::Arc;
+
+use gr_driver::Traced;
+use gr_gcode::Parameter;
+use gr_ide::gcode::hints::Ran;
+use gr_ide::gcode::hover::{Facts, Run};
+use gr_ide::gcode::names;
+use gr_ide::{Hint, HintKind, Item, Lens, Token, config, gcode, p21};
+use gr_text::Span;
+use tower_lsp::ls_types as lsp;
+
+use super::{Answer, MOST_BLOCKS, MOST_BLOCKS_VISIBLE, doc, exchange_doc, joints};
+use crate::documents::{Kind, View};
+use crate::protocol::{TOKEN_TYPES, markdown, symbol, symbol_kind, token_type};
+use crate::text::Text;
+
+/// What stands under the cursor.
+pub fn hover(mut view: View, at: lsp::Position) -> Answer<Option<lsp::Hover>> {
+    let offset = view.offset(at);
+    let found = match view.kind {
+        Kind::Gcode(..) => gcode_hover(&mut view, offset)?,
+        Kind::Exchange => p21::hover::hover(exchange_doc(&view.exchange()), offset),
+        Kind::Config(schema) => config::hover(schema, &view.text.to_string(), offset),
+        Kind::Tools => config::tools::hover(&view.text.to_string(), offset, view.station.setup.machine_units),
+        Kind::Other => None,
+    };
+    Ok(found.map(|h| lsp::Hover { contents: lsp::HoverContents::Markup(markdown(h.text)), range: Some(view.range(h.span)) }))
+}
+
+/// One block as it is run, with the values of some parameters.
+pub(super) fn trace_line(view: &View, line: u32, wanted: &[Parameter]) -> Answer<Option<Traced>> {
+    let Some((session, file, dialect)) = view.session() else { return Ok(None) };
+    if dialect.family == gr_spec::Family::Ufmg2008 {
+        return Ok(None);
+    }
+    Ok(session.trace(file, line..line + 1, wanted, MOST_BLOCKS)?.into_iter().next())
+}
+
+fn gcode_hover(view: &mut View, offset: u32) -> Answer<Option<gr_ide::Hover>> {
+    let Some((session, file, dialect)) = view.session() else { return Ok(None) };
+    let tables = (session.file(file)?, dialect);
+    let doc = doc(&tables);
+    let parameter = gcode::hover::parameter_at(doc, offset);
+    let wanted: Vec<Parameter> = parameter.iter().cloned().collect();
+    let Some(line) = doc.line_at(offset) else { return Ok(None) };
+    let traced = trace_line(view, line.line, &wanted)?;
+    view.release();
+    let run = traced.map(|t| run_of(view, t, parameter.is_some()));
+    let written = parameter.and_then(|p| names::last_write(doc, &p, line.line));
+    let written = written.and_then(|l| doc.line(l)).map(|l| (l.line, l.text()));
+    let setup = &view.station.setup;
+    let facts = Facts { run: run.as_ref(), tools: Some((&setup.tools, setup.machine_units)), last_write: written };
+    Ok(gcode::hover::hover(doc, offset, facts))
+}
+
+fn run_of(view: &View, t: Traced, valued: bool) -> Run {
+    let value = valued.then(|| (t.values.first().copied().flatten(), t.values_after.first().copied().flatten()));
+    let moves = t.program.steps().any(|s| s.op.moves());
+    let end = t.program.steps().filter(|s| s.op.moves()).last().map(|s| s.end.xyz());
+    let joints = end.filter(|_| moves).and_then(|xyz| joints(view, xyz, None));
+    let shown = joints.zip(view.station.machine.as_ref()).map(|(j, m)| crate::machine::show(m, &j)).unwrap_or_default();
+    Run { before: t.before, after: t.after, program: t.program, value, cycle: t.cycle, joints: shown }
+}
+
+/// Remarks inside of the visible text.
+pub fn hints(mut view: View, range: lsp::Range) -> Answer<Vec<lsp::InlayHint>> {
+    let kinds = view.settings.hints.kinds();
+    let span = Span::new(view.offset(range.start), view.offset(range.end));
+    let found = match view.kind {
+        Kind::Gcode(..) => {
+            let Some((session, file, dialect)) = view.session() else { return Ok(Vec::new()) };
+            if dialect.family == gr_spec::Family::Ufmg2008 {
+                return Ok(Vec::new());
+            }
+            let tables = (session.file(file)?, dialect);
+            let lines = range.start.line..range.end.line.saturating_add(1).min(range.start.line + 2_000);
+            let traced = session.trace(file, lines, &[], MOST_BLOCKS_VISIBLE)?;
+            view.release();
+            let ran: Vec<Ran<'_>> =
+                traced.iter().map(|t| Ran { line: t.line, before: &t.before, after: &t.after, program: &t.program }).collect();
+            gcode::hints::hints(doc(&tables), &ran, &kinds)
+        }
+        Kind::Exchange if kinds.attributes => p21::hints::hints(exchange_doc(&view.exchange()), span),
+        _ => Vec::new(),
+    };
+    Ok(found.into_iter().filter(|h| span.start <= h.at && h.at <= span.end).map(|h| hint(&view, h)).collect())
+}
+
+fn hint(view: &View, h: Hint) -> lsp::InlayHint {
+    let before = matches!(h.kind, HintKind::Motion | HintKind::Attribute);
+    lsp::InlayHint {
+        position: view.text.position(h.at, view.columns),
+        label: lsp::InlayHintLabel::String(h.text),
+        kind: Some(if before { lsp::InlayHintKind::PARAMETER } else { lsp::InlayHintKind::TYPE }),
+        text_edits: None,
+        tooltip: (!h.tooltip.is_empty()).then(|| lsp::InlayHintTooltip::MarkupContent(markdown(h.tooltip))),
+        padding_left: Some(!before),
+        padding_right: Some(h.kind == HintKind::Attribute),
+        data: None,
+    }
+}
+
+/// The outline.
+pub fn symbols(mut view: View) -> Answer<Vec<lsp::DocumentSymbol>> {
+    let items = outline(&mut view)?;
+    Ok(items.iter().map(|i| symbol(i, &view.text, view.columns)).collect())
+}
+
+fn outline(view: &mut View) -> Answer<Vec<Item>> {
+    Ok(match view.kind {
+        Kind::Gcode(..) => view.program()?.map(|t| gcode::outline::outline(doc(&t))).unwrap_or_default(),
+        Kind::Exchange => p21::outline::outline(exchange_doc(&view.exchange())),
+        Kind::Config(_) => config::outline(&view.text.to_string()),
+        Kind::Tools => config::tools::outline(&view.text.to_string()),
+        Kind::Other => Vec::new(),
+    })
+}
+
+/// Symbols of a workspace that are listed.
+const MOST_SYMBOLS: usize = 500;
+
+/// Subroutines, tools and operations of all programs whose name has all letters of the query in order.
+pub fn workspace_symbols(view: &crate::server::Everything, query: &str) -> Vec<lsp::WorkspaceSymbol> {
+    let mut found = Vec::new();
+    let query = query.to_lowercase();
+    let fits = |name: &str| {
+        let mut letters = query.chars().filter(|c| !c.is_whitespace()).peekable();
+        name.to_lowercase().chars().for_each(|c| {
+            letters.next_if_eq(&c);
+        });
+        letters.peek().is_none()
+    };
+    for (uri, text, items) in view.outlines() {
+        let mut open: Vec<(&Item, String)> = items.iter().map(|i| (i, String::new())).collect();
+        open.reverse();
+        while let Some((item, container)) = open.pop() {
+            if found.len() >= MOST_SYMBOLS {
+                return found;
+            }
+            if fits(&item.name) {
+                let location = lsp::Location { uri: uri.clone(), range: text.range(item.span, view.columns) };
+                found.push(lsp::WorkspaceSymbol {
+                    name: item.name.clone(),
+                    kind: symbol_kind(item.kind),
+                    tags: None,
+                    container_name: (!container.is_empty()).then(|| container.clone()),
+                    location: lsp::OneOf::Left(location),
+                    data: None,
+                });
+            }
+            open.extend(item.children.iter().rev().map(|c| (c, item.name.clone())));
+        }
+    }
+    found
+}
+
+/// What can be folded.
+pub fn folds(mut view: View) -> Answer<Vec<lsp::FoldingRange>> {
+    let found = match view.kind {
+        Kind::Gcode(..) => view.program()?.map(|t| gcode::outline::folds(doc(&t))).unwrap_or_default(),
+        Kind::Exchange => {
+            let exchange = view.exchange();
+            p21::outline::folds(exchange_doc(&exchange), &exchange.lines)
+        }
+        Kind::Config(_) => config::folds(&view.text.to_string()),
+        _ => Vec::new(),
+    };
+    let range = |f: gr_ide::Fold| lsp::FoldingRange {
+        start_line: f.first,
+        end_line: f.last,
+        kind: f.comment.then_some(lsp::FoldingRangeKind::Comment),
+        ..lsp::FoldingRange::default()
+    };
+    Ok(found.into_iter().map(range).collect())
+}
+
+/// What the selection grows over, for each position.
+pub fn selections(mut view: View, at: &[lsp::Position]) -> Answer<Vec<lsp::SelectionRange>> {
+    let offsets: Vec<u32> = at.iter().map(|p| view.offset(*p)).collect();
+    let spans: Vec<Vec<Span>> = match view.kind {
+        Kind::Gcode(..) => match view.program()? {
+            Some(t) => offsets.iter().map(|o| gcode::outline::selections(doc(&t), *o)).collect(),
+            None => vec![Vec::new(); at.len()],
+        },
+        Kind::Exchange => {
+            let exchange = view.exchange();
+            offsets.iter().map(|o| p21::lenses::selections(exchange_doc(&exchange), *o)).collect()
+        }
+        _ => vec![Vec::new(); at.len()],
+    };
+    Ok(spans.into_iter().zip(at).map(|(spans, at)| chain(&view, &spans, *at)).collect())
+}
+
+fn chain(view: &View, spans: &[Span], at: lsp::Position) -> lsp::SelectionRange {
+    let mut parent = None;
+    for span in spans.iter().rev() {
+        parent = Some(Box::new(lsp::SelectionRange { range: view.range(*span), parent }));
+    }
+    parent.map_or(lsp::SelectionRange { range: lsp::Range { start: at, end: at }, parent: None }, |p| *p)
+}
+
+/// Tokens of a whole document or some of its lines.
+pub fn tokens(mut view: View, range: Option<lsp::Range>) -> Answer<(View, Arc<Vec<lsp::SemanticToken>>)> {
+    let span = range.map_or(Span::new(0, view.text.len()), |r| Span::new(view.offset(r.start), view.offset(r.end)));
+    let found: Vec<Token> = match view.kind {
+        Kind::Gcode(..) => match view.program()? {
+            Some(t) => {
+                let lines = range.map_or(0..u32::MAX, |r| r.start.line..r.end.line.saturating_add(1));
+                gcode::tokens::tokens(doc(&t), lines)
+            }
+            None => Vec::new(),
+        },
+        Kind::Exchange => p21::outline::tokens(exchange_doc(&view.exchange()), span),
+        _ => Vec::new(),
+    };
+    let encoded = Arc::new(encode(&view, &found));
+    Ok((view, encoded))
+}
+
+/// Each token relative to the one before; those that span lines are left out.
+fn encode(view: &View, tokens: &[Token]) -> Vec<lsp::SemanticToken> {
+    let mut out = Vec::with_capacity(tokens.len());
+    let (mut line, mut column) = (0, 0);
+    let mut cursor = Cursor::new(&view.text, view.columns);
+    for t in tokens {
+        let start = cursor.position(t.span.start);
+        let end = cursor.position(t.span.end);
+        if start.line != end.line || start.character >= end.character || (start.line, start.character) < (line, column) {
+            continue;
+        }
+        let delta_line = start.line - line;
+        let delta_start = if delta_line == 0 { start.character - column } else { start.character };
+        (line, column) = (start.line, start.character);
+        out.push(lsp::SemanticToken {
+            delta_line,
+            delta_start,
+            length: end.character - start.character,
+            token_type: token_type(t.kind),
+            token_modifiers_bitset: u32::from(t.modifiers),
+        });
+    }
+    out
+}
+
+/// Positions of rising offsets without a search for each.
+struct Cursor<'t> {
+    text: &'t Text,
+    columns: crate::text::Columns,
+    line: u32,
+    start: u32,
+    next: u32,
+    ascii: bool,
+}
+
+impl<'t> Cursor<'t> {
+    fn new(text: &'t Text, columns: crate::text::Columns) -> Cursor<'t> {
+        Cursor { text, columns, line: 0, start: 0, next: 0, ascii: false }
+    }
+    fn position(&mut self, offset: u32) -> lsp::Position {
+        if offset < self.start || offset >= self.next {
+            let p = self.text.position(offset, self.columns);
+            self.line = p.line;
+            self.start = self.text.line_start(p.line);
+            self.next = self.text.line_start(p.line + 1).max(self.start);
+            self.ascii = self.text.slice(Span::new(self.start, self.next)).is_ascii();
+            return p;
+        }
+        if self.ascii {
+            return lsp::Position { line: self.line, character: offset - self.start };
+        }
+        self.text.position(offset, self.columns)
+    }
+}
+
+/// What the client needs to know about tokens.
+pub fn legend() -> lsp::SemanticTokensLegend {
+    lsp::SemanticTokensLegend {
+        token_types: TOKEN_TYPES.iter().map(|t| lsp::SemanticTokenType::new(t)).collect(),
+        token_modifiers: gr_ide::TOKEN_MODIFIERS.iter().map(|t| lsp::SemanticTokenModifier::new(t)).collect(),
+    }
+}
+
+/// The edits that make new tokens of old ones: what lies between the equal ends.
+pub fn delta(old: &[lsp::SemanticToken], new: &[lsp::SemanticToken]) -> Vec<lsp::SemanticTokensEdit> {
+    let head = old.iter().zip(new).take_while(|(a, b)| a == b).count();
+    let tail = old[head..].iter().rev().zip(new[head..].iter().rev()).take_while(|(a, b)| a == b).count();
+    if head == old.len() && head == new.len() {
+        return Vec::new();
+    }
+    // Counted in numbers: a token is five.
+    vec![lsp::SemanticTokensEdit {
+        start: head as u32 * 5,
+        delete_count: (old.len() - head - tail) as u32 * 5,
+        data: Some(new[head..new.len() - tail].to_vec()),
+    }]
+}
+
+/// Remarks above lines.
+pub fn lenses(mut view: View) -> Answer<Vec<lsp::CodeLens>> {
+    let found: Vec<Lens> = match view.kind {
+        Kind::Gcode(..) => {
+            let Some(tables) = view.program()? else { return Ok(Vec::new()) };
+            let doc = doc(&tables);
+            let subs = names::subs(doc);
+            let elsewhere = if subs.is_empty() { Vec::new() } else { calls_elsewhere(&view) };
+            let count = |label: &str| elsewhere.iter().filter(|l| *l == label).count();
+            let motion = view.motion();
+            gcode::lenses::lenses(doc, motion.as_ref().map(|m| (&m.program, &m.report)), &count)
+        }
+        Kind::Exchange => {
+            let exchange = view.exchange();
+            let motion = view.motion();
+            p21::lenses::lenses(exchange_doc(&exchange), &exchange.lines, motion.as_ref().map(|m| &m.report))
+        }
+        _ => Vec::new(),
+    };
+    let lens = |l: Lens| {
+        let at = lsp::Position { line: l.line, character: 0 };
+        lsp::CodeLens {
+            range: lsp::Range { start: at, end: at },
+            command: Some(lsp::Command { title: l.text, command: String::new(), arguments: None }),
+            data: None,
+        }
+    };
+    Ok(found.into_iter().map(lens).collect())
+}
+
+/// Labels that the other programs of the workspace call, each as often as it is called.
+fn calls_elsewhere(view: &View) -> Vec<String> {
+    let dialect = if let Kind::Gcode(_, d) = view.kind { d } else { gr_spec::Dialect::linuxcnc() };
+    let all = view.other_programs();
+    let calls = all.iter().flat_map(|(_, _, file)| names::calls(gcode::Doc { file, dialect }));
+    calls.map(|c| names::label_text(&c.label)).collect()
+}
+
+/// Subroutine files that are called.
+pub fn links(mut view: View) -> Answer<Vec<lsp::DocumentLink>> {
+    let Some(tables) = view.program()? else { return Ok(Vec::new()) };
+    let doc = doc(&tables);
+    let own: Vec<_> = names::subs(doc).into_iter().map(|s| s.label).collect();
+    let setup = view.station.setup_for(tables.1);
+    let mut found = Vec::new();
+    for call in names::calls(doc).into_iter().filter(|c| !own.contains(&c.label)).take(2_000) {
+        let name = super::names::file_name(&call.label);
+        let path = gr_interp::subroutine_paths(&setup, &name).into_iter().chain(super::names::beside(&view, &name)).find(|p| p.is_file());
+        if let Some(path) = path
+            && let Some(target) = lsp::Uri::from_file_path(&path)
+        {
+            found.push(lsp::DocumentLink { range: view.range(call.span), target: Some(target), tooltip: Some(path.display().to_string()), data: None });
+        }
+    }
+    Ok(found)
+}
+
+/// Tokens of the whole document with their name, and the edits since `have` when that is what was sent last.
+pub fn all_tokens(view: View, have: Option<String>) -> Answer<(String, Arc<Vec<lsp::SemanticToken>>, Option<Vec<lsp::SemanticTokensEdit>>)> {
+    let (view, new) = tokens(view, None)?;
+    let id = format!("{}", view.version);
+    let old = view.swap_tokens(&id, &new);
+    let edits = old.filter(|(old_id, _)| have.as_deref() == Some(old_id)).map(|(_, old)| delta(&old, &new));
+    Ok((id, new, edits))
+}
+
+/// Diagnostics with a name for what they are: the same name means the same diagnostics.
+pub fn pulled(view: View) -> Answer<(String, Vec<lsp::Diagnostic>)> {
+    use std::hash::{Hash as _, Hasher as _};
+    let own = if let Kind::Gcode(file, _) = view.kind { file } else { gr_text::FileId(0) };
+    let (text, columns, uri, most) = (view.text.clone(), view.columns, view.uri.clone(), view.settings.most_problems);
+    let found = super::diagnostics(view)?;
+    let place = |(file, span): (gr_text::FileId, Span)| (file == own).then(|| lsp::Location { uri: uri.clone(), range: text.range(span, columns) });
+    let shown = found.iter().filter(|d| d.primary().0 == own).take(most);
+    let items: Vec<lsp::Diagnostic> = shown.map(|d| crate::protocol::diagnostic(d, &text, columns, &place)).collect();
+    let mut h = std::collections::hash_map::DefaultHasher::new();
+    serde_json::to_string(&items).unwrap_or_default().hash(&mut h);
+    Ok((format!("{:016x}", h.finish()), items))
+}

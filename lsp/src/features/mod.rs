@@ -1,0 +1,122 @@
+//! From requests to features and back. Each function takes a view and gives data of the protocol; failures are that
+//! the view was overtaken by an edit, or that the request can't be met and why.
+
+mod custom;
+mod edits;
+mod look;
+mod names;
+mod write;
+
+pub use custom::*;
+pub use edits::*;
+pub use look::*;
+pub use names::*;
+pub use write::*;
+
+use gr_driver::Cancelled;
+use gr_ide::gcode;
+use gr_text::{Diagnostic, FileId, Severity, Span, code};
+use tower_lsp::ls_types as lsp;
+
+use crate::documents::{Kind, View};
+
+/// Why a request has no answer.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Failure {
+    /// The text changed meanwhile.
+    Overtaken,
+    /// It can't be met.
+    Refused(String),
+}
+
+impl From<Cancelled> for Failure {
+    fn from(_: Cancelled) -> Failure {
+        Failure::Overtaken
+    }
+}
+
+/// What a request gives.
+pub type Answer<T> = Result<T, Failure>;
+
+/// Everything that is to be said about a document.
+pub fn diagnostics(mut view: View) -> Answer<Vec<Diagnostic>> {
+    let found = match view.kind {
+        Kind::Gcode(..) => {
+            let Some((session, file, dialect)) = view.session() else { return Ok(Vec::new()) };
+            if undeclared(&view) {
+                let tables = session.file(file)?;
+                syntax_only(&tables, file, dialect)
+            } else {
+                session.check(file)?.diagnostics
+            }
+        }
+        Kind::Exchange => {
+            view.release();
+            let exchange = view.exchange();
+            if exchange.text.len() > MOST_PLANNED {
+                gr_step::diagnostics_of(exchange.text.as_bytes(), &exchange.tables, FileId(0))
+            } else {
+                return Ok(view.host.check_exchange(&view.path, &exchange.text, &view.station));
+            }
+        }
+        Kind::Config(schema) => {
+            view.release();
+            let text = view.text.to_string();
+            match schema {
+                gr_ide::config::Schema::Machine => gr_machine::parse(FileId(0), &text).err().unwrap_or_default(),
+                gr_ide::config::Schema::Project => view.host.check_project(&view.path, &text),
+            }
+        }
+        Kind::Tools => gr_interp::read_tools(&view.text.to_string(), FileId(0)).1,
+        Kind::Other => Vec::new(),
+    };
+    Ok(found.into_iter().filter_map(|d| view.station.harden(d)).collect())
+}
+
+/// A `.gcode` file of which nobody says what control it is for: mostly a printer's. Its spelling alone is looked at.
+fn undeclared(view: &View) -> bool {
+    let printer = view.path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gcode"));
+    printer && view.host.undeclared(&view.path, &view.text.slice(Span::new(0, 4_096)), &view.settings)
+}
+
+fn syntax_only(tables: &gr_gcode::File, file: FileId, _dialect: &gr_spec::Dialect) -> Vec<Diagnostic> {
+    let mut found = vec![Diagnostic::new(code::FILE_UNDECLARED_DIALECT, file, Span::default(), &[])];
+    for (chunk, start) in tables.chunks.iter().zip(&tables.starts) {
+        found.extend(chunk.scan.faults.iter().map(|fault| {
+            let mut d = Diagnostic::new(fault.code, file, fault.span.shifted(*start), &fault.args);
+            d.severity = Severity::Hint;
+            d
+        }));
+    }
+    found.truncate(gr_driver::MOST_OF_A_KIND);
+    found
+}
+
+/// Larger exchange files are checked but not planned while they are edited, bytes.
+const MOST_PLANNED: usize = 8_000_000;
+
+/// Blocks that are run to find out about one line.
+const MOST_BLOCKS: u32 = 2_000_000;
+/// … about what is visible.
+const MOST_BLOCKS_VISIBLE: u32 = 300_000;
+
+/// The program of a view.
+fn doc<'a>(tables: &'a (std::sync::Arc<gr_gcode::File>, &'static gr_spec::Dialect)) -> gcode::Doc<'a> {
+    gcode::Doc { file: &tables.0, dialect: tables.1 }
+}
+
+/// The exchange file of a view.
+fn exchange_doc(exchange: &crate::documents::Exchange) -> gr_ide::p21::Doc<'_> {
+    gr_ide::p21::Doc { text: exchange.text.as_bytes(), file: &exchange.tables }
+}
+
+/// Edits of one file as the protocol has them.
+fn text_edits(view: &View, edits: Vec<gr_ide::Edit>) -> Vec<lsp::TextEdit> {
+    edits.into_iter().map(|e| lsp::TextEdit { range: view.range(e.span), new_text: e.text }).collect()
+}
+
+/// Joint values of the chosen machine at a pose, as people read them.
+fn joints(view: &View, xyz: [f64; 3], near: Option<&[f64]>) -> Option<Vec<f64>> {
+    let machine = view.station.machine.as_ref()?;
+    crate::machine::joints(machine, xyz, near)
+}

@@ -1,0 +1,98 @@
+//! Folders that the client has open, and the programs in them. Nothing outside of them and of the search path for
+//! subroutines is read.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::SystemTime;
+
+use gr_gcode::File;
+use gr_spec::Dialect;
+
+/// Files of a workspace that are looked at for calls and names.
+const MOST_FILES: usize = 2_000;
+/// Larger ones are not.
+const MOST_BYTES: u64 = 2_000_000;
+/// Folders below folders.
+const MOST_DEPTH: u32 = 12;
+
+type Cached = BTreeMap<PathBuf, (Option<SystemTime>, Arc<File>)>;
+
+/// Folders and what was read from them.
+#[derive(Default)]
+pub struct Workspace {
+    folders: Mutex<Vec<PathBuf>>,
+    files: Mutex<Cached>,
+}
+
+impl Workspace {
+    /// Folders that are open.
+    pub fn set_folders(&self, folders: Vec<PathBuf>) {
+        *self.folders.lock().unwrap_or_else(PoisonError::into_inner) = folders;
+    }
+    /// The same.
+    pub fn folders(&self) -> Vec<PathBuf> {
+        self.folders.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+    /// Forgets what was read.
+    pub fn forget(&self) {
+        self.files.lock().unwrap_or_else(PoisonError::into_inner).clear();
+    }
+    /// G-code programs in the folders, in order.
+    pub fn programs(&self) -> Vec<PathBuf> {
+        let mut found = Vec::new();
+        for folder in self.folders() {
+            walk(&folder, 0, &mut found);
+        }
+        found.sort();
+        found.dedup();
+        found
+    }
+    /// A file with its tables, read again when it changed.
+    pub fn file(&self, path: &Path, dialect: &'static Dialect) -> Option<Arc<File>> {
+        let meta = std::fs::metadata(path).ok()?;
+        if !meta.is_file() || meta.len() > MOST_BYTES {
+            return None;
+        }
+        let time = meta.modified().ok();
+        if let Some((known, file)) = self.files.lock().unwrap_or_else(PoisonError::into_inner).get(path)
+            && *known == time
+            && time.is_some()
+        {
+            return Some(file.clone());
+        }
+        let text = gr_text::decode(std::fs::read(path).ok()?).text;
+        let file = Arc::new(gr_driver::scan_file(&path.to_string_lossy(), &text, dialect));
+        self.files.lock().unwrap_or_else(PoisonError::into_inner).insert(path.to_path_buf(), (time, file.clone()));
+        Some(file)
+    }
+}
+
+/// Extensions of G-code programs, those that only other programs claim left out.
+pub fn is_program(path: &Path) -> bool {
+    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
+    matches!(extension.as_str(), "ngc" | "nc" | "tap" | "cnc" | "g" | "ncc" | "gcode")
+        || Dialect::all().iter().any(|d| d.extensions.contains(&extension.as_str()))
+}
+
+fn walk(folder: &Path, depth: u32, found: &mut Vec<PathBuf>) {
+    let Ok(entries) = std::fs::read_dir(folder) else { return };
+    let mut entries: Vec<PathBuf> = entries.flatten().map(|e| e.path()).collect();
+    entries.sort();
+    for path in entries {
+        if found.len() >= MOST_FILES {
+            return;
+        }
+        let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+        if name.starts_with('.') || matches!(name.as_str(), "target" | "node_modules") || path.is_symlink() {
+            continue;
+        }
+        if path.is_dir() {
+            if depth < MOST_DEPTH {
+                walk(&path, depth + 1, found);
+            }
+        } else if is_program(&path) {
+            found.push(path);
+        }
+    }
+}
