@@ -12,6 +12,8 @@ use crate::process::*;
 const ABOVE_LAST_PECK: f64 = 1.0;
 /// Drills break through by this much, mm.
 const BREAK_THROUGH: f64 = 1.0;
+/// Room between a stepped-aside back-boring edge and its hole, mm.
+const ASIDE: f64 = 0.2;
 /// More pecks than this are a mistake.
 const MOST_PECKS: f64 = 10_000.0;
 
@@ -30,10 +32,16 @@ pub(crate) fn drill(e: &mut Emit<'_>, step: &Workingstep, d: &Drilling, feature:
     let Some(depth) = depth(e, step, d, feature) else { return };
     let Some(feed) = step.operation.technology.feed else { return };
     let keyword = step.operation.keyword.as_str();
-    if matches!(keyword, "BACK_BORING" | "THREAD_DRILLING") {
-        let why = if keyword == "BACK_BORING" { ": how far the tool steps aside is not in the file" } else { "" };
+    if keyword == "THREAD_DRILLING" {
+        let why = ": drilling and threading in one stroke; MULTISTEP_DRILLING or DRILLING and TAPPING are";
         return e.say(code::PLAN_NOT_LOWERED, step.operation.origin, &[keyword, why]);
     }
+    let aside = if keyword == "BACK_BORING" {
+        let Some(aside) = aside(e, step, d, feature) else { return };
+        aside
+    } else {
+        [0.0; 2]
+    };
     checks(e, step, feature, depth);
     for frame in &feature.copies {
         let top = frame.origin[2].max(frame.point([0.0, 0.0, 0.0])[2]);
@@ -44,6 +52,7 @@ pub(crate) fn drill(e: &mut Emit<'_>, step: &Workingstep, d: &Drilling, feature:
         match keyword {
             "TAPPING" => tap(e, &job),
             "MULTISTEP_DRILLING" => multistep(e, &job),
+            "BACK_BORING" => back(e, &job, aside),
             _ => once(e, &job),
         }
     }
@@ -88,6 +97,65 @@ fn depth(e: &mut Emit<'_>, step: &Workingstep, d: &Drilling, feature: &Feature) 
             None
         }
     }
+}
+
+/// How far a back-boring tool steps aside to pass the hole it works behind, and which way.
+fn aside(e: &mut Emit<'_>, step: &Workingstep, d: &Drilling, feature: &Feature) -> Option<[f64; 2]> {
+    let (o, t) = (&step.operation, &step.operation.tool);
+    let missing = |e: &mut Emit<'_>, what: &str, why: &str| e.say(code::PLAN_MISSING_VALUE, o.origin, &[&o.keyword, what, why]);
+    let Some(hole) = d.previous else {
+        missing(e, "previous_diameter", "the tool has to pass the hole it works behind");
+        return None;
+    };
+    if d.depth.is_none() {
+        missing(e, "cutting_depth", "it says how far back the tool bores");
+        return None;
+    }
+    let Some(edge) = t.orientation.filter(|o| o[0] != 0.0 || o[1] != 0.0) else {
+        missing(e, "its_tool.direction_for_spindle_orientation", "the tool has to step aside, away from where its edge points");
+        return None;
+    };
+    let by = (t.diameter - hole) / 2.0 + ASIDE;
+    let room = hole / 2.0 - by - t.bar.unwrap_or(0.0) / 2.0;
+    if by < ASIDE || room < 0.0 {
+        let what = format!("#{} {}", feature.origin.id, feature.keyword);
+        let why = format!("a tool of {} mm stepped aside by {by} mm does not pass a hole of {hole} mm", t.diameter);
+        e.say(code::PLAN_CANNOT_CUT, step.origin, &[&what, &why]);
+        return None;
+    }
+    let rule = "its depth counts from the far side of the part towards the spindle; the oriented edge points as the tool says, seen in the machine";
+    e.say(code::PLAN_TAKES_TURNS, o.origin, &[&o.keyword, rule]);
+    let n = libm::hypot(edge[0], edge[1]);
+    Some([-edge[0] / n * by, -edge[1] / n * by])
+}
+
+/// Through the hole stepped aside with the spindle oriented, back to the middle behind it, up at feed, and out again.
+fn back(e: &mut Emit<'_>, job: &Job<'_>, aside: [f64; 2]) {
+    let o = &job.step.operation;
+    let far = job.step.feature.depth;
+    let below = far + BREAK_THROUGH + o.tool.cutting_length.unwrap_or(0.0).min(job.depth);
+    let over = |z: f64| crate::frame::add(job.at(z), [aside[0], aside[1], 0.0]);
+    let way = if o.technology.clockwise { Turn::Cw } else { Turn::Ccw };
+    let orient = |e: &mut Emit<'_>| {
+        e.turn(Turn::Stop);
+        e.push(Op::SpindleOrient { spindle: 0, angle: 0.0, direction: 0 });
+    };
+    orient(e);
+    e.rapid(over(job.retract));
+    e.rapid(over(-below));
+    e.feed(job.feed);
+    e.line(job.at(-below));
+    e.turn(way);
+    e.line(job.at(-(far - job.depth)));
+    if job.d.dwell > 0.0 {
+        e.push(Op::Dwell(job.d.dwell));
+    }
+    e.line(job.at(-below));
+    orient(e);
+    e.line(over(-below));
+    e.rapid(over(job.retract));
+    e.rapid(job.at(job.retract));
+    e.turn(way);
 }
 
 fn checks(e: &mut Emit<'_>, step: &Workingstep, feature: &Feature, depth: f64) {

@@ -2,6 +2,7 @@
 //! program of it; [`table`] lists it for people; [`reference`] repeats the results of two published systems;
 //! [`stepnc`] writes a motion program back as STEP-NC. Reading Part 21 and checking the schema are elsewhere.
 
+mod ap238;
 mod drill;
 mod emit;
 mod explicit;
@@ -22,6 +23,9 @@ pub use process::{Process, Tool, Units};
 pub fn process(text: &[u8], file: FileId, units: Option<Units>) -> (Option<Process>, Vec<Tool>, Vec<Diagnostic>) {
     let exchange = gr_p21::parse(text);
     let model = gr_step::Model::new(text, &exchange);
+    if gr_step::dialect(&model) == gr_step::Dialect::Ap238 {
+        return ap238::read(&model, file);
+    }
     read::read(&model, file, units)
 }
 

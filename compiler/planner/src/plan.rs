@@ -249,6 +249,9 @@ impl Planner<'_> {
         if o.technology.contact_feed && o.toolpaths.is_empty() {
             self.e.say(code::PLAN_NO_EFFECT, o.technology.origin, &["feedrate_reference .CCP.", "the operation", "the feed is that of the tool center"]);
         }
+        if o.technology.synchronised && !matches!(o.keyword.as_str(), "TAPPING") {
+            self.e.say(code::PLAN_NO_EFFECT, o.technology.origin, &["synchronize_spindle_with_feed", "the operation", "only a tap goes in step with the spindle"]);
+        }
         if !o.toolpaths.is_empty() {
             for frame in &s.feature.copies {
                 explicit::follow(&mut self.e, &o.toolpaths, frame, Some((&o.technology, o.functions)), security, true);

@@ -486,7 +486,7 @@ pub enum HoleBottom {
 }
 
 /// A tool.
-#[derive(Clone, PartialEq, Debug)]
+#[derive(Clone, PartialEq, Debug, Default)]
 pub struct Tool {
     /// Instance of the tool.
     pub origin: Origin,
@@ -510,8 +510,12 @@ pub struct Tool {
     pub teeth: Option<u32>,
     /// Right-handed, if stated.
     pub right_handed: Option<bool>,
-    /// Pitch of a tap.
+    /// Pitch of a tap or a thread mill.
     pub pitch: Option<f64>,
+    /// Where its edge points when the spindle is oriented.
+    pub orientation: Option<[f64; 3]>,
+    /// Diameter of what holds it, for going through a hole sideways.
+    pub bar: Option<f64>,
     /// Number in the tool table, from 1.
     pub number: u32,
 }

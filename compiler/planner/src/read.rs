@@ -81,6 +81,23 @@ fn step_modeler(model: &Model<'_>) -> bool {
 }
 
 impl<'m> Reader<'m> {
+    /// For curves and messages alone; angles are radians.
+    pub fn bare(model: &'m Model<'m>, file: FileId) -> Reader<'m> {
+        Reader {
+            model,
+            file,
+            units: Units::StepModeler,
+            out: Vec::new(),
+            tools: Vec::new(),
+            parents: BTreeMap::new(),
+            placed_twice: BTreeSet::new(),
+            variables: BTreeMap::new(),
+            stack: Vec::new(),
+            count: 0,
+            reached: BTreeSet::new(),
+            units_said: true,
+        }
+    }
     pub fn say(&mut self, code: Code, node: Node<'_>, args: &[&str]) {
         let args: Vec<String> = args.iter().map(|a| (*a).to_string()).collect();
         let d = Diagnostic::new(code, self.file, node.keyword_span(), &args);
@@ -344,7 +361,7 @@ impl<'m> Reader<'m> {
             self.missing(node, "its_secplane", "rapids need a plane above which they are safe");
             return None;
         };
-        let toolpaths = node.node("its_toolpath").map(|t| self.toolpaths(t, 0.0)).unwrap_or_default();
+        let toolpaths = node.node("its_toolpath").map(|t| self.toolpaths(t, None)).unwrap_or_default();
         let home = node.keyword() == "RETURN_HOME";
         if toolpaths.is_empty() && !home {
             self.missing(node, "its_toolpath", "a rapid movement has to say where to");

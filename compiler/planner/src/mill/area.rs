@@ -352,7 +352,17 @@ impl Job<'_> {
         if !self.m.bottom {
             return tp::contour_closed(region, &self.wall()).map_err(words);
         }
-        Ok(tp::clear(region, &self.clearing()?).map_err(words)?.passes)
+        Ok(self.connected(tp::clear(region, &self.clearing()?).map_err(words)?.passes))
+    }
+
+    /// Strokes joined as the strategy says: by lifting, if it does.
+    pub(super) fn connected(&self, mut passes: Vec<tp::Pass>) -> Vec<tp::Pass> {
+        if self.m.strategy.as_ref().is_some_and(|s| s.connection.as_deref() == Some("LIFT_SHIFT_PLUNGE")) {
+            for p in &mut passes {
+                p.link = tp::Link::Retract;
+            }
+        }
+        passes
     }
 
     /// One pass along a wall.
@@ -392,7 +402,7 @@ impl Job<'_> {
             what.bidirectional = s.keyword != "UNIDIRECTIONAL";
             what.step_left = s.step_left.unwrap_or(true);
         }
-        let passes = tp::face(&outline, &solid?, &what).map_err(words)?;
+        let passes = self.connected(tp::face(&outline, &solid?, &what).map_err(words)?);
         tp::motion(&passes, &self.heights(0.0, self.bottom), &self.entry(true)?, None, self.radius).map_err(words)
     }
 

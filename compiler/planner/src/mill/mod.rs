@@ -1,10 +1,12 @@
 //! 2½D milling: planes, pockets, slots, steps, profiles, bosses and milled holes, by way of the plane geometry of
 //! `gr_toolpath`. What all of them share is here; [`area`] empties what has an outline, [`slot`] follows a section,
-//! [`section`] is the plane geometry of that section.
+//! [`section`] is the plane geometry of that section,
+//! [`thread`] goes round in a helix.
 
 mod area;
 mod section;
 mod slot;
+mod thread;
 
 use gr_text::code;
 use gr_toolpath as tp;
@@ -57,6 +59,9 @@ struct Job<'a> {
 }
 
 pub(crate) fn mill(e: &mut Emit<'_>, step: &Workingstep, m: &Milling, feature: &Feature, given: &Given) {
+    if let Shape::Thread { .. } = feature.shape {
+        return thread::mill(e, step, m, feature, given.security);
+    }
     let Some(job) = job(e, step, m, feature, given) else { return };
     let planned = match &feature.shape {
         Shape::Face { .. } => job.face(e),

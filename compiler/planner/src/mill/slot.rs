@@ -191,7 +191,7 @@ impl Job<'_> {
         if !closed && b - a > 1e-5 && !open {
             let half = width / 2.0 + self.m.allowance_side;
             let region = self.blind(line, half, ends, self.radius + RUN_OUT)?;
-            return Ok(tp::clear(&region, &self.clearing()?).map_err(words)?.passes);
+            return Ok(self.connected(tp::clear(&region, &self.clearing()?).map_err(words)?.passes));
         }
         let mut what = tp::Contour::new(self.radius);
         what.stepover = self.by;

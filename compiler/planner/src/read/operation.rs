@@ -4,6 +4,7 @@ use gr_step::Node;
 use gr_text::code;
 
 use super::{Reader, origin};
+use crate::frame::{add, dot, scale, sub, unit};
 use crate::process::*;
 
 impl<'m> Reader<'m> {
@@ -22,7 +23,7 @@ impl<'m> Reader<'m> {
             }
         };
         let functions = node.node("its_machine_functions").map(|f| self.functions(f)).unwrap_or_default();
-        let toolpaths = node.node("its_toolpath").map(|t| self.toolpaths(t, tool.diameter)).unwrap_or_default();
+        let toolpaths = node.node("its_toolpath").map(|t| self.toolpaths(t, Some(&tool))).unwrap_or_default();
         let direction = node.node("its_tool_direction").map(|d| d.keyword().to_string());
         if let Some(d) = direction.as_deref().filter(|d| *d != "THREE_AXES") {
             let why = format!(": tool direction {d}");
@@ -77,7 +78,7 @@ impl<'m> Reader<'m> {
         }
         Drilling {
             depth: node.real("cutting_depth"),
-            previous: node.real("previous_diameter"),
+            previous: node.real("previous_diameter").filter(|d| *d > 0.0 && d.is_finite()),
             dwell: node.real("dwell_time_bottom").filter(|d| *d > 0.0 && d.is_finite()).unwrap_or(0.0),
             feed_on_retract: node.real("feed_on_retract").map(as_ratio),
             first: stretch(depth("depth_of_start"), ratio("reduced_feed_at_start")),
@@ -110,6 +111,10 @@ impl<'m> Reader<'m> {
     fn strategy(&mut self, node: Node<'m>) -> Strategy {
         let choice = |a: &str| node.attr(a).and_then(|v| v.choice());
         let feed = node.node("feed_direction").and_then(|d| self.direction(d)).map(|d| [d[0], d[1]]);
+        let connection = choice("its_stroke_connection_strategy");
+        if connection.as_deref().is_some_and(|c| c == "DEGOUGE" || c == "LOOP_BACK") {
+            self.no_effect(node, "its_stroke_connection_strategy", "strokes are joined by the shortest way that stays inside");
+        }
         Strategy {
             origin: origin(node),
             keyword: node.keyword().to_string(),
@@ -119,14 +124,17 @@ impl<'m> Reader<'m> {
             step_left: choice("stepover_direction").map(|c| c == "LEFT"),
             ccw: choice("rotation_direction").map(|c| c == "CCW"),
             climb: choice("cutmode").or_else(|| choice("spiral_cutmode")).map(|c| c == "CLIMB"),
-            connection: choice("its_stroke_connection_strategy"),
+            connection,
         }
     }
 
     fn approach(&mut self, node: Node<'m>, attribute: &str) -> Approach {
         let Some(a) = node.node(attribute) else { return Approach::None };
-        let angle = |name: &str| a.real(name).map_or(0.0, |v| self.angle(v));
         let length = |name: &str| a.real(name).unwrap_or(0.0);
+        if a.attr("tool_orientation").is_some() {
+            self.no_effect(a, "tool_orientation", "the tool stands along the axis of its feature all the way");
+        }
+        let angle = |name: &str| a.real(name).map_or(0.0, |v| self.angle(v));
         match a.keyword() {
             "PLUNGE_TOOLAXIS" => Approach::Axis,
             "PLUNGE_RAMP" => Approach::Ramp(angle("angle")),
@@ -134,7 +142,7 @@ impl<'m> Reader<'m> {
             "PLUNGE_ZIGZAG" => Approach::Zigzag(angle("angle"), length("width")),
             "AP_RETRACT_ANGLE" => Approach::Angle(angle("angle"), length("travel_length")),
             "AP_RETRACT_TANGENT" => Approach::Tangent(length("radius")),
-            "ALONG_PATH" => Approach::Along(a.node("path").map(|p| self.toolpaths(p, 0.0)).unwrap_or_default()),
+            "ALONG_PATH" => Approach::Along(a.node("path").map(|p| self.toolpaths(p, None)).unwrap_or_default()),
             _ => Approach::None,
         }
     }
@@ -174,12 +182,21 @@ impl<'m> Reader<'m> {
                 "LEFT" => Some(false),
                 _ => None,
             }),
-            pitch: node.real("thread_pitch"),
+            pitch: node.real("thread_pitch").filter(|p| *p > 0.0),
+            orientation: node.node("direction_for_spindle_orientation").and_then(|d| self.direction(d)),
+            bar: node.real("tool_holder_diameter_for_spindle_orientation").filter(|d| *d > 0.0),
             number: 0,
         };
+        tool = self.numbered(tool);
+        Some(tool)
+    }
+
+    /// The tool with its number in the table.
+    pub fn numbered(&mut self, mut tool: Tool) -> Tool {
         let same = |t: &Tool| {
             t.name == tool.name && t.kind == tool.kind && t.diameter == tool.diameter && t.edge_radius == tool.edge_radius
                 && t.tip_angle == tool.tip_angle && t.cutting_length == tool.cutting_length && t.length == tool.length
+                && t.taper == tool.taper && t.pitch == tool.pitch
         };
         match self.tools.iter().find(|t| same(t)) {
             Some(known) => tool.number = known.number,
@@ -188,7 +205,7 @@ impl<'m> Reader<'m> {
                 self.tools.push(tool.clone());
             }
         }
-        Some(tool)
+        tool
     }
 
     fn technology(&mut self, node: Node<'m>, tool: &Tool) -> Technology {
@@ -266,11 +283,11 @@ impl<'m> Reader<'m> {
     }
 
     /// The pieces of an explicit tool path.
-    pub fn toolpaths(&mut self, list: Node<'m>, tool_diameter: f64) -> Vec<Toolpath> {
-        list.nodes("its_list").into_iter().filter_map(|n| self.toolpath(n, tool_diameter)).collect()
+    pub fn toolpaths(&mut self, list: Node<'m>, tool: Option<&Tool>) -> Vec<Toolpath> {
+        list.nodes("its_list").into_iter().filter_map(|n| self.toolpath(n, tool)).collect()
     }
 
-    fn toolpath(&mut self, node: Node<'m>, tool_diameter: f64) -> Option<Toolpath> {
+    fn toolpath(&mut self, node: Node<'m>, tool: Option<&Tool>) -> Option<Toolpath> {
         let role = node.attr("its_type").and_then(|v| v.choice()).unwrap_or_default();
         let (mut rapid, mut ratio) = (false, None);
         if let Some(speed) = node.attr("its_speed") {
@@ -283,22 +300,7 @@ impl<'m> Reader<'m> {
                 return None;
             }
         }
-        let stand_in = Tool {
-            origin: origin(node),
-            name: String::new(),
-            kind: String::new(),
-            diameter: tool_diameter,
-            tip_angle: None,
-            cutting_length: None,
-            edge_radius: 0.0,
-            taper: 0.0,
-            length: None,
-            teeth: None,
-            right_handed: None,
-            pitch: None,
-            number: 0,
-        };
-        let technology = node.node("its_technology").map(|t| self.technology(t, &stand_in));
+        let technology = node.node("its_technology").map(|t| self.technology(t, tool.unwrap_or(&Tool::default())));
         let functions = node.node("its_machine_functions").map(|f| self.functions(f));
         let path = match node.keyword() {
             "CUTTER_LOCATION_TRAJECTORY" => {
@@ -319,8 +321,10 @@ impl<'m> Reader<'m> {
                 PathKind::Location { curve, axis }
             }
             "CUTTER_CONTACT_TRAJECTORY" => {
-                self.not_lowered(node, ": the path of the contact point; a cutter location trajectory is");
-                return None;
+                let (curve, axis) = self.contact(node, tool)?;
+                let forward = node.attr("its_direction").and_then(|v| v.boolean()).unwrap_or(true);
+                let (curve, axis) = if forward { (curve, axis) } else { (curve.reversed(), axis.map(|a| a.reversed())) };
+                PathKind::Location { curve, axis }
             }
             "FEEDSTOP" => PathKind::Feedstop(node.real("dwell").filter(|d| *d >= 0.0 && d.is_finite()).unwrap_or(0.0)),
             "CONNECT_SECPLANE" => PathKind::BySecurityPlane,
@@ -331,6 +335,68 @@ impl<'m> Reader<'m> {
             }
         };
         Some(Toolpath { origin: origin(node), role, rapid, ratio, technology, functions, path })
+    }
+}
+
+/// Corners of a curve of straight pieces.
+fn corners(curve: &Curve) -> Option<Vec<[f64; 3]>> {
+    let line = |p: &Piece| match p {
+        Piece::Line(q) => Some(*q),
+        Piece::Arc { .. } => None,
+    };
+    std::iter::once(Some(curve.start)).chain(curve.pieces.iter().map(line)).collect()
+}
+
+/// Where the tip of a tool is whose edge touches a point: the centre of its rounding is off the surface by the edge
+/// radius, its axis further out by what is left of the radius.
+fn tip(contact: [f64; 3], normal: [f64; 3], axis: [f64; 3], radius: f64, edge: f64) -> [f64; 3] {
+    let up = dot(normal, axis);
+    let aside = unit(sub(normal, scale(axis, up))).unwrap_or([0.0; 3]);
+    let centre = add(add(contact, scale(normal, edge)), scale(aside, radius - edge));
+    sub(centre, scale(axis, edge))
+}
+
+impl<'m> Reader<'m> {
+    /// A path of contact points as one of the tool's tip.
+    fn contact(&mut self, node: Node<'m>, tool: Option<&Tool>) -> Option<(Curve, Option<Curve>)> {
+        let Some(tool) = tool else {
+            self.not_lowered(node, ": the path of the contact point without a tool");
+            return None;
+        };
+        let Some(base) = node.node("basiccurve").filter(|b| b.keyword() == "CURVE_WITH_NORMAL_VECTOR") else {
+            self.not_lowered(node, ": its basiccurve is no CURVE_WITH_NORMAL_VECTOR");
+            return None;
+        };
+        let curve = base.node("basiccurve").and_then(|c| self.curve(c, 0))?;
+        let normals = base.node("surface_normal").and_then(|c| self.curve(c, 0))?;
+        let axis = match node.node("its_toolaxis") {
+            Some(a) => Some(self.curve(a, 0)?),
+            None => None,
+        };
+        let (points, normals) = (corners(&curve), corners(&normals));
+        let axes = axis.as_ref().map(corners);
+        let (Some(points), Some(normals)) = (points, normals) else {
+            self.not_lowered(node, ": the contact path or its normals are no polyline");
+            return None;
+        };
+        let axes = match axes {
+            None => vec![[0.0, 0.0, 1.0]; points.len()],
+            Some(a) => a.unwrap_or_default(),
+        };
+        if points.len() != normals.len() || points.len() != axes.len() {
+            let what = format!("{} points, {} normals and {} tool axes", points.len(), normals.len(), axes.len());
+            self.say(code::PLAN_CANNOT_CUT, node, &["the contact path", &what]);
+            return None;
+        }
+        let (radius, edge) = (tool.diameter / 2.0, tool.edge_radius.min(tool.diameter / 2.0));
+        let all: Option<Vec<[f64; 3]>> =
+            points.iter().zip(&normals).zip(&axes).map(|((p, n), a)| Some(tip(*p, unit(*n)?, unit(*a)?, radius, edge))).collect();
+        let Some(all) = all else {
+            self.say(code::PLAN_CANNOT_CUT, node, &["the contact path", "a normal or tool axis has no direction"]);
+            return None;
+        };
+        let start = *all.first()?;
+        Some((Curve { start, pieces: all[1..].iter().map(|p| Piece::Line(*p)).collect() }, axis))
     }
 }
 

@@ -1,0 +1,75 @@
+//! Threads by a thread mill: a helix up or down the flank, begun and ended on half circles that touch it.
+
+use std::f64::consts::PI;
+
+use gr_text::code;
+
+use super::RUN_OUT;
+use crate::emit::Emit;
+use crate::process::*;
+
+/// How deep an outer ISO metric thread is, in pitches: its minor diameter is d - 1.22687 P (ISO 724, ISO 68-1).
+const OUTER_DEPTH: f64 = 1.22687 / 2.0;
+/// More turns than this are a mistake.
+const MOST_TURNS: f64 = 10_000.0;
+
+pub(super) fn mill(e: &mut Emit<'_>, step: &Workingstep, m: &Milling, feature: &Feature, security: f64) {
+    let Shape::Thread { major, pitch, right, inner, length } = &feature.shape else { return };
+    let o = &step.operation;
+    let Some(pitch) = o.tool.pitch.or(*pitch).filter(|p| *p > 0.0) else {
+        let why = "the thread says neither threads per inch nor is the tool's pitch known";
+        return e.say(code::PLAN_MISSING_VALUE, feature.origin, &[&feature.keyword, "number_of_threads", why]);
+    };
+    let name = format!("#{} {}", feature.origin.id, feature.keyword);
+    let cannot = |e: &mut Emit<'_>, why: &str| e.say(code::PLAN_CANNOT_CUT, step.origin, &[&name, why]);
+    if !o.tool.kind.contains("THREAD") {
+        return cannot(e, "a thread is milled by a thread mill");
+    }
+    let r = o.tool.diameter / 2.0;
+    let radius = if *inner { major / 2.0 - r - m.allowance_side } else { major / 2.0 - OUTER_DEPTH * pitch + r + m.allowance_side };
+    let long = match (*length > 0.0, feature.depth > 0.0) {
+        (true, true) => length.min(feature.depth),
+        (true, false) => *length,
+        _ => feature.depth,
+    };
+    if *inner && radius <= 1e-3 {
+        return cannot(e, &format!("its tool of {} mm is no smaller than the thread", o.tool.diameter));
+    }
+    if !(long > 0.0) || long / pitch > MOST_TURNS || o.technology.feed.is_none() {
+        return cannot(e, "its length is none, or takes too many turns");
+    }
+    // A comb as long as the thread cuts it in one turn, a single row in as many as there are pitches.
+    let turns = if o.tool.cutting_length.is_some_and(|l| l >= long) { 1.0 } else { (long / pitch - 1e-9).ceil() };
+    // The tool climbs out of a blind hole; climb milling goes round with the spindle's sense reversed.
+    let climb = m.strategy.as_ref().and_then(|s| s.climb).unwrap_or(true) == o.technology.clockwise;
+    let ccw = climb == *inner;
+    let up = ccw == *right;
+    let (from, to) = if up { (-long, -long + pitch * turns) } else { (-long + pitch * turns, -long) };
+    let way = if up { 1.0 } else { -1.0 };
+    let sense = if ccw { 1.0 } else { -1.0 };
+    let retract = o.retract.filter(|r| *r > 0.0).unwrap_or(RUN_OUT);
+    // Half a circle in: from the axis of a hole, from outside a stud.
+    let lead = if *inner { radius / 2.0 } else { r + RUN_OUT };
+    let away = if *inner { 0.0 } else { radius + 2.0 * lead };
+    // Out with the pitch; in with it only from above, so that nothing is cut below the thread.
+    let rise = way * pitch / 4.0;
+    let first = if up { 0.0 } else { rise };
+    for frame in &feature.copies {
+        let at = |x: f64, z: f64| frame.point([x, 0.0, z]);
+        e.travel(at(away, retract), frame.z, security);
+        e.technology(&o.technology, o.functions);
+        // Down the axis of the hole, or beside the stud: nothing is cut there.
+        e.line(at(away, from - first));
+        let sweep = if *inner { sense * PI } else { -sense * PI };
+        let middle = (radius + away) / 2.0;
+        e.arc(at(middle, from - first), frame.z, at(radius, from), sweep);
+        let mut z = from;
+        for k in 1..=turns as usize {
+            let next = from + (to - from) * k as f64 / turns;
+            e.arc(at(0.0, z), frame.z, at(radius, next), sense * 2.0 * PI);
+            z = next;
+        }
+        e.arc(at(middle, to), frame.z, at(away, to + rise), sweep);
+        e.line(at(away, retract.max(to + rise)));
+    }
+}

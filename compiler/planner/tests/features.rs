@@ -1,0 +1,239 @@
+//! Features and paths that a height field cannot judge: undercuts, threads, back boring, contact paths, and what the
+//! planner honours of strategies and tools.
+
+mod judge;
+
+use gr_ir::{Op, Turn};
+use gr_planner::{Options, Planned, plan};
+use gr_text::{Diagnostic, FileId, Severity, code};
+use judge::cases::{BLOCK, TOP};
+use judge::part::{Mill, Part};
+
+fn planned(p: &Part) -> (Planned, Vec<Diagnostic>) {
+    let (planned, out) = plan(p.text().as_bytes(), FileId(0), &Options::default());
+    let errors: Vec<_> = out.iter().filter(|d| d.severity == Severity::Error).collect();
+    assert!(errors.is_empty(), "{errors:#?}\n{}", p.text());
+    (planned.expect("a program"), out)
+}
+
+fn refused(p: &Part) -> Vec<Diagnostic> {
+    let (planned, out) = plan(p.text().as_bytes(), FileId(0), &Options::default());
+    assert!(planned.is_none(), "{out:#?}");
+    out.into_iter().filter(|d| d.severity == Severity::Error).collect()
+}
+
+fn text(p: &Planned) -> String {
+    gr_ir::text::print(&p.program, false)
+}
+
+fn tee(ends: [&str; 2], d: f64, edge: f64) -> Part {
+    let mut p = Part::new(BLOCK);
+    let neck = p.tool("ENDMILL", 6.0, 0.0, None);
+    let dim = p.add(format!("MILLING_TOOL_DIMENSION({d:?},$,$,{edge:?},0.,$,$)"));
+    let body = p.add(format!("T_SLOT_MILL(#{dim},6,.RIGHT.,.F.,$,$)"));
+    let cut = p.add("CUTTING_COMPONENT(90.,$,$,$,$)".into());
+    let bar = p.add(format!("MILLING_CUTTING_TOOL('T',#{body},(#{cut}),$,$,$)"));
+    let ops = [neck, bar].map(|t| p.mill(&Mill::new("BOTTOM_AND_SIDE_ROUGH_MILLING", t, 2.5, 3.0)));
+    let along = p.direction([1.0, 0.0, 0.0]);
+    let length = p.length(60.0);
+    let path = p.add(format!("LINEAR_PATH($,#{length},#{along})"));
+    let [w, bw, bd, zero] = [8.0, 16.0, 4.0, 0.0].map(|v| p.length(v));
+    let section = p.add(format!("TEE_PROFILE($,0.,0.,#{bw},#{bd},#{zero},#{w},#{zero},#{zero})"));
+    let ends = ends.map(|e| p.add(e.into()));
+    p.machine("SLOT", &ops, [0.0, 20.0, TOP], Some(10.0), &format!(",#{path},#{section},(#{},#{})", ends[0], ends[1]));
+    p
+}
+
+const OPEN: &str = "OPEN_SLOT_END_TYPE()";
+const ROUND: &str = "RADIUSED_SLOT_END_TYPE()";
+
+#[test]
+fn t_slots_are_cut_from_their_open_end() {
+    let (p, _) = planned(&tee([OPEN, ROUND], 16.0, 4.0));
+    let mut tool = 0;
+    for s in p.program.steps() {
+        if let Op::ToolChange(n) = s.op {
+            tool = n;
+        }
+        let (a, b) = (s.start.xyz(), s.end.xyz());
+        if tool == 2 && s.op.moves() && a[2].min(b[2]) < TOP {
+            // Down and up only outside the part: the cutter is wider than the neck.
+            let upright = (a[2] - b[2]).abs() > 1e-9;
+            assert!(!upright || b[0] <= -8.0, "{s:?}");
+            // In the bar only at feed.
+            assert!(upright || !matches!(s.op, Op::Rapid), "{s:?}");
+        }
+    }
+    insta::assert_snapshot!(text(&p));
+    assert!(refused(&tee([ROUND, ROUND], 16.0, 4.0)).iter().any(|d| d.message.contains("open end")));
+    assert!(refused(&tee([OPEN, OPEN], 18.0, 4.0)).iter().any(|d| d.message.contains("16 mm wide")));
+    assert!(refused(&tee([OPEN, OPEN], 16.0, 5.0)).iter().any(|d| d.message.contains("4 mm high")));
+    // A lower cutter takes the bar on several levels.
+    let (low, _) = planned(&tee([OPEN, OPEN], 12.0, 2.0));
+    let floors: std::collections::BTreeSet<i64> =
+        low.program.steps().filter(|s| matches!(s.op, Op::Linear)).map(|s| (s.end.axes[2] * 1000.0).round() as i64).collect();
+    assert!(floors.contains(&4000) && floors.contains(&2000), "{floors:?}");
+}
+
+fn thread(inner: bool, hand: &str, climb: &str, edge: f64) -> Part {
+    let mut p = Part::new(BLOCK);
+    let dim = p.add(format!("MILLING_TOOL_DIMENSION(8.,$,$,{edge:?},0.,$,$)"));
+    let body = p.add(format!("THREAD_MILL(#{dim},3,.RIGHT.,.F.,$)"));
+    let cut = p.add("CUTTING_COMPONENT(90.,$,$,$,$)".into());
+    let tool = p.add(format!("MILLING_CUTTING_TOOL('thread mill',#{body},(#{cut}),$,$,$)"));
+    let op = p.mill(&Mill::new("SIDE_FINISH_MILLING", tool, 20.0, 1.0).strategy(&format!("CONTOUR_PARALLEL($,$,$,.{climb}.)")));
+    let bore = p.add("FLAT_HOLE_BOTTOM()".into());
+    let size = p.length(14.0);
+    let hole = p.feature("ROUND_HOLE", &[], [30.0, 20.0, TOP], Some(10.0), &format!(",#{size},$,#{bore}"));
+    let place = p.place([0.0; 3]);
+    let area = p.add(format!("PARTIAL_AREA_DEFINITION(9.,#{place},$)"));
+    let [fit, form, hand] = ["6H", "M", hand].map(|t| p.add(format!("DESCRIPTIVE_PARAMETER('p','{t}')")));
+    let count = p.add("NUMERIC_PARAMETER('threads per inch',12.7,'1/in')".into());
+    let flag = if inner { ".T." } else { ".F." };
+    let doc = p.add("SPECIFICATION((),'ISO 724',$,$)".into());
+    let f = p.feature("CATALOGUE_THREAD", &[op], [30.0, 20.0, TOP], Some(9.0), &format!(",#{area},(#{hole}),{flag},$,#{fit},#{form},16.,#{count},#{hand},#{doc}"));
+    p.step(f, op);
+    p
+}
+
+#[test]
+fn threads_are_milled_in_a_helix() {
+    let (p, _) = planned(&thread(true, "right hand", "CLIMB", 2.0));
+    insta::assert_snapshot!(text(&p));
+    // 2 mm pitch over 9 mm by a single row: five turns, right-hand, climb: counter-clockwise and up.
+    let turns: Vec<_> = p.program.steps().filter_map(|s| if let Op::Arc(a) = s.op { Some((a.turns, s.end.axes[2] - s.start.axes[2], s.start.xyz())) } else { None }).collect();
+    let full: Vec<_> = turns.iter().filter(|t| (t.1.abs() - 2.0).abs() < 1e-9).collect();
+    assert_eq!(full.len(), 5);
+    assert!(full.iter().all(|t| t.0 > 0 && t.1 > 0.0 && (t.2[0] - 34.0).abs() < 1e-9), "{full:?}");
+    let rise = |p: Part| {
+        let (p, _) = planned(&p);
+        let s: Vec<(i32, f64)> = p.program.steps().filter_map(|s| if let Op::Arc(a) = s.op { Some((a.turns.signum(), s.end.axes[2] - s.start.axes[2])) } else { None }).collect();
+        let full: Vec<_> = s.into_iter().filter(|t| (t.1.abs() - 2.0).abs() < 1e-9).collect();
+        (full.len(), full[0].0, full[0].1 > 0.0)
+    };
+    assert_eq!(rise(thread(true, "left hand", "CLIMB", 2.0)), (5, 1, false));
+    assert_eq!(rise(thread(true, "right hand", "CONVENTIONAL", 2.0)), (5, -1, false));
+    assert_eq!(rise(thread(true, "right hand", "CLIMB", 12.0)), (1, 1, true));
+    assert_eq!(rise(thread(false, "right hand", "CLIMB", 2.0)), (5, -1, false));
+}
+
+fn back(previous: &str, direction: bool) -> Part {
+    let mut p = Part::new(BLOCK);
+    let dim = p.add("MILLING_TOOL_DIMENSION(14.,$,$,2.,0.,$,$)".into());
+    let body = p.add(format!("BORING_TOOL(#{dim},1,.RIGHT.,.F.,$,.F.)"));
+    let cut = p.add("CUTTING_COMPONENT(90.,$,$,$,$)".into());
+    let edge = if direction { format!("#{}", p.direction([1.0, 0.0, 0.0])) } else { "$".into() };
+    let tool = p.add(format!("MILLING_CUTTING_TOOL('bar',#{body},(#{cut}),$,{edge},5.)"));
+    let (t, f) = (p.technology(), p.functions());
+    let op = p.add(format!("BACK_BORING($,$,'op',5.,$,#{tool},#{t},#{f},$,3.,{previous},0.5,$,$)"));
+    let size = p.length(14.0);
+    let bottom = p.add("FLAT_HOLE_BOTTOM()".into());
+    p.machine("ROUND_HOLE", &[op], [30.0, 20.0, TOP], Some(12.0), &format!(",#{size},$,#{bottom}"));
+    p
+}
+
+#[test]
+fn back_boring_steps_aside_through_its_hole() {
+    let (p, out) = planned(&back("10.", true));
+    assert!(out.iter().any(|d| d.code == code::PLAN_TAKES_TURNS));
+    insta::assert_snapshot!(text(&p));
+    let mut stands = true;
+    for s in p.program.steps() {
+        match s.op {
+            Op::SpindleTurn { turn, .. } => stands = turn == Turn::Stop,
+            op if op.moves() => {
+                let (a, b) = (s.start.xyz(), s.end.xyz());
+                // Through the hole only stepped aside, and with the spindle standing.
+                if a[2].min(b[2]) < TOP && a[2].max(b[2]) > 3.0 + 1e-9 {
+                    assert!(stands && a[0] < 30.0 && b[0] < 30.0, "{s:?}");
+                }
+            }
+            _ => {}
+        }
+    }
+    let lowest_feed = p.program.steps().filter(|s| s.op == Op::Linear).map(|s| s.end.axes[2]).fold(f64::MAX, f64::min);
+    assert!(lowest_feed < 0.0);
+    assert!(refused(&back("$", true)).iter().any(|d| d.message.contains("previous_diameter")));
+    assert!(refused(&back("10.", false)).iter().any(|d| d.message.contains("direction_for_spindle_orientation")));
+    assert!(refused(&back("8.", true)).iter().any(|d| d.message.contains("does not pass")));
+}
+
+fn contact(kind: &str, edge: f64, normals: &str) -> Part {
+    let mut p = Part::new(BLOCK);
+    let tool = p.tool(kind, 10.0, edge, None);
+    let points: Vec<String> = [(10.0, 10.0), (50.0, 10.0)].iter().map(|q| format!("#{}", p.point([q.0, q.1, -2.0]))).collect();
+    let line = p.add(format!("POLYLINE('',({}))", points.join(",")));
+    let n = p.add(normals.into());
+    let ns = p.add(format!("POLYLINE('',(#{n},#{n}))"));
+    let base = p.add(format!("CURVE_WITH_NORMAL_VECTOR(#{line},#{ns})"));
+    let path = p.add(format!("CUTTER_CONTACT_TRAJECTORY(.T.,.CONTACT.,$,$,$,.T.,#{base},$,.SIDE.)"));
+    let list = p.add(format!("TOOLPATH_LIST((#{path}))"));
+    let (t, f) = (p.technology(), p.functions());
+    let op = p.add(format!("FREEFORM_OPERATION(#{list},$,'op',5.,$,#{tool},#{t},#{f},$,$,$,$)"));
+    p.machine("TOOLPATH_FEATURE", &[op], [0.0, 0.0, TOP], Some(0.0), "");
+    p
+}
+
+#[test]
+fn contact_paths_become_tip_paths() {
+    let ends = |p: &Part| -> Vec<[f64; 3]> {
+        let (p, _) = planned(p);
+        p.program.steps().filter(|s| s.op == Op::Linear).map(|s| s.end.xyz()).collect()
+    };
+    let near = |p: [f64; 3], q: [f64; 3]| (0..3).all(|i| (p[i] - q[i]).abs() < 1e-9);
+    // A wall that looks to +y: a flat tool stands its radius off, at the height of the contact.
+    let at = ends(&contact("ENDMILL", 0.0, "CARTESIAN_POINT('',(0.,1.,0.))"));
+    assert!(near(*at.last().expect("moves"), [50.0, 15.0, TOP - 2.0]), "{at:?}");
+    // A floor under a ball: the tip is the contact.
+    let at = ends(&contact("BALL_ENDMILL", 5.0, "CARTESIAN_POINT('',(0.,0.,1.))"));
+    assert!(near(*at.last().expect("moves"), [50.0, 10.0, TOP - 2.0]), "{at:?}");
+    // A slope of 45 degrees under a ball.
+    let at = ends(&contact("BALL_ENDMILL", 5.0, "CARTESIAN_POINT('',(0.,1.,1.))"));
+    let h = 5.0 * std::f64::consts::FRAC_1_SQRT_2;
+    assert!(near(*at.last().expect("moves"), [50.0, 10.0 + h, TOP - 2.0 + h - 5.0]), "{at:?}");
+    // The same under a bull nose: 2 mm of rounding, 3 mm of flat.
+    let at = ends(&contact("BULLNOSE_ENDMILL", 2.0, "CARTESIAN_POINT('',(0.,1.,1.))"));
+    let h = 2.0 * std::f64::consts::FRAC_1_SQRT_2;
+    assert!(near(*at.last().expect("moves"), [50.0, 10.0 + h + 3.0, TOP - 2.0 + h - 2.0]), "{at:?}");
+    let out = refused(&contact("ENDMILL", 0.0, "CARTESIAN_POINT('',(0.,0.,0.))"));
+    assert!(out.iter().any(|d| d.message.contains("no direction")));
+}
+
+#[test]
+fn strokes_are_joined_as_the_strategy_says() {
+    let retracts = |connection: &str| {
+        let c = judge::cases::face(&format!("BIDIRECTIONAL($,$,$,.LEFT.,{connection})"), 16.0, 0.0);
+        let (p, _) = planned(&c.part);
+        p.program.steps().filter(|s| s.op == Op::Rapid && s.end.axes[2] > s.start.axes[2]).count()
+    };
+    assert!(retracts(".LIFT_SHIFT_PLUNGE.") > retracts(".STRAGHTLINE.") + 2);
+    let c = judge::cases::face("BIDIRECTIONAL($,$,$,.LEFT.,.LOOP_BACK.)", 16.0, 0.0);
+    assert!(planned(&c.part).1.iter().any(|d| d.code == code::PLAN_NO_EFFECT && d.message.contains("stroke_connection")));
+}
+
+/// The path in the feature's frame does not depend on where the feature lies or how it is turned.
+#[test]
+fn tilted_features_have_the_same_path() {
+    let make = |z: [f64; 3], x: [f64; 3], at: [f64; 3]| {
+        let mut p = Part::new([60.0, 60.0, 60.0]);
+        let t = p.tool("ENDMILL", 6.0, 0.0, None);
+        let op = p.mill(&Mill::new("BOTTOM_AND_SIDE_ROUGH_MILLING", t, 2.0, 3.0));
+        let place = p.turned(at, z, x);
+        let (w, l) = (p.length(20.0), p.length(30.0));
+        let profile = p.add(format!("RECTANGULAR_CLOSED_PROFILE($,#{w},#{l})"));
+        let bottom = p.add("PLANAR_POCKET_BOTTOM_CONDITION()".into());
+        let f = p.feature_at("CLOSED_POCKET", &[op], place, Some(4.0), &format!(",(),$,#{bottom},$,$,#{profile}"));
+        p.step(f, op);
+        let (planned, _) = planned(&p);
+        let frame = planned.process.steps()[0].feature.frame;
+        let feeds: Vec<[f64; 3]> = planned.program.steps().filter(|s| s.op.feeds()).map(|s| frame.inverse_point(s.end.xyz())).collect();
+        (feeds, planned)
+    };
+    let (upright, _) = make([0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [30.0, 30.0, 60.0]);
+    let (side, p) = make([0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [30.0, 0.0, 30.0]);
+    assert_eq!(upright.len(), side.len());
+    for (a, b) in upright.iter().zip(&side) {
+        assert!((0..3).all(|i| (a[i] - b[i]).abs() < 1e-9), "{a:?} {b:?}");
+    }
+    assert!(p.program.steps().filter(|s| s.op.feeds()).all(|s| s.end.tool_axis == Some([0.0, -1.0, 0.0])));
+}
