@@ -7,7 +7,9 @@
 //! | `material` | materials and cutting force |
 //! | `error` | the errors at one place of the machine |
 //! | `map` | a quantity over the work space |
+//! | `picture` | maps and bar charts as PNG and SVG |
 //! | `place` | where a part is best put |
+//! | `report` | errors along a program |
 //! | `compensate` | correction for known deviations |
 
 // `!(x <= limit)` is meant: a value that is not a number must fail the test.
@@ -18,6 +20,8 @@ pub mod error;
 pub mod grade;
 pub mod map;
 pub mod material;
+pub mod picture;
 pub mod place;
+pub mod report;
 
 pub use error::{Budget, BudgetOptions, Errors, Sensitivity, Spread, closed_form};

@@ -3,7 +3,7 @@
 //! can show, so that a million moves stay quick and small.
 
 mod chart;
-mod font;
+pub mod font;
 mod html;
 mod path;
 mod raster;

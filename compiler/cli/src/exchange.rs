@@ -55,6 +55,13 @@ pub struct Plan {
     pub own_table: bool,
 }
 
+/// What is wrong with a text that is no exchange file at all, whatever its name says.
+pub fn not_one(text: &str) -> Option<Diagnostic> {
+    let faults = gr_p21::check_syntax(text.as_bytes());
+    let fault = faults.into_iter().find(|f| f.code == code::P21_NOT_AN_EXCHANGE_FILE)?;
+    Some(Diagnostic::new(fault.code, FILE, fault.span, &fault.args))
+}
+
 /// Everything there is to say about a file.
 pub fn check(name: &str, text: &str, path: &Path, station: &Station) -> Checked {
     let unit = Unit::new(path, text.into(), gr_text::Encoding::Utf8, station);
@@ -93,6 +100,9 @@ fn add(found: &mut Vec<Diagnostic>, more: Vec<Diagnostic>, levels: &Levels) {
     let orphans = found.iter().any(|d| d.code == code::STEP_ORPHAN_WORKINGSTEP);
     found.extend(more.into_iter().filter(|d| !(orphans && d.code == code::PLAN_ORPHAN_STEP)));
     found.retain_mut(|d| kept(d, levels));
+    // Where statements are damaged, what they refer to only seems to be left over.
+    let damaged = found.iter().any(|d| d.severity == Severity::Error && d.code.def().slug.starts_with("p21/"));
+    found.retain(|d| !(damaged && d.code == code::STEP_UNREFERENCED));
     found.sort_by_key(|d| (d.primary().1.start, d.primary().1.end));
     found.dedup();
 }
@@ -151,7 +161,7 @@ fn moving(unit: &Unit, program: gr_ir::Program, plan: Plan) -> Motion {
 }
 
 /// The process of a file, with errors of reading it only.
-fn process(unit: &Unit) -> Result<(Process, Vec<Tool>, Checked), Checked> {
+pub fn process(unit: &Unit) -> Result<(Process, Vec<Tool>, Checked), Checked> {
     let mut found = syntax(unit);
     if bad(&found) {
         return Err(with_source(&unit.name(), unit, found));

@@ -55,12 +55,15 @@ fn run(cli: Cli) -> ExitCode {
         Command::Diff(args) => commands::diff::run(global, &args).into(),
         Command::Verify(args) => commands::diff::verify(global, &args).into(),
         Command::Explain(args) => commands::explain::run(&args).into(),
+        Command::Accuracy(args) => commands::accuracy::run(global, &args).into(),
+        Command::Map(args) => commands::map::run(global, &args).into(),
+        Command::Place(args) => commands::place::run(global, &args).into(),
         Command::Target(args) => commands::target::run(&args).into(),
         Command::Machine(args) => commands::machine::run(global, &args).into(),
         Command::Filter(args) => commands::filter::run(global, &args).into(),
         Command::Rs274(args) => commands::rs274::run("gcc-robot rs274".as_ref(), &args.arguments),
         Command::Init(args) => commands::init::run(global, &args).into(),
-        Command::Lsp(_) => match gr_lsp::run() {
+        Command::Lsp(_) => match gr_lsp::run(std::sync::Arc::new(commands::lsp::Editor)) {
             Ok(()) => Exit::Ok.into(),
             Err(_) => Exit::Io.into(),
         },

@@ -64,6 +64,12 @@ pub enum Command {
     Diff(DiffArgs),
     /// Prove that a translation moves the machine as its source does
     Verify(VerifyArgs),
+    /// What error the machine will make along a program
+    Accuracy(AccuracyArgs),
+    /// A map of the machine's work space: reach, errors, stiffness, singularities
+    Map(MapArgs),
+    /// The best place for a part in the machine's work space
+    Place(PlaceArgs),
     /// List and show what `build --target` can make
     Target(TargetArgs),
     /// List, show and check machines
@@ -446,4 +452,131 @@ pub struct LspArgs {
     /// Accepted because editors pass it; there is no other way
     #[arg(long)]
     pub stdio: bool,
+}
+
+/// Options of `accuracy`.
+#[derive(Args, Debug, Clone)]
+pub struct AccuracyArgs {
+    /// Program: G-code or STEP-NC
+    pub file: PathBuf,
+    /// How it is read
+    #[command(flatten)]
+    pub setup: SetupArgs,
+    /// Where the part's origin is in the machine's base [default: as the machine file says]
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
+    pub part: Option<String>,
+    /// Tolerance of the part where the program states none, plus or minus, mm
+    #[arg(long, value_name = "MM")]
+    pub tolerance: Option<f64>,
+    /// Grade of ISO 286-1 of the machine's geometry, in place of its file's
+    #[arg(long = "it", value_name = "GRADE", value_parser = clap::value_parser!(u8).range(1..=18))]
+    pub grade: Option<u8>,
+    /// Material of the part [default: that of the STEP-NC file]
+    #[arg(long, value_name = "NAME")]
+    pub material: Option<String>,
+    /// Depth of cut along the tool, where the program states none, mm
+    #[arg(long, value_name = "MM")]
+    pub depth: Option<f64>,
+    /// Width of cut across the tool, where the program states none, mm
+    #[arg(long, value_name = "MM")]
+    pub width: Option<f64>,
+    /// Teeth of the tools, where the program states none
+    #[arg(long, value_name = "COUNT")]
+    pub teeth: Option<f64>,
+    /// Diameter of the tools, where neither program nor tool table states it, mm
+    #[arg(long, value_name = "MM")]
+    pub diameter: Option<f64>,
+    /// How the report is written
+    #[arg(long, value_enum, default_value_t, value_name = "FORMAT")]
+    pub format: TableFormat,
+    /// Where to write it [default: standard output]
+    #[arg(short, long, value_name = "FILE")]
+    pub output: Option<PathBuf>,
+    /// The model of a publication
+    #[arg(long, value_enum, value_name = "SYSTEM")]
+    pub reference: Option<AccuracyReference>,
+}
+
+/// How a table is written.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum, Default)]
+pub enum TableFormat {
+    /// For people
+    #[default]
+    Text,
+    /// One object
+    Json,
+    /// One row per line
+    Csv,
+}
+
+/// Publications with a model of accuracy.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
+pub enum AccuracyReference {
+    /// Gojtan, EPUSP 2009: cones of the spherical joints fixed in the base, tolerances by the formula of chapter 7
+    Usp2009,
+}
+
+/// Options of `map`.
+#[derive(Args, Debug, Clone)]
+pub struct MapArgs {
+    /// Machine: an id such as usp/2ups-prp, or the path of a machine file
+    #[arg(long, value_name = "MACHINE")]
+    pub machine: String,
+    /// workspace, condition, singularity, kinematic[-x|-y|-z], geometric[-x|-y|-z], elastic[-x|-y|-z], total,
+    /// stiffness, or sensitivity (bars)
+    #[arg(long, value_name = "NAME", default_value = "workspace")]
+    pub quantity: String,
+    /// Plane of the base: x=…, y=… or z=…, mm
+    #[arg(long, value_name = "AXIS=MM", default_value = "z=0")]
+    pub plane: String,
+    /// Picture or table: its ending says which (.png, .svg, .csv); may be given several times
+    #[arg(short, long, value_name = "FILE")]
+    pub output: Vec<PathBuf>,
+    /// Nodes along each side
+    #[arg(long, value_name = "COUNT", default_value_t = 400, value_parser = clap::value_parser!(u32).range(2..=4000))]
+    pub resolution: u32,
+    /// Force on the tool, N: three numbers, for deflections
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
+    pub force: Option<String>,
+    /// Signs of the joint errors, such as +-+; without them the worst pattern
+    #[arg(long, value_name = "SIGNS", allow_hyphen_values = true)]
+    pub signs: Option<String>,
+    /// Grade of ISO 286-1 of the machine's geometry, in place of its file's
+    #[arg(long = "it", value_name = "GRADE", value_parser = clap::value_parser!(u8).range(1..=18))]
+    pub grade: Option<u8>,
+    /// The model of a publication: its grid of 5 mm too
+    #[arg(long, value_enum, value_name = "SYSTEM")]
+    pub reference: Option<AccuracyReference>,
+}
+
+/// Options of `place`.
+#[derive(Args, Debug, Clone)]
+pub struct PlaceArgs {
+    /// Program whose path must be within reach; without one the largest rectangle of stock is looked for
+    pub file: Option<PathBuf>,
+    /// How it is read
+    #[command(flatten)]
+    pub setup: SetupArgs,
+    /// What is best
+    #[arg(long, value_enum, default_value_t, value_name = "WHAT")]
+    pub aim: PlaceAim,
+    /// Heights of the rectangle: a number or two, mm
+    #[arg(long, value_name = "FROM,TO", default_value = "0", allow_hyphen_values = true)]
+    pub heights: String,
+    /// How the result is written
+    #[arg(long, value_enum, default_value_t, value_name = "FORMAT")]
+    pub format: TableFormat,
+    /// The model of a publication
+    #[arg(long, value_enum, value_name = "SYSTEM")]
+    pub reference: Option<AccuracyReference>,
+}
+
+/// What the best place is.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum, Default)]
+pub enum PlaceAim {
+    /// Furthest from where the reach ends
+    #[default]
+    Margin,
+    /// Smallest error
+    Error,
 }

@@ -1,5 +1,6 @@
 //! One module per command.
 
+pub mod accuracy;
 pub mod build;
 pub mod check;
 pub mod completions;
@@ -8,7 +9,10 @@ pub mod explain;
 pub mod filter;
 pub mod fmt;
 pub mod init;
+pub mod lsp;
 pub mod machine;
+pub mod map;
+pub mod place;
 pub mod preview;
 pub mod preview_serve;
 pub mod rs274;

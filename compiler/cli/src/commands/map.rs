@@ -1,0 +1,207 @@
+//! `gcc-robot map --machine usp/2ups-prp --quantity kinematic-x --plane z=0 -o map.png`
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+use gr_accuracy::map::{self, Map, Plane, Probe, Quantity, Request};
+use gr_accuracy::picture::Picture;
+use gr_accuracy::{Budget, BudgetOptions, closed_form};
+use gr_machine::{Chain, Machine};
+use gr_text::code;
+
+use super::accuracy::{referenced, triple};
+use crate::exit::Exit;
+use crate::options::{Global, MapArgs};
+use crate::output::write_all;
+use crate::progress::Progress;
+use crate::sources::{Sources, reason};
+
+pub fn run(global: &Global, args: &MapArgs) -> Exit {
+    let mut sources = Sources::default();
+    let machine = match super::machine::load(&args.machine, &mut sources) {
+        Ok(m) => referenced(m, args.reference),
+        Err(found) => {
+            let mut renderer = global.renderer(true);
+            found.iter().for_each(|d| renderer.show(&sources, d));
+            renderer.finish(false);
+            return Exit::Findings;
+        }
+    };
+    let refuse = |what: &str, why: &str| {
+        super::refuse(global, Path::new(&args.machine), code::ACCURACY_BAD_OPTION, &[what.to_string(), why.to_string()])
+    };
+    if let Chain::Incomplete { missing, .. } = &machine.chain {
+        return refuse(&machine.id, &format!("it is a template; its file must still say {}", missing.join(", ")));
+    }
+    let Some(plane) = plane(&args.plane) else {
+        return refuse("--plane", "one of x, y and z, and where: z=0");
+    };
+    let budget = Budget::new(&machine, BudgetOptions { grade: args.grade, usp2009: args.reference.is_some() });
+    let made = if args.quantity == "sensitivity" {
+        Ok(bars(&machine, plane, args))
+    } else {
+        area(global, args, &machine, plane, &budget)
+    };
+    let (text, files) = match made {
+        Ok(made) => made,
+        Err((what, why)) => return refuse(&what, &why),
+    };
+    if let Err((path, e)) = write_all(&files) {
+        let name = path.display().to_string();
+        return super::refuse(global, &path, code::FILE_UNWRITABLE, &[name, reason(&e)]);
+    }
+    super::print(&text)
+}
+
+type Made = (String, Vec<(PathBuf, Vec<u8>)>);
+type Refused = (String, String);
+
+fn plane(text: &str) -> Option<Plane> {
+    let (axis, at) = text.split_once('=')?;
+    let axis = ["x", "y", "z"].iter().position(|a| a.eq_ignore_ascii_case(axis.trim()))?;
+    Some(Plane { axis, at: at.trim().parse().ok().filter(|v: &f64| v.is_finite())? })
+}
+
+fn area(global: &Global, args: &MapArgs, machine: &Machine, plane: Plane, budget: &Budget) -> Result<Made, Refused> {
+    let Some((_, quantity)) = Quantity::NAMES.into_iter().find(|(n, _)| *n == args.quantity) else {
+        let all: Vec<&str> = Quantity::NAMES.iter().map(|(n, _)| *n).collect();
+        return Err(("--quantity".into(), format!("known are {} and sensitivity", all.join(", "))));
+    };
+    let lacks = |what: &str, key: &str| Err((format!("--quantity {}", args.quantity), format!("the file of {} says nothing of {what}: {key}", machine.id)));
+    let (joints, geometry, stiffness) = quantity.needs();
+    if joints && budget.joints.is_none() {
+        return lacks("the error of its joints", "`joints` in `[accuracy]`");
+    }
+    if geometry && budget.geometry.is_none() {
+        return lacks("the tolerances of its geometry", "`grade` or `parameter` in `[accuracy]`, or `--it`");
+    }
+    let stiff = machine.cell.stiffness.as_ref();
+    let soft = (0..machine.joints.len()).find(|i| stiff.is_none_or(|s| s.members.iter().all(|m| m.joint != *i)));
+    if let (true, Some(i)) = (stiffness, soft) {
+        return lacks(&format!("the stiffness of {}", machine.joints[i].name), "`[stiffness]`");
+    }
+    let force = match &args.force {
+        Some(text) => triple(text).ok_or(("--force".to_string(), "three numbers are wanted: -100,0,0".to_string()))?,
+        None if matches!(quantity, Quantity::Elastic(_)) => {
+            return Err(("--quantity elastic".into(), "a deflection needs a force: `--force -100,0,0`".into()));
+        }
+        None => [0.0; 3],
+    };
+    let signs = match &args.signs {
+        None => None,
+        Some(text) => Some(signs(text, machine.joints.len()).ok_or((
+            "--signs".to_string(),
+            format!("one + or - for each of the {} joints", machine.joints.len()),
+        ))?),
+    };
+    let probe = Probe::downward(machine);
+    let size = match (&machine.chain, args.reference) {
+        // The grid of the thesis' program: 5 mm, rounded to whole steps.
+        (Chain::TwoLegs(_), Some(_)) => {
+            let e = probe.extent();
+            let steps = |i: usize| libm_round((e[i].1 - e[i].0) / 5.0);
+            (steps(0) + 1, steps(1) + steps(1) % 2 + 1)
+        }
+        _ => (args.resolution as usize, args.resolution as usize),
+    };
+    let request = Request { quantity, plane, size, window: None, force, signs, deviations: None };
+    let progress = Progress::new(global.quiet, format!("map of {}", machine.id));
+    if !closed_form(machine) {
+        progress.tell(|| format!("map of {}: {} places by search, this takes a while", machine.id, size.0 * size.1));
+    }
+    let tell = std::sync::Mutex::new(&progress);
+    let map = map::map(&probe, budget, &request, &|done, of| {
+        if let Ok(p) = tell.try_lock() {
+            p.tell(|| format!("map of {}: row {done} of {of}", machine.id));
+        }
+    });
+    let title = format!("{}  {}  {}={} mm", machine.id, args.quantity, ["x", "y", "z"][plane.axis], plane.at);
+    let mut text = told(&map, machine);
+    if quantity == Quantity::Workspace && closed_form(machine) {
+        progress.tell(|| format!("volume of {}", machine.id));
+        let _ = writeln!(text, "volume {:.1} dm³ (by layers of a grid)", map::volume(&probe, 68, 120) / 1e6);
+    }
+    drop(progress);
+    if let Quantity::Elastic(_) | Quantity::Stiffness = quantity {
+        text += "springs of the drives only; the model of its source was never confirmed by better than a factor of 2\n";
+    }
+    if map.summary().is_none() {
+        let _ = writeln!(text, "nothing of this plane is within reach");
+    }
+    let picture = Picture::map(&map, &title);
+    Ok((text, files(&args.output, &picture, || map.csv())?))
+}
+
+fn libm_round(v: f64) -> usize {
+    (v + 0.5).max(2.0) as usize
+}
+
+fn signs(text: &str, count: usize) -> Option<Vec<f64>> {
+    let one = |c: char| match c {
+        '+' => Some(1.0),
+        '-' => Some(-1.0),
+        '0' => Some(0.0),
+        _ => None,
+    };
+    let all: Option<Vec<f64>> = text.chars().filter(|c| *c != ',').map(one).collect();
+    all.filter(|s| s.len() == count)
+}
+
+fn told(map: &Map, machine: &Machine) -> String {
+    let (a, b) = map.plane.axes();
+    let name = |i: usize| ["X", "Y", "Z"][i];
+    let unit = map.quantity.unit();
+    let mut out = format!("{}: {} in the plane {} = {} mm\n", machine.id, map.quantity.name(), name(map.plane.axis), map.plane.at);
+    let Some(s) = map.summary() else { return out };
+    let step = map.step();
+    let _ = writeln!(out, "area {:.2} dm² ({} nodes of {:.3} × {:.3} mm)", s.area / 1e4, s.nodes, step[0], step[1]);
+    let [x, y] = s.extent;
+    let _ = writeln!(out, "reach {} {:.1} to {:.1}, {} {:.1} to {:.1} mm", name(a), x.0, x.1, name(b), y.0, y.1);
+    if map.quantity != Quantity::Workspace {
+        let at = |p: [f64; 2]| format!("{} {:.1} {} {:.1}", name(a), p[0], name(b), p[1]);
+        let _ = writeln!(out, "least {:.4} {unit} at {}", s.least.0, at(s.least.1));
+        let _ = writeln!(out, "greatest {:.4} {unit} at {}", s.greatest.0, at(s.greatest.1));
+        let _ = writeln!(out, "mean {:.4} {unit}", s.mean);
+    }
+    out
+}
+
+fn bars(machine: &Machine, plane: Plane, args: &MapArgs) -> Made {
+    let probe = Probe::downward(machine);
+    let side = (args.resolution as usize).min(120);
+    let all = map::mean_sensitivity(&probe, plane, (side, side));
+    let mut text = format!("{}: mean movement of the tool point per mm or rad of each number of the geometry, mm\n", machine.id);
+    let _ = writeln!(text, "{:<20}{:>12}{:>12}{:>12}{:>12}", "", "X", "Y", "Z", "length");
+    for (name, [x, y, z, length]) in &all {
+        let _ = writeln!(text, "{name:<20}{x:>12.5}{y:>12.5}{z:>12.5}{length:>12.5}");
+    }
+    let rows: Vec<(String, f64)> = all.iter().map(|(n, v)| (n.clone(), v[3])).collect();
+    let title = format!("{}  sensitivity  {}={} mm", machine.id, ["x", "y", "z"][plane.axis], plane.at);
+    let picture = Picture::bars(&rows, &title, "mm per mm or rad");
+    let csv = || {
+        let mut out = String::from("parameter,x,y,z,length\n");
+        for (name, v) in &all {
+            let _ = writeln!(out, "{name},{},{},{},{}", v[0], v[1], v[2], v[3]);
+        }
+        out
+    };
+    let files = files(&args.output, &picture, csv).unwrap_or_default();
+    (text, files)
+}
+
+fn files(goals: &[PathBuf], picture: &Picture, csv: impl Fn() -> String) -> Result<Vec<(PathBuf, Vec<u8>)>, Refused> {
+    let mut out = Vec::new();
+    for goal in goals {
+        let ending = goal.extension().map_or(String::new(), |e| e.to_string_lossy().to_ascii_lowercase());
+        let wrong = |e: String| (goal.display().to_string(), e);
+        let bytes = match ending.as_str() {
+            "png" => picture.png().map_err(wrong)?,
+            "svg" => picture.svg().map_err(wrong)?.into_bytes(),
+            "csv" => csv().into_bytes(),
+            _ => return Err(wrong("the ending says what is written: .png, .svg or .csv".into())),
+        };
+        out.push((goal.clone(), bytes));
+    }
+    Ok(out)
+}
+
