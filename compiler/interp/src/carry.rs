@@ -4,7 +4,7 @@
 
 use gr_canon::{FileId, FrameId, Sink};
 
-use crate::control::{Label, Offset};
+use crate::control::{ARGS, Label, Offset};
 use crate::{End, Files, Interp, Params, Setup, State};
 
 /// The label table and what goes with it, as plain data.
@@ -12,10 +12,13 @@ use crate::{End, Files, Interp, Params, Setup, State};
 pub struct Carry {
     /// In the order of their scopes and names.
     labels: Vec<(u32, Box<str>, Box<str>, Offset)>,
-    /// An `if` ran, a loop is being left by `break` or `continue`, the last call gave a value.
-    switches: [bool; 4],
+    /// An `if` ran, a loop is being left by `break` or `continue`, the last call gave a value, a call has come back, an
+    /// error inside a call was met.
+    switches: [bool; 6],
     /// Value of the last condition and of the last call, as bits.
     values: [u64; 2],
+    /// #1 … #30 before the last call, as bits: a failing M98 brings them back. None: all zero.
+    kept: Option<Box<[u64; ARGS]>>,
 }
 
 impl Carry {
@@ -47,8 +50,10 @@ impl<'a, S: Sink> Interp<'a, S> {
             let name = run.symbols.of(name);
             run.offsets.insert(Label { scope, name }, *at);
         }
-        [run.executed_if, run.doing_break, run.doing_continue, run.value_returned] = carry.switches;
+        [run.executed_if, run.doing_break, run.doing_continue, run.value_returned, run.came_back, run.main_unnamed] =
+            carry.switches;
         [run.test_value, run.return_value] = carry.values.map(f64::from_bits);
+        run.levels[0].kept = carry.kept.as_ref().map(|kept| Box::new(kept.map(f64::from_bits)));
         run
     }
 
@@ -66,8 +71,16 @@ impl<'a, S: Sink> Interp<'a, S> {
         labels.sort_by(|a, b| (a.0, &a.1, &a.2).cmp(&(b.0, &b.1, &b.2)));
         Carry {
             labels,
-            switches: [self.executed_if, self.doing_break, self.doing_continue, self.value_returned],
+            switches: [
+                self.executed_if,
+                self.doing_break,
+                self.doing_continue,
+                self.value_returned,
+                self.came_back,
+                self.main_unnamed,
+            ],
             values: [self.test_value, self.return_value].map(f64::to_bits),
+            kept: self.levels[0].kept.as_ref().map(|kept| Box::new(kept.map(|v| (v + 0.0).to_bits()))).filter(|k| **k != [0; ARGS]),
         }
     }
 
@@ -86,13 +99,14 @@ impl<'a, S: Sink> Interp<'a, S> {
             && self.queue.is_of(self.place.file)
     }
 
-    /// Runs until the run is [at rest](Interp::at_rest) before a line that `stop` knows, or to the end.
+    /// Runs until the run is [at rest](Interp::at_rest) before a line that `stop` knows, with no control flow behind it
+    /// that was met already; or to the end.
     pub fn run_until(&mut self, stop: &dyn Fn(u32) -> bool) -> Option<End> {
         loop {
             if let Some(end) = self.run_open_piece() {
                 return Some(end);
             }
-            if self.at_rest() && stop(self.next) {
+            if self.next >= self.frontier && self.at_rest() && stop(self.next) {
                 return None;
             }
         }

@@ -18,7 +18,7 @@ use crate::state::SavedModes;
 use crate::{Fault, Interp, Res};
 
 /// Number of subroutine parameters.
-const ARGS: usize = 30;
+pub(crate) const ARGS: usize = 30;
 /// Call levels, the main program counted.
 const LEVELS: usize = 10;
 
@@ -107,7 +107,8 @@ pub(crate) struct Return {
     pub place: Place,
     pub next: u32,
     pub shift: i32,
-    pub params: Option<Box<[f64; ARGS]>>,
+    /// Its parameters #1 … #30 come back too.
+    pub params: bool,
     loops: usize,
 }
 
@@ -118,6 +119,9 @@ pub(crate) struct Level {
     pub kind: CallKind,
     /// Set while a call from this level is going on.
     pub ret: Option<Return>,
+    /// #1 … #30 before the last call with arguments from this level. They stay: after an error the controller takes
+    /// them back even when they are not those of the call that failed.
+    pub kept: Option<Box<[f64; ARGS]>>,
     pub m98_left: i32,
     pub saved: Option<Box<SavedModes>>,
     pub saved_valid: bool,
@@ -126,7 +130,7 @@ pub(crate) struct Level {
 
 impl Level {
     pub fn new(sub: u32) -> Level {
-        Level { sub, kind: CallKind::None, ret: None, m98_left: -1, saved: None, saved_valid: false, restore: false }
+        Level { sub, kind: CallKind::None, ret: None, kept: None, m98_left: -1, saved: None, saved_valid: false, restore: false }
     }
 }
 
@@ -197,6 +201,13 @@ pub struct Statement {
     pub line: u32,
     /// Relative to the start of the line.
     span: Span,
+}
+
+impl Statement {
+    /// The same on a line further down.
+    pub fn shifted(&self, by: u32) -> Statement {
+        Statement { line: self.line + by, ..self.clone() }
+    }
 }
 
 /// The statement on a line of a chunk.
@@ -293,7 +304,7 @@ impl<S: Sink> Interp<'_, S> {
 
     /// A line that begins with M98 or M99.
     pub(crate) fn fanuc_line(&mut self, scan: &Scan, words: &[Word], which: Fanuc) -> Res {
-        self.blocks += 1;
+        self.count_control()?;
         let rest: Vec<Word> = first_real(words).map_or_else(Vec::new, |first| {
             words.iter().filter(|w| w.start > first.start).copied().collect()
         });
@@ -376,10 +387,7 @@ impl<S: Sink> Interp<'_, S> {
 
     /// A line that begins with an O-word or a macro statement.
     pub(crate) fn control_line(&mut self, scan: &Scan, text: &str, line: u32, words: &[Word], word: &Word) -> Res {
-        self.blocks += 1;
-        if self.blocks > self.setup.budgets.blocks {
-            return Err(self.endless("the program has run more blocks than the limit allows"));
-        }
+        self.count_control()?;
         let control = match word.form {
             Form::Control => scan.controls.get(word.index()).copied(),
             _ => None,
@@ -582,7 +590,7 @@ impl<S: Sink> Interp<'_, S> {
     }
 
     fn convert_return(&mut self, keyword: Keyword, m99: bool) -> Res {
-        if self.level() == 0 && self.sub_name.is_none() {
+        if self.level() == 0 && self.sub_name.is_none() && !self.came_back {
             let args = [self.sequence().to_string(), self.line_text().to_string()];
             let fault = structure(rs274::RT_O_NOT_IN_SUB_LINE, "").own_args(&["this ends a subroutine, but none has begun"]);
             return Err(with_args(fault, &[&args[0], &args[1]]));
@@ -604,7 +612,7 @@ impl<S: Sink> Interp<'_, S> {
                 }
                 self.skip = None;
                 self.defining_sub = false;
-                self.sub_name = None;
+                (self.sub_name, self.came_back) = (None, false);
             }
             return Ok(());
         }
@@ -616,10 +624,8 @@ impl<S: Sink> Interp<'_, S> {
         let level = self.level();
         let Some(left) = self.levels.pop() else { return Ok(()) };
         let Some(ret) = self.levels[level - 1].ret.take() else { return Ok(()) };
-        if let Some(params) = &ret.params {
-            for (i, v) in params.iter().enumerate() {
-                self.write_param(i as u32 + 1, *v);
-            }
+        if ret.params {
+            self.take_back_params(level - 1);
         }
         self.place = ret.place;
         self.next = ret.next;
@@ -629,12 +635,22 @@ impl<S: Sink> Interp<'_, S> {
         self.params.leave_level(level);
         let caller = self.levels[level - 1].sub;
         self.sub_name = (level > 1).then_some(caller);
+        // The main program has a name too, an empty one, until an error takes it away.
+        self.came_back = level == 1 && !self.main_unnamed;
         if left.restore && left.saved_valid {
             if let Some(saved) = &left.saved {
                 self.restore_modes(saved)?;
             }
         }
         if left.kind == CallKind::Remap { self.remap_finished() } else { Ok(()) }
+    }
+
+    /// #1 … #30 as they were before the last call with arguments from this level, zeros if there was none.
+    pub(crate) fn take_back_params(&mut self, level: usize) {
+        let kept = self.levels.get(level).and_then(|l| l.kept.clone()).unwrap_or_else(|| Box::new([0.0; ARGS]));
+        for (i, v) in kept.iter().enumerate() {
+            self.write_param(i as u32 + 1, *v);
+        }
     }
 
     /// Calls a subroutine.
@@ -660,13 +676,13 @@ impl<S: Sink> Interp<'_, S> {
                 here.m98_left = -1;
             }
         }
-        let params = (kind != CallKind::M98).then(|| {
-            let old = Box::new(std::array::from_fn(|i| self.params.get(i as u32 + 1)));
+        let params = kind != CallKind::M98;
+        if params {
+            self.levels[level].kept = Some(Box::new(std::array::from_fn(|i| self.params.get(i as u32 + 1))));
             for (i, v) in args.iter().enumerate() {
                 self.write_param(i as u32 + 1, *v);
             }
-            old
-        });
+        }
         let ret = Return { place: self.place, next, shift: self.shift, params, loops: self.loops.len() };
         self.levels[level].ret = Some(ret);
         let mut new = Level::new(label.name);
@@ -685,7 +701,7 @@ impl<S: Sink> Interp<'_, S> {
 
     fn call_nothing(&mut self, label: Label) -> Res {
         let level = self.level();
-        let ret = Return { place: self.place, next: self.next, shift: self.shift, params: None, loops: self.loops.len() };
+        let ret = Return { place: self.place, next: self.next, shift: self.shift, params: false, loops: self.loops.len() };
         self.levels[level].ret = Some(ret);
         let mut new = Level::new(label.name);
         new.kind = CallKind::M98;
@@ -1085,9 +1101,7 @@ impl<S: Sink> Interp<'_, S> {
             return Ok(());
         }
         self.blocks += 1;
-        if self.blocks > self.setup.budgets.blocks {
-            return Err(self.endless("the contour has more blocks than the limit allows"));
-        }
+        self.check_budgets()?;
         self.block.clear();
         self.comment = None;
         self.settings.clear();

@@ -136,7 +136,9 @@ impl<S: Sink> Interp<'_, S> {
             hole.level = old;
         }
         hole.clear = if self.m.retract_r != 0 { hole.retract } else { old };
-        let exact = self.m.path_mode == 0;
+        // What was given out, not what was programmed: a cycle that failed leaves its exact path behind.
+        let path = self.world.path;
+        let exact = path == 0;
         let tolerances = [self.world.tolerance, self.world.naivecam];
         if !exact {
             self.emit(Call::SetMotionControlMode(PathMode::ExactPath));
@@ -157,13 +159,13 @@ impl<S: Sink> Interp<'_, S> {
         self.m.current[axes[2]] = hole.clear;
         self.m.cycle_cc = given;
         if !exact {
-            self.restore_path_mode(tolerances);
+            self.restore_path_mode(path, tolerances);
         }
         Ok(())
     }
 
-    fn restore_path_mode(&mut self, [tolerance, naivecam]: [f64; 2]) {
-        let mode = match self.m.path_mode {
+    fn restore_path_mode(&mut self, path: u8, [tolerance, naivecam]: [f64; 2]) {
+        let mode = match path {
             1 => PathMode::ExactStop,
             2 => PathMode::Continuous(tolerance),
             _ => PathMode::ExactPath,

@@ -194,6 +194,26 @@ impl<S: Sink> Interp<'_, S> {
         finite(value).map_err(|f| blame(f, scan, id))
     }
 
+    /// A pair of brackets encloses the whole of this expression.
+    #[cold]
+    fn is_bracketed(&self, scan: &Scan, id: ExprId) -> bool {
+        let Some(text) = scan.node_spans.get(id.0 as usize).and_then(|s| self.reading.text.get(s.range())) else {
+            return false;
+        };
+        let mut depth = 0;
+        for (i, byte) in text.bytes().enumerate() {
+            match byte {
+                b'[' => depth += 1,
+                b']' => depth -= 1,
+                _ => {}
+            }
+            if depth == 0 {
+                return i > 0 && i + 1 == text.len();
+            }
+        }
+        false
+    }
+
     fn eval_node(&mut self, scan: &Scan, id: ExprId, depth: u32) -> Res<f64> {
         if depth > MAX_DEPTH {
             return Err(Fault::own(code::EXPRESSION_TOO_DEEP));
@@ -235,7 +255,12 @@ impl<S: Sink> Interp<'_, S> {
                 let a = self.eval_node(scan, a, depth + 1)?;
                 let b = self.eval_node(scan, b, depth + 1)?;
                 let tolerance = if self.setup.version == Version::V2_9 { 1e-4 } else { 1e-6 };
-                binary(op, a, b, tolerance).map_err(|f| blame(f, scan, id))
+                let value = binary(op, a, b, tolerance).map_err(|f| blame(f, scan, id))?;
+                // The controller looks at the value of a bracket, not at what is worked out inside.
+                if !value.is_finite() && self.is_bracketed(scan, id) {
+                    return finite(value).map_err(|f| blame(f, scan, id));
+                }
+                Ok(value)
             }
             Node::Bad => Err(self.parse_fault(scan)),
         }

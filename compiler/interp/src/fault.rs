@@ -50,9 +50,15 @@ impl Fault {
     pub fn message_args(&self) -> &[String] {
         if self.own_args.is_empty() { &self.args } else { &self.own_args }
     }
-    /// What the real `rs274` prints.
+    /// What the real `rs274` prints: it has room for 254 bytes.
     pub fn rs_text(&self) -> Option<String> {
-        self.rs.map(|rs| gr_spec::fill(rs.text(), &self.args))
+        self.rs.map(|rs| {
+            let mut text = gr_spec::fill(rs.text(), &self.args);
+            if text.len() > 254 {
+                text.truncate((0..=254).rev().find(|at| text.is_char_boundary(*at)).unwrap_or(0));
+            }
+            text
+        })
     }
     /// Adds a message argument.
     pub fn arg(mut self: Box<Self>, value: impl std::fmt::Display) -> Box<Fault> {

@@ -9,7 +9,7 @@ use gr_text::Span;
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::block::Block;
-use crate::control::{FileIndex, Label, Level, Loop, Offset, Skip, Symbols};
+use crate::control::{CallKind, FileIndex, Label, Level, Loop, Offset, Skip, Symbols};
 use crate::io::Comment;
 use crate::queue::Queue;
 use crate::remap::{Config, Remapped};
@@ -223,6 +223,10 @@ pub struct Interp<'a, S: Sink> {
     pub(crate) skip: Option<Skip>,
     pub(crate) defining_sub: bool,
     pub(crate) sub_name: Option<u32>,
+    /// The main program goes on behind a call: the controller then lets a stray `return` pass.
+    pub(crate) came_back: bool,
+    /// An error inside a call was met: no call counts as come back from any more.
+    pub(crate) main_unnamed: bool,
     pub(crate) executed_if: bool,
     pub(crate) doing_break: bool,
     pub(crate) doing_continue: bool,
@@ -240,6 +244,10 @@ pub struct Interp<'a, S: Sink> {
     pub(crate) frames: u32,
     pub(crate) blocks: u64,
     pub(crate) emitted: u64,
+    /// Totals when the main program last came on by itself: budgets count from there.
+    pub(crate) spent: (u64, u64),
+    /// Control flow of the main program was met on lines before this one only.
+    pub(crate) frontier: u32,
     pub(crate) findings: Vec<Finding>,
     pub(crate) log: Option<Box<Log>>,
 }
@@ -270,7 +278,7 @@ impl<'a, S: Sink> Interp<'a, S> {
         let mut run = Self::with(files, setup, sink, state, params, tools);
         run.place = Place { file: main, line, frame: FrameId::MAIN };
         run.note_file(main);
-        (run.next, run.shift) = (line, shift);
+        (run.next, run.shift, run.frontier) = (line, shift, line);
         run
     }
 
@@ -310,6 +318,8 @@ impl<'a, S: Sink> Interp<'a, S> {
             skip: None,
             defining_sub: false,
             sub_name: None,
+            came_back: false,
+            main_unnamed: false,
             executed_if: false,
             doing_break: false,
             doing_continue: false,
@@ -325,6 +335,8 @@ impl<'a, S: Sink> Interp<'a, S> {
             frames: 0,
             blocks: 0,
             emitted: 0,
+            spent: (0, 0),
+            frontier: 0,
             findings: Vec::new(),
             log: None,
         }
@@ -527,6 +539,8 @@ impl<'a, S: Sink> Interp<'a, S> {
     pub(crate) fn fails(&mut self, fault: Box<Fault>) -> bool {
         let own = fault.rs.is_none();
         self.found(fault);
+        // What the block was about to set is not set.
+        self.settings.clear();
         self.unwind();
         own || !self.setup.keep_going || self.findings.len() >= 100
     }
@@ -639,16 +653,41 @@ impl<'a, S: Sink> Interp<'a, S> {
             self.store_settings()?;
         }
         self.blocks += 1;
-        if self.blocks > self.setup.budgets.blocks || self.emitted > self.setup.budgets.calls {
-            return Err(self.over_budget());
-        }
+        self.check_budgets()?;
         self.execute_block()
     }
 
+    /// Budgets end what goes around and around. A program that comes on line by line may be as long as it likes.
+    #[inline]
+    pub(crate) fn check_budgets(&mut self) -> Res {
+        let (blocks, calls) = (self.blocks - self.spent.0, self.emitted - self.spent.1);
+        if blocks > self.setup.budgets.blocks || calls > self.setup.budgets.calls {
+            return self.over_budget(blocks);
+        }
+        Ok(())
+    }
+
     #[cold]
-    fn over_budget(&self) -> Box<Fault> {
-        let what = if self.blocks > self.setup.budgets.blocks { "blocks" } else { "motions" };
-        Fault::own(code::RUN_ENDLESS).arg(format!("the program has run more {what} than the limit allows"))
+    fn over_budget(&mut self, blocks: u64) -> Res {
+        if self.at_rest() && self.place.line >= self.frontier {
+            self.spent = (self.blocks, self.emitted);
+            return Ok(());
+        }
+        let what = if blocks > self.setup.budgets.blocks { "blocks" } else { "motions" };
+        Err(self.endless(&format!("the program has run more {what} than the limit allows")))
+    }
+
+    /// Counts a line with control flow. Budgets begin anew on each that the main program comes to for the first time
+    /// outside of calls and loops, so that it does not matter where a run began.
+    pub(crate) fn count_control(&mut self) -> Res {
+        if self.level() == 0 && self.place.line >= self.frontier {
+            if self.at_rest() {
+                self.spent = (self.blocks, self.emitted);
+            }
+            self.frontier = self.place.line + 1;
+        }
+        self.blocks += 1;
+        self.check_budgets()
     }
 
     /// Lines with structure, faults, `%`, or while skipping.
@@ -720,28 +759,32 @@ impl<'a, S: Sink> Interp<'a, S> {
             .unwrap_or_else(|| Fault::new(code::NUMBER_MALFORMED, rs274::BAD_NUMBER_FORMAT).arg("").arg(""))
     }
 
+    /// Stands in for `rs274`: told to go on after an error, it does so with whatever the controller is left with.
+    fn stands_in(&self) -> bool {
+        self.setup.keep_going && !self.setup.startup_code
+    }
+
     /// Forgets calls, loops and skipping, as after an error or at the end.
     pub(crate) fn unwind(&mut self) {
         while self.levels.len() > 1 {
+            self.main_unnamed = true;
             self.levels.pop();
             let level = self.level();
             self.params.leave_level(level + 1);
             let ret = self.levels[level].ret.take();
             if let Some(ret) = ret {
-                if let Some(saved) = ret.params {
-                    for (i, v) in saved.iter().enumerate() {
-                        self.write_param(i as u32 + 1, *v);
-                    }
+                if ret.params || (self.levels[level].kind != CallKind::M98 && self.stands_in()) {
+                    self.take_back_params(level);
                 }
-                self.place.file = ret.place.file;
-                self.place.frame = ret.place.frame;
+                self.place = ret.place;
                 self.next = ret.next;
                 self.shift = ret.shift;
                 self.flow = if self.flow == Flow::Next { Flow::Jump } else { self.flow };
             }
         }
+        self.place.frame = FrameId::MAIN;
         self.remaps.clear();
-        self.sub_name = None;
+        (self.sub_name, self.came_back) = (None, false);
         self.defining_sub = false;
         self.skip = None;
         self.offsets.clear();

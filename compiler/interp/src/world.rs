@@ -28,13 +28,15 @@ pub struct World {
     pub feed_held: u8,
     /// The speed override was switched off last, not on (of whichever spindle).
     pub speed_held: u8,
-    pad: [u8; 4],
+    /// Path control as it was given out: 0 exact path, 1 exact stop, 2 blending.
+    pub path: u8,
+    pad: [u8; 3],
 }
 
 impl World {
     /// At the start.
     pub fn new() -> World {
-        World { units: Units::Mm as u8, plane: Plane::Xy as u8, ..World::zeroed() }
+        World { units: Units::Mm as u8, plane: Plane::Xy as u8, path: 2, ..World::zeroed() }
     }
     fn moved(&mut self, to: &Axes) {
         self.position.copy_from_slice(&to[..6]);
@@ -81,7 +83,11 @@ impl World {
             Call::SelectPlane(plane) => self.plane = *plane as u8,
             Call::SetFeedRate(feed) => self.feed = *feed,
             Call::SetMotionControlMode(mode) => {
-                self.tolerance = if let PathMode::Continuous(t) = mode { *t } else { 0.0 };
+                (self.path, self.tolerance) = match mode {
+                    PathMode::ExactPath => (0, 0.0),
+                    PathMode::ExactStop => (1, 0.0),
+                    PathMode::Continuous(t) => (2, *t),
+                };
             }
             Call::EnableFeedOverride => self.feed_held = 0,
             Call::DisableFeedOverride => self.feed_held = 1,
