@@ -11,6 +11,8 @@ use gr_spec::{Code, Severity, code};
 use gr_text::{Diagnostic, FileId, Frame, Span};
 
 use crate::db::{Database, Db, Document, scanned, shape};
+use crate::layout::{Layout, layout};
+use crate::library::sub_file;
 use crate::engine::End;
 use crate::lints::Found;
 use crate::timeline::{Group, Timeline, timeline, timeline_to};
@@ -66,6 +68,7 @@ struct Assembly<'a> {
     db: &'a dyn Db,
     document: Document,
     id: FileId,
+    layout: &'a Layout,
     timeline: &'a Timeline<'a>,
     /// The same finding in every pass of a loop is one diagnostic.
     seen: BTreeMap<(FileId, u32, Code, Option<u8>, Option<(u32, u32)>), usize>,
@@ -84,6 +87,7 @@ impl<'a> Assembly<'a> {
             db,
             document,
             id,
+            layout: layout(db, document),
             timeline,
             seen: BTreeMap::new(),
             told: BTreeSet::new(),
@@ -150,11 +154,11 @@ impl<'a> Assembly<'a> {
     /// The chunk a line is in.
     fn source(&self, file: FileId, line: u32) -> Option<Source> {
         if file != self.id {
-            let contents = self.db.disk().contents(file)?;
+            let contents = sub_file(self.db, self.document.run(self.db), file)?;
             let (chunk, line) = contents.locate(line)?;
             return Some(Source::of(&contents, chunk, line));
         }
-        let starts = &self.timeline.starts;
+        let starts = &self.layout.starts;
         let last = starts.len().checked_sub(2)?;
         let at = starts.partition_point(|s| s.0 <= line).saturating_sub(1).min(last);
         let chunk = *self.document.chunks(self.db).get(at)?;
@@ -190,7 +194,7 @@ impl<'a> Assembly<'a> {
             if !shape(self.db, *chunk, run).damaged {
                 continue;
             }
-            let (first_line, start) = self.timeline.starts[at];
+            let (first_line, start) = self.layout.starts[at];
             let scan = scanned(self.db, *chunk, run);
             let mut last = u32::MAX;
             for fault in scan.faults.iter() {

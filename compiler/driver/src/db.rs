@@ -1,5 +1,7 @@
 //! The salsa database: inputs and the queries about one chunk that need no interpretation.
 
+use std::collections::BTreeMap;
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -76,7 +78,7 @@ impl Database {
 }
 
 /// A chunk's text.
-#[salsa::input]
+#[salsa::input(debug)]
 pub(crate) struct ChunkText {
     #[returns(ref)]
     pub(crate) text: Arc<str>,
@@ -94,6 +96,13 @@ pub(crate) struct Document {
     /// Number of the file in the session.
     #[returns(copy)]
     pub(crate) id: u32,
+}
+
+/// The files that are open, by [`crate::library::plain_path`].
+#[salsa::input(singleton)]
+pub(crate) struct OpenFiles {
+    #[returns(ref)]
+    pub(crate) files: Arc<BTreeMap<PathBuf, Document>>,
 }
 
 /// What programs are run with.
@@ -139,6 +148,14 @@ pub(crate) struct Shape {
     pub(crate) computed: bool,
     /// Has a jump to an N number.
     pub(crate) jumps: bool,
+    /// Lines that skipping must look at.
+    pub(crate) stops: Box<[u32]>,
+    /// Lines with M2 or M30.
+    pub(crate) ends: Box<[u32]>,
+    /// Lines that may begin or end subroutines, loops and branches.
+    pub(crate) statements: Box<[gr_interp::Statement]>,
+    /// The first line with a statement of control flow.
+    pub(crate) first_control: Option<u32>,
 }
 
 /// What a stretch of a chunk is.
@@ -210,6 +227,8 @@ pub(crate) fn shape_of(scan: &Scan, text: &str, setup: &gr_interp::Setup) -> Sha
     let mut outline = Vec::new();
     // Names that begin with `_` may speak of the run itself: its line, its call depth.
     shape.control = scan.names.iter().any(|n| n.starts_with('_'));
+    // A remapped code calls a subroutine, and a remapped motion does so wherever it is still active.
+    shape.control |= !setup.ini.all("rs274ngc", "remap").is_empty();
     let macros = dialect.family == gr_spec::Family::Fanuc;
     for (n, line) in scan.lines.iter().enumerate() {
         let n = n as u32;
@@ -254,6 +273,9 @@ pub(crate) fn shape_of(scan: &Scan, text: &str, setup: &gr_interp::Setup) -> Sha
                 b'n' if macros && word.form == Form::Literal => {
                     labels.push(Label { name: word.value.to_string().into(), line: n, kind: LabelKind::Number });
                 }
+                b'g' if word.form != Form::Bad && (word.form != Form::Literal || (70.0..73.0).contains(&word.value)) => {
+                    shape.control = true;
+                }
                 b'(' | b';' => {
                     let span = scan.word_span(text, n, word);
                     shape.environment |= comment_acts(text.get(span.range()).unwrap_or(""));
@@ -267,6 +289,7 @@ pub(crate) fn shape_of(scan: &Scan, text: &str, setup: &gr_interp::Setup) -> Sha
     }
     shape.labels = labels.into();
     shape.outline = outline.into();
+    crate::layout::line_shapes(&mut shape, scan, text);
     shape
 }
 

@@ -1,6 +1,6 @@
 //! Files that programs pull in by themselves: external subroutines, found along the search path.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use gr_canon::FileId;
@@ -45,11 +45,8 @@ impl Disk {
     pub(crate) fn contents(&self, id: FileId) -> Option<Arc<File>> {
         self.lock().get(id.0 as usize)?.contents.clone()
     }
-    /// The first of `candidates` that can be read.
-    pub(crate) fn find(&self, candidates: &[PathBuf], dialect: &'static Dialect) -> Option<(FileId, Arc<File>)> {
-        candidates.iter().find_map(|path| self.load(path, dialect))
-    }
-    fn load(&self, path: &Path, dialect: &'static Dialect) -> Option<(FileId, Arc<File>)> {
+    /// A file, when it can be read.
+    pub(crate) fn load(&self, path: &Path, dialect: &'static Dialect) -> Option<(FileId, Arc<File>)> {
         let name = path.to_string_lossy();
         let known = self.lock().iter().position(|k| *k.path == *name);
         if let Some(at) = known

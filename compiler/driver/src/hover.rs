@@ -7,8 +7,9 @@ use gr_gcode::Symbols;
 use gr_interp::Modal;
 
 use crate::db::{ChunkText, Database, Db, Document, RunOptions, scanned};
-use crate::engine::{self, Library};
-use crate::timeline::{timeline_to, whole};
+use crate::engine;
+use crate::layout::layout;
+use crate::timeline::{nearest, timeline_to};
 
 /// Modes and position around a block.
 #[derive(Clone, Copy, Debug)]
@@ -27,26 +28,24 @@ pub(crate) fn state_at(db: &Database, document: Document, line: u32) -> Option<S
     let run = document.run(db);
     let options = run.options(db);
     let timeline = timeline_to(db, document, line);
-    let starts = &timeline.starts;
+    let starts = &layout(db, document).starts;
     if line >= starts.last()?.0 {
         return None;
     }
     let at = starts.partition_point(|s| s.0 <= line).checked_sub(1)?;
-    if let Some((entry, env)) = timeline.entries.get(at).copied().flatten()
+    if let Some(known) = timeline.entries.get(at).copied().flatten()
         && !crate::db::shape(db, *document.chunks(db).get(at)?, run).control
     {
         let chunk = *document.chunks(db).get(at)?;
         let chunk = gr_gcode::Chunk { text: chunk.text(db).clone(), scan: scanned(db, chunk, run) };
-        return engine::around(&chunk, line - starts[at].0, entry.boundary(db), env.environment(db), options);
+        let (entry, env) = (known.entry.boundary(db), known.env.environment(db));
+        return engine::around(&chunk, line - starts[at].0, entry, env, options);
     }
     // Inside of control flow: run from where it begins.
-    let (first, (entry, env)) = timeline.entries[..=at].iter().enumerate().rev().find_map(|(i, e)| Some((i, (*e)?)))?;
+    let stretch = nearest(db, document, timeline, at)?;
     let main = FileId(document.id(db));
-    let mut library = Library::new(db, options, main, whole(db, document));
-    let percent = entry.boundary(db).modal().percent != 0;
-    let shift = if percent { first_percent(db, document)? } else { 0 };
-    let (state, params, from) = engine::entry_of(entry.boundary(db), env.environment(db), starts[first].0, shift);
-    let mut interp = gr_interp::Interp::resume(&mut library, &options.setup, Discard, (state, params), main, (from, shift as i32));
+    let mut library = stretch.library();
+    let mut interp = stretch.resume(&mut library, Discard);
     for _ in 0..MOST_BLOCKS {
         let here = interp.comes_to(main, line);
         let before = *interp.modal();
@@ -59,17 +58,6 @@ pub(crate) fn state_at(db: &Database, document: Document, line: u32) -> Option<S
         }
     }
     None
-}
-
-/// Line of the opening `%`.
-fn first_percent(db: &dyn Db, document: Document) -> Option<u32> {
-    let mut first = 0;
-    document.chunks(db).iter().find_map(|c| {
-        let shape = crate::db::shape(db, *c, document.run(db));
-        let found = shape.first_percent.map(|l| l + first);
-        first += shape.lines;
-        found
-    })
 }
 
 /// Names of a chunk.

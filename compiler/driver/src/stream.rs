@@ -129,7 +129,7 @@ pub fn stream<S: Sink>(path: &str, text: Arc<str>, setup: &Setup, rules: Option<
 /// Whether the lints have nothing to say, in the program and about it as a whole.
 fn says_nothing(lints: Lints<'_>, files: &Loaded, setup: &Setup, rules: &Rules) -> bool {
     let mut late = Late::default();
-    late.take(&lints.summary, 0, rules);
+    late.take(&lints.summary, None, rules);
     if !lints.found.is_empty() || !late.found.is_empty() {
         return false;
     }

@@ -1,16 +1,20 @@
 //! A file put together from its chunks: which state each chunk begins in, and everything that was found.
 //!
 //! A chunk without control flow is interpreted on its own ([`step`]), and the result is remembered for the
-//! chunk, the state it is entered in and, if it touches them, the parameters. Most edits leave the state after
-//! the chunk as it was, and then nothing below is done again. From the first chunk with control flow on, the
-//! program is run as a whole ([`flow`]).
+//! chunk, the state it is entered in and, if it touches them, the parameters. From a chunk with control flow on the
+//! program is run ([`flow`]) until it is outside of calls and loops at the start of a chunk again; that is remembered
+//! for the line, the state, the parameters and what control flow has left behind, and depends on the chunks that
+//! execution came to. Most edits leave the state after the chunk as it was, and then nothing below is done again.
 
 use std::sync::Arc;
 
-use gr_canon::{CallFrame, FrameId};
+use gr_canon::{CallFrame, FileId, FrameId};
+use gr_interp::Carry;
+use gr_spec::{Severity, code};
 
-use crate::db::{ChunkText, Counted, Db, Document, RunOptions, Shape, scanned, shape};
-use crate::engine::{self, Boundary, End, Environment};
+use crate::db::{ChunkText, Counted, Db, Document, RunOptions, scanned};
+use crate::engine::{self, Boundary, End, Environment, Stretch};
+use crate::layout::{Layout, Part, layout};
 use crate::lints::{Cuts, Found, From, Summary, Where};
 
 /// State between two chunks.
@@ -27,6 +31,13 @@ pub(crate) struct Env<'db> {
     pub(crate) environment: Environment,
 }
 
+/// What control flow has left behind between two chunks.
+#[salsa::interned(debug)]
+pub(crate) struct Labels<'db> {
+    #[returns(ref)]
+    pub(crate) carry: Carry,
+}
+
 /// What interpreting a chunk gives.
 #[derive(Clone, PartialEq, Debug, salsa::SalsaValue)]
 pub(crate) struct Step<'db> {
@@ -41,9 +52,6 @@ pub(crate) struct Step<'db> {
     pub(crate) summary: Summary,
     #[salsa_value(unsafe(prove(Option<End>: 'static)))]
     pub(crate) end: Option<End>,
-    /// An M2 or M30 that did not end the program because its block has a mistake.
-    #[salsa_value(unsafe(prove(Option<End>: 'static)))]
-    pub(crate) tried: Option<End>,
     /// Parameters were touched although none were given.
     pub(crate) impure: bool,
 }
@@ -66,7 +74,6 @@ pub(crate) fn step<'db>(
         found: outcome.found.into(),
         summary: outcome.summary,
         end: outcome.end,
-        tried: outcome.tried,
         impure: outcome.impure,
     }
 }
@@ -78,72 +85,66 @@ pub(crate) struct Flow<'db> {
     #[salsa_value(unsafe(prove(Arc<[Found]>: 'static)))]
     pub(crate) found: Arc<[Found]>,
     /// The call tree that the findings point into.
-    #[salsa_value(unsafe(prove(Arc<[(FrameId, CallFrame)]>: 'static)))]
-    pub(crate) frames: Arc<[(FrameId, CallFrame)]>,
+    #[salsa_value(unsafe(prove(Frames: 'static)))]
+    pub(crate) frames: Frames,
     #[salsa_value(unsafe(prove(Summary: 'static)))]
     pub(crate) summary: Summary,
     #[salsa_value(unsafe(prove(Option<End>: 'static)))]
     pub(crate) end: Option<End>,
-    /// State at the end.
-    pub(crate) exit: Entry<'db>,
+    /// What comes behind it.
+    pub(crate) exit: Known<'db>,
+    /// First line behind it, which begins a chunk; none = the program ended.
+    pub(crate) next: Option<u32>,
+    /// What is opened and never closed in the other files that were opened.
+    #[salsa_value(unsafe(prove(Box<[(FileId, Vec<Found>)]>: 'static)))]
+    pub(crate) unclosed: Box<[(FileId, Vec<Found>)]>,
 }
 
-/// Runs the program from the start of a chunk to its end.
+/// A call tree.
+pub(crate) type Frames = Arc<[(FrameId, CallFrame)]>;
+
+/// Runs the program from a line that begins a chunk until it is at rest at the start of another one.
 #[salsa::tracked(returns(ref), no_eq)]
-pub(crate) fn flow<'db>(db: &'db dyn Db, document: Document, chunk: u32, entry: Entry<'db>, env: Env<'db>) -> Flow<'db> {
+pub(crate) fn flow<'db>(db: &'db dyn Db, document: Document, line: u32, entry: Entry<'db>, env: Env<'db>, labels: Labels<'db>) -> Flow<'db> {
     db.count(Counted::Flow);
-    let run = document.run(db);
-    let _ = run.disk_revision(db);
-    let options = run.options(db);
-    let chunks = document.chunks(db);
-    let file = whole(db, document);
-    let (mut line, mut shift) = (0, None);
-    for (i, c) in chunks.iter().enumerate() {
-        if i == chunk as usize {
-            break;
-        }
-        line += shape(db, *c, run).lines;
-    }
-    if entry.boundary(db).modal().percent != 0 {
-        let mut first = 0;
-        for c in chunks.iter() {
-            shift = shift.or_else(|| Some(first + shape(db, *c, run).first_percent?));
-            first += shape(db, *c, run).lines;
-        }
-    }
-    let stretch = engine::Stretch {
-        db,
-        main: gr_canon::FileId(document.id(db)),
-        file,
-        line,
-        shift: shift.unwrap_or(0),
-        entry: entry.boundary(db),
-        env: env.environment(db),
-        options,
-    };
-    let outcome = engine::flow(&stretch);
+    // Subroutine files are read again when they may have changed.
+    let _ = document.run(db).disk_revision(db);
+    let outcome = engine::flow(&Known { entry, env, labels }.stretch(db, document, line));
     Flow {
         found: outcome.found.into(),
         frames: outcome.frames.into(),
         summary: outcome.summary,
         end: outcome.end,
-        exit: Entry::new(db, outcome.boundary),
+        exit: Known {
+            entry: Entry::new(db, outcome.boundary),
+            env: Env::new(db, outcome.environment),
+            labels: Labels::new(db, outcome.carry),
+        },
+        next: outcome.next,
+        unclosed: outcome.unclosed.into(),
     }
 }
 
-/// The whole file with its tables.
-pub(crate) fn whole(db: &dyn Db, document: Document) -> Arc<gr_gcode::File> {
-    let run = document.run(db);
-    let chunks = document.chunks(db).iter().map(|c| gr_gcode::Chunk { text: c.text(db).clone(), scan: scanned(db, *c, run) });
-    let path = db.disk().path(gr_canon::FileId(document.id(db))).unwrap_or_default();
-    Arc::new(gr_gcode::File::new(&path, chunks.collect()))
+/// All that is known where a chunk begins.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, salsa::SalsaValue)]
+pub(crate) struct Known<'db> {
+    pub(crate) entry: Entry<'db>,
+    pub(crate) env: Env<'db>,
+    pub(crate) labels: Labels<'db>,
+}
+
+impl<'db> Known<'db> {
+    /// A run that goes on from here.
+    pub(crate) fn stretch(self, db: &'db dyn Db, document: Document, line: u32) -> Stretch<'db> {
+        Stretch { db, document, line, entry: self.entry.boundary(db), env: self.env.environment(db), carry: self.labels.carry(db) }
+    }
 }
 
 /// State before the first block.
 #[salsa::tracked(returns(copy))]
-fn start(db: &dyn Db, run: RunOptions, percent: bool) -> (Entry<'_>, Env<'_>) {
+fn start(db: &dyn Db, run: RunOptions, percent: bool) -> Known<'_> {
     let (boundary, environment) = engine::start(run.options(db), percent);
-    (Entry::new(db, boundary), Env::new(db, environment))
+    Known { entry: Entry::new(db, boundary), env: Env::new(db, environment), labels: Labels::new(db, Carry::default()) }
 }
 
 /// A stretch of findings whose lines count from `first_line`.
@@ -152,18 +153,14 @@ pub(crate) struct Group {
     pub(crate) first_line: u32,
     pub(crate) found: Arc<[Found]>,
     /// Call tree, when the stretch was run with control flow.
-    pub(crate) frames: Option<Arc<[(FrameId, CallFrame)]>>,
+    pub(crate) frames: Option<Frames>,
 }
 
 /// A file put together.
 #[derive(Clone, PartialEq, Debug, salsa::SalsaValue)]
 pub(crate) struct Timeline<'db> {
-    /// First line and first byte of each chunk, and after the last one the totals.
-    #[salsa_value(unsafe(prove(Box<[(u32, u32)]>: 'static)))]
-    pub(crate) starts: Box<[(u32, u32)]>,
     /// State in which a chunk is entered; none = not known (inside control flow, after the end, not computed).
-    #[salsa_value(unsafe(prove(Entry<'db>: salsa::SalsaValue)))]
-    pub(crate) entries: Vec<Option<(Entry<'db>, Env<'db>)>>,
+    pub(crate) entries: Vec<Option<Known<'db>>>,
     #[salsa_value(unsafe(prove(Vec<Group>: 'static)))]
     pub(crate) groups: Vec<Group>,
     /// How and on which line the program ended.
@@ -186,6 +183,12 @@ pub(crate) fn timeline_to<'db>(db: &'db dyn Db, document: Document, line: u32) -
     fold(db, document, line)
 }
 
+/// The run that goes on from the nearest known state before a chunk.
+pub(crate) fn nearest<'db>(db: &'db dyn Db, document: Document, timeline: &Timeline<'db>, chunk: usize) -> Option<Stretch<'db>> {
+    let (at, known) = timeline.entries.get(..=chunk)?.iter().enumerate().rev().find_map(|(i, k)| Some((i, (*k)?)))?;
+    Some(known.stretch(db, document, layout(db, document).starts.get(at)?.0))
+}
+
 /// What is carried along for lints that compare distant parts.
 #[derive(Default)]
 pub(crate) struct Late {
@@ -195,17 +198,21 @@ pub(crate) struct Late {
 }
 
 impl Late {
-    pub(crate) fn take(&mut self, summary: &Summary, first_line: u32, rules: &crate::Rules) {
+    /// Takes what a stretch has left. `base`: a chunk was run alone, and these are its file and first line.
+    pub(crate) fn take(&mut self, summary: &Summary, base: Option<(FileId, u32)>, rules: &crate::Rules) {
+        let real = |place: Where| match base {
+            Some((file, first)) => Where { file, line: place.line.wrapping_add(first), ..place },
+            None => place,
+        };
         for dive in &summary.dives {
             if let Some(mut found) = dive.judge(&self.cuts, rules) {
-                found.place.line = found.place.line.wrapping_add(first_line);
+                found.place = real(found.place);
                 self.found.push(found);
             }
         }
         self.cuts = if summary.new_frame { summary.cuts } else { self.cuts.join(&summary.cuts) };
-        if let Some(mut place) = summary.bare_cut {
-            place.line = place.line.wrapping_add(first_line);
-            self.bare_cut = Some(place);
+        if let Some(place) = summary.bare_cut {
+            self.bare_cut = Some(real(place));
         }
         if summary.spindle_starts
             && let Some(place) = self.bare_cut.take()
@@ -242,70 +249,113 @@ fn too_many(groups: &mut Vec<Group>) -> Option<u32> {
     None
 }
 
+/// The main file's statements of control flow make faults of these kinds over and over once an error has made the
+/// controller forget all labels: the rest of a loop or branch is then without its beginning.
+const CONSEQUENCES: [gr_spec::Code; 2] = [code::FLOW_LABEL, code::FLOW_UNCLOSED];
+
+/// Whether a finding in the main file or another one is an error after which labels are forgotten that were there.
+fn forgets(found: &Found, line: u32, own: bool, first_control: u32) -> bool {
+    let ended = found.code == code::PROGRAM_ENDS_EARLY;
+    found.from == From::Fault && !ended && (!own || line >= first_control)
+}
+
+/// Drops what is the same mistake once more; returns whether labels were forgotten.
+fn drop_consequences(groups: &mut [Group], main: FileId, first_control: u32) -> bool {
+    let mut after_error = false;
+    for group in groups {
+        let own = |f: &Found| group.frames.is_none() || f.place.file == main;
+        let dropped = |f: &Found, after: bool| after && f.from != From::Lint && CONSEQUENCES.contains(&f.code);
+        let mut kept = Vec::new();
+        for f in group.found.iter() {
+            if !dropped(f, after_error) {
+                kept.push(f);
+            }
+            after_error |= forgets(f, f.place.line.wrapping_add(group.first_line), own(f), first_control);
+        }
+        if kept.len() < group.found.len() {
+            group.found = kept.into_iter().cloned().collect();
+        }
+    }
+    after_error
+}
+
+/// Line of an M2 or M30 that could not end the program: something before it is not closed, or that block itself
+/// has a mistake.
+fn unreached_end(layout: &Layout, groups: &[Group], unclosed: &[Found], main: FileId) -> Option<u32> {
+    let faulty = |line: u32| {
+        groups.iter().any(|g| {
+            let own = |f: &Found| g.frames.is_none() || f.place.file == main;
+            g.found.iter().any(|f| f.from == From::Fault && own(f) && f.place.line.wrapping_add(g.first_line) == line)
+        })
+    };
+    let open = |line: u32| unclosed.iter().any(|f| f.place.file == main && f.place.line < line);
+    layout.ends.iter().copied().find(|line| open(*line) || faulty(*line))
+}
+
+/// A file while it is being put together.
+struct Fold<'db> {
+    groups: Vec<Group>,
+    late: Late,
+    end: Option<End>,
+    /// Unclosed statements of the other files that were opened.
+    others: Vec<(FileId, Vec<Found>)>,
+    known: Known<'db>,
+    entries: Vec<Option<Known<'db>>>,
+}
+
 fn fold<'db>(db: &'db dyn Db, document: Document, last_line: u32) -> Timeline<'db> {
     let run = document.run(db);
     let options = run.options(db);
-    let chunks = document.chunks(db);
-    let shapes: Vec<&Shape> = chunks.iter().map(|c| shape(db, *c, run)).collect();
-    let mut starts = Vec::with_capacity(chunks.len() + 1);
-    let (mut line, mut byte) = (0u32, 0u32);
-    for s in &shapes {
-        starts.push((line, byte));
-        (line, byte) = (line + s.lines, byte + s.bytes);
-    }
-    starts.push((line, byte));
-    let mut entries = vec![None; chunks.len()];
-    let (mut groups, mut late, mut end, mut tried) = (Vec::new(), Late::default(), None, None);
-    let percent = shapes.iter().find_map(|s| s.first_text).unwrap_or(false);
-    let (mut entry, mut env) = start(db, run, percent);
+    let main = FileId(document.id(db));
+    let layout = layout(db, document);
+    let parts = &layout.parts;
+    let mut fold = Fold {
+        groups: Vec::new(),
+        late: Late::default(),
+        end: None,
+        others: Vec::new(),
+        known: start(db, run, layout.percent),
+        entries: vec![None; parts.len()],
+    };
     let mut at = 0;
-    while at < chunks.len() && end.is_none() && starts[at].0 <= last_line {
-        entries[at] = Some((entry, env));
-        if shapes[at].control {
-            let flow = flow(db, document, at as u32, entry, env);
-            late.take(&flow.summary, 0, &options.rules);
-            if !flow.found.is_empty() {
-                groups.push(Group { first_line: 0, found: flow.found.clone(), frames: Some(flow.frames.clone()) });
-            }
-            end = flow.end;
-            entry = flow.exit;
-            at = chunks.len();
+    while at < parts.len() && fold.end.is_none() && parts[at].first_line <= last_line {
+        fold.entries[at] = Some(fold.known);
+        if parts[at].control {
+            let next = fold.flow(db, document, parts[at].first_line);
+            at = next.map_or(parts.len(), |line| parts.partition_point(|p| p.first_line < line));
         } else {
-            let touched = shapes[at].environment.then_some(env);
-            let mut outcome = step(db, chunks[at], run, entry, touched);
-            if outcome.impure {
-                outcome = step(db, chunks[at], run, entry, Some(env));
-            }
-            let step = outcome;
-            let first_line = starts[at].0;
-            late.take(&step.summary, first_line, &options.rules);
-            if !step.found.is_empty() {
-                groups.push(Group { first_line, found: step.found.clone(), frames: None });
-            }
-            end = step.end.map(|e| e.shifted(first_line));
-            tried = tried.or(step.tried.map(|e| e.shifted(first_line)));
-            entry = step.exit;
-            env = step.env.unwrap_or(env);
+            fold.step(db, document, &parts[at]);
             at += 1;
         }
     }
+    let Fold { mut groups, mut late, mut end, others, known, entries } = fold;
     if let Some(line) = too_many(&mut groups) {
         end = Some(End { line, stopped: true, program: false });
     }
-    let complete = at >= chunks.len() || end.is_some();
-    // The program has its end, even if a mistake keeps the controller from it.
-    let end = match end {
-        None => tried.filter(|_| complete),
-        Some(e) if e.stopped && e.program => tried.or(end),
-        _ => end,
-    };
+    let complete = at >= parts.len() || end.is_some();
+    let after_error = drop_consequences(&mut groups, main, layout.first_control.unwrap_or(0));
     if complete {
-        let context = engine::Finish { shapes: &shapes, starts: &starts, options, modal: entry.boundary(db).modal(), end };
-        late.found.extend(engine::finish(&context));
+        let others = others.into_iter().flat_map(|(_, found)| found);
+        let mut unclosed: Vec<Found> = layout.unclosed.iter().cloned().chain(others).collect();
+        // What stands behind the end is not looked at.
+        unclosed.retain(|f| !after_error && (f.place.file != main || end.is_none_or(|e| f.place.line <= e.line)));
+        if end.is_none() {
+            let last = layout.ends.last();
+            let before_end = |f: &&mut Found| f.place.file == main && last.is_some_and(|l| f.place.line < *l);
+            unclosed.iter_mut().filter(before_end).for_each(|f| f.severity = Severity::Error);
+            // The program has its end, even if a mistake keeps the controller from it.
+            let unreached = unreached_end(layout, &groups, &unclosed, main);
+            end = unreached.map(|line| End { line, stopped: true, program: true });
+        }
+        if !unclosed.is_empty() {
+            groups.push(Group { first_line: 0, found: unclosed.into(), frames: Some(Arc::default()) });
+        }
+        let modal = known.entry.boundary(db).modal();
+        late.found.extend(engine::finish(&engine::Finish { layout, main, options, modal, end }));
     }
-    if groups.iter().any(|g: &Group| g.found.iter().any(|f| f.code.def().severity == gr_spec::Severity::Error)) {
+    if groups.iter().any(|g: &Group| g.found.iter().any(|f| f.code.def().severity == Severity::Error)) {
         // After an error the rest is not to be trusted: what is still on at the end says nothing.
-        let left_on = [gr_spec::code::END_SPINDLE_ON, gr_spec::code::END_COMPENSATION_ON];
+        let left_on = [code::END_SPINDLE_ON, code::END_COMPENSATION_ON];
         late.found.retain(|f| !left_on.contains(&f.code));
         for group in &mut groups {
             if group.found.iter().any(|f| left_on.contains(&f.code)) {
@@ -314,7 +364,50 @@ fn fold<'db>(db: &'db dyn Db, document: Document, last_line: u32) -> Timeline<'d
         }
     }
     if !late.found.is_empty() {
-        groups.push(Group { first_line: 0, found: late.found.into(), frames: None });
+        groups.push(Group { first_line: 0, found: late.found.into(), frames: Some(Arc::default()) });
     }
-    Timeline { starts: starts.into(), entries, groups, end, complete }
+    Timeline { entries, groups, end, complete }
+}
+
+impl<'db> Fold<'db> {
+    /// Adds a chunk without control flow.
+    fn step(&mut self, db: &'db dyn Db, document: Document, part: &Part) {
+        let run = document.run(db);
+        let Known { entry, env, labels } = self.known;
+        let mut step = step(db, part.chunk, run, entry, part.environment.then_some(env));
+        if step.impure {
+            step = self::step(db, part.chunk, run, entry, Some(env));
+        }
+        let first_line = part.first_line;
+        self.late.take(&step.summary, Some((FileId(document.id(db)), first_line)), &run.options(db).rules);
+        let mut labels = labels;
+        if !step.found.is_empty() {
+            self.groups.push(Group { first_line, found: step.found.clone(), frames: None });
+            if step.found.iter().any(|f| f.from == From::Fault) {
+                let mut carry = labels.carry(db).clone();
+                carry.forget_labels();
+                labels = Labels::new(db, carry);
+            }
+        }
+        self.end = step.end.map(|e| e.shifted(first_line));
+        self.known = Known { entry: step.exit, env: step.env.unwrap_or(env), labels };
+    }
+
+    /// Adds a stretch with control flow; returns the first line behind it.
+    fn flow(&mut self, db: &'db dyn Db, document: Document, line: u32) -> Option<u32> {
+        let Known { entry, env, labels } = self.known;
+        let flow = flow(db, document, line, entry, env, labels);
+        self.late.take(&flow.summary, None, &document.run(db).options(db).rules);
+        if !flow.found.is_empty() {
+            self.groups.push(Group { first_line: 0, found: flow.found.clone(), frames: Some(flow.frames.clone()) });
+        }
+        for (file, found) in &flow.unclosed {
+            if !self.others.iter().any(|(f, _)| f == file) {
+                self.others.push((*file, found.clone()));
+            }
+        }
+        self.end = flow.end;
+        self.known = flow.exit;
+        flow.next
+    }
 }

@@ -9,6 +9,8 @@ use proptest::prelude::*;
 fn options(chunk: usize) -> Options {
     let mut options = Options::new(Setup::default());
     options.chunk_lines = Some(chunk);
+    // Endless loops are found soon.
+    (options.setup.budgets.passes, options.setup.budgets.blocks) = (100, 3000);
     options
 }
 
@@ -107,6 +109,42 @@ fn text() -> impl Strategy<Value = String> {
         .prop_map(|lines| lines.into_iter().map(|(l, e)| l + e).collect::<String>())
 }
 
+/// Programs as people write them: subroutines at the top or behind the end, loops and calls in the middle, with plain
+/// stretches between them, and here and there something wrong.
+fn structured() -> impl Strategy<Value = String> {
+    let stretch = || proptest::collection::vec(line(), 0..6).prop_map(|l| l.join("\n") + "\n");
+    let body = stretch().prop_map(|s| s.replace("M2\n", "").replace("%\n", "")).boxed();
+    let sub = (101u32..104, body.clone(), any::<bool>()).prop_map(|(n, b, value)| {
+        format!("o{n} sub\n{b}o{n} endsub{}\n", if value { " [#1+1]" } else { "" })
+    });
+    let block = prop_oneof![
+        3 => stretch(),
+        2 => (101u32..105, 0u32..4).prop_map(|(n, v)| format!("o{n} call [{v}]\n")),
+        1 => (201u32..204, 0u32..4, body.clone()).prop_map(|(n, k, b)| format!("o{n} repeat [{k}]\n{b}o{n} endrepeat\n")),
+        1 => (301u32..304, body.clone()).prop_map(|(n, b)| format!("#7=0\no{n} while [#7 LT 3]\n#7=[#7+1]\n{b}o{n} endwhile\n")),
+        1 => (301u32..304, body.clone()).prop_map(|(n, b)| format!("#7=0\no{n} do\n#7=[#7+1]\n{b}o{n} while [#7 LT 2]\n")),
+        1 => (401u32..404, 0u32..2, body.clone(), body.clone())
+            .prop_map(|(n, c, a, b)| format!("o{n} if [{c}]\n{a}o{n} else\n{b}o{n} endif\n")),
+        1 => (301u32..304, body.clone()).prop_map(|(n, b)| format!("o{n} while [1]\n{b}o401 if [1]\no{n} break\no401 endif\no{n} endwhile\n")),
+        1 => (501u32..503, 0u32..3).prop_map(|(n, l)| format!("M98 P{n} L{l}\n")),
+        1 => Just("G1 X#<_value> Y#<_call_level>\n".to_string()),
+        1 => Just("#<_global>=3\n".to_string()),
+        1 => Just("G1 Z#<_global>\n".to_string()),
+        1 => Just("G41.1 D1\nG1 X20 Y5\n".to_string()),
+    ];
+    let fanuc = (501u32..503, body).prop_map(|(n, b)| format!("O{n}\n{b}M99\n"));
+    let end = prop_oneof![4 => Just("M2\n"), 1 => Just("%\n"), 1 => Just("")];
+    let subs = proptest::collection::vec(sub, 0..3);
+    let blocks = proptest::collection::vec(block, 0..10);
+    let fanuc = proptest::collection::vec(fanuc, 0..3);
+    (any::<bool>(), subs, blocks, end, fanuc, any::<bool>()).prop_map(
+        |(percent, subs, blocks, end, fanuc, feeds)| {
+            let text = format!("{}{}F100\n{}{end}{}", if percent { "%\n" } else { "" }, subs.concat(), blocks.concat(), fanuc.concat());
+            if feeds { text.replace('\n', "\r\n") } else { text }
+        },
+    )
+}
+
 #[derive(Clone, Debug)]
 struct Edit {
     at: usize,
@@ -147,6 +185,18 @@ fn assert_same(text: &str, got: &Check, expected: &Check, what: &str) {
     assert!(got == expected, "{what}: labels, help or fixes differ\n{text}");
 }
 
+fn edits_leave_no_trace(text: String, edits: &[Edit], chunk: usize) {
+    let mut expected = text;
+    let mut session = Session::new();
+    let file = session.open("part.ngc", &expected, options(chunk));
+    for edit in edits {
+        let range = apply(&mut expected, edit);
+        session.edit(file, range, &edit.new);
+        assert_eq!(session.text(file).as_deref(), Some(expected.as_str()));
+        assert_same(&expected, &session.check(file), &scratch(&expected, 256), "edits");
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: cases(), ..ProptestConfig::default() })]
 
@@ -157,16 +207,17 @@ proptest! {
 
     #[test]
     fn edits_are_invisible(text in text(), edits in proptest::collection::vec(edit(), 1..8), chunk in prop_oneof![1usize..9, Just(256)]) {
-        let mut expected = text;
-        let mut session = Session::new();
-        let file = session.open("part.ngc", &expected, options(chunk));
-        for edit in &edits {
-            let range = apply(&mut expected, edit);
-            session.edit(file, range, &edit.new);
-            let text = session.text(file);
-            prop_assert_eq!(text.as_deref(), Some(expected.as_str()));
-            assert_same(&expected, &session.check(file), &scratch(&expected, 256), "edits");
-        }
+        edits_leave_no_trace(text, &edits, chunk);
+    }
+
+    #[test]
+    fn chunk_size_is_invisible_in_structured_programs(text in structured(), chunk in 1usize..9) {
+        assert_same(&text, &scratch(&text, chunk), &scratch(&text, 256), "chunks");
+    }
+
+    #[test]
+    fn edits_are_invisible_in_structured_programs(text in structured(), edits in proptest::collection::vec(edit(), 1..8), chunk in 1usize..9) {
+        edits_leave_no_trace(text, &edits, chunk);
     }
 
     #[test]
@@ -281,5 +332,14 @@ fn a_hundred_mistakes_are_enough_whatever_the_chunks() {
     assert_eq!(whole.diagnostics.len(), 100);
     for chunk in [1, 3, 7, 64] {
         assert_same(&text, &scratch(&text, chunk), &whole, "many mistakes");
+    }
+}
+
+#[test]
+fn a_faulty_assignment_sets_nothing_later() {
+    let text = "F100\no201 repeat [1]\n#<depth>=2o201 endrepeat\nG0 X1 Y2\nG1 Z#<_global>\nM2\n";
+    for chunk in [1, 3, 256] {
+        let found = scratch(text, chunk).diagnostics;
+        assert!(found.iter().any(|d| d.message.contains("#<_global> has no value")), "{:?}", shown(text, &found));
     }
 }
