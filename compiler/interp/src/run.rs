@@ -437,7 +437,14 @@ impl<'a, S: Sink> Interp<'a, S> {
             let scan = &chunk.scan;
             let lines = l..scan.lines.len() as u32;
             let text = |l| chunk.text[scan.line_span(&chunk.text, l).range()].trim();
-            if let Some(l) = lines.into_iter().find(|l| !text(*l).is_empty()) {
+            let found = lines.into_iter().find(|l| !text(*l).is_empty());
+            if let Some(fault) = found.and_then(|l| self.too_long(scan, l)) {
+                // The controller can't even open it.
+                self.place.line = first + found.unwrap_or(l);
+                self.read_alone(&chunk, found.unwrap_or(l));
+                return Err(fault);
+            }
+            if let Some(l) = found {
                 kind = Some(scan.lines[l as usize].kind);
                 line = first + l;
                 break;
@@ -459,6 +466,18 @@ impl<'a, S: Sink> Interp<'a, S> {
         }
         self.reset();
         Ok(())
+    }
+
+    fn too_long(&self, scan: &Scan, line: u32) -> Option<Box<Fault>> {
+        scan.faults_of(line).iter().find(|f| f.rs == rs274::COMMAND_TOO_LONG).map(convert_fault)
+    }
+
+    /// A line that is not executed becomes the line read last.
+    fn read_alone(&mut self, chunk: &Chunk, line: u32) {
+        let span = chunk.scan.line_span(&chunk.text, line);
+        (self.reading.text, self.reading.scan) = (chunk.text.clone(), chunk.scan.clone());
+        (self.reading.line, self.reading.begin) = (line, span.start);
+        (self.reading.start, self.reading.end) = (span.start, span.end);
     }
 
     /// Resets the controller as it does when a file is opened or closed.
@@ -564,8 +583,11 @@ impl<'a, S: Sink> Interp<'a, S> {
         let p = self.place;
         let text = self.line_text();
         let text = text.char_indices().nth(254).map_or(text, |(i, _)| &text[..i]);
-        // Blanks at the end of a line are not read; a call that the controller made up keeps its own.
-        let text = if fault.code == code::REMAP_WORDS { text } else { text.trim_end() }.into();
+        let text = text.split('\0').next().unwrap_or(text);
+        // Blanks at the end of a line are not read; a call that the controller made up keeps its own, and a line that is
+        // too long is not looked at.
+        let whole = fault.code == code::REMAP_WORDS || fault.code == code::TEXT_LINE_TOO_LONG;
+        let text = if whole { text } else { text.trim_end() }.into();
         self.findings.push(Finding { file: p.file, line: p.line, frame: p.frame, fault, span, text });
     }
 
@@ -600,14 +622,11 @@ impl<'a, S: Sink> Interp<'a, S> {
     /// The file's last line becomes the line read last.
     fn show_last_line(&mut self) {
         let file = self.files.file(self.place.file);
-        let Some((c, l)) = file.locate(file.line_count().wrapping_sub(1)) else { return };
-        let chunk = &file.chunks[c];
-        let span = chunk.scan.line_span(&chunk.text, l);
-        self.reading.text = chunk.text.clone();
-        (self.reading.start, self.reading.end) = (span.start, span.end);
-        self.place.line = file.line_count() - 1;
-        self.reading.scan = chunk.scan.clone();
-        (self.reading.line, self.reading.begin) = (l, span.start);
+        let count = file.line_count();
+        let Some((c, l)) = file.locate(count.wrapping_sub(1)) else { return };
+        let chunk = file.chunks[c].clone();
+        self.place.line = count - 1;
+        self.read_alone(&chunk, l);
     }
 
     /// Reads and executes one line.

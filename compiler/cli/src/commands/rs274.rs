@@ -12,7 +12,7 @@ use gr_driver::Loaded;
 use gr_gcode::Chunk;
 use gr_interp::{End, Finding, Interp, Setup, ToolTable};
 use gr_spec::{Dialect, Rs274, fill, rs274};
-use gr_text::{FileId, decode};
+use gr_text::{Decoded, Encoding, FileId, decode};
 
 use crate::sources::is_latin1;
 
@@ -313,7 +313,8 @@ fn execute(choice: &Choice) -> Result<u8, Quit> {
         }
         Some(Ok(())) => {
             if let Err(fault) = run.open(FileId(0)) {
-                report_fault(&fault.rs.map_or(String::new(), |rs| fill(rs.text(), &fault.args)), "", &[]);
+                let line: String = run.line_text().chars().take(254).collect();
+                report_fault(&fault.rs_text().unwrap_or_default(), &line, &[]);
                 return Err(Quit(1));
             }
             let code = from_file(&mut run, choice);
@@ -354,7 +355,12 @@ fn program(choice: &Choice) -> Program {
         Ok(bytes) => {
             // The real command takes a byte order mark for characters of the program.
             let mark = bytes.starts_with("\u{FEFF}".as_bytes());
-            let mut decoded = decode(bytes);
+            // Nor does it know UTF-16: the bytes are what they are.
+            let wide = bytes.starts_with(&[0xFF, 0xFE]) || bytes.starts_with(&[0xFE, 0xFF]);
+            let mut decoded = match wide {
+                true => Decoded { text: bytes.iter().map(|b| *b as char).collect(), encoding: Encoding::Latin1 },
+                false => decode(bytes),
+            };
             let latin1 = is_latin1(&decoded);
             if mark {
                 decoded.text.insert_str(0, if latin1 { "\u{EF}\u{BB}\u{BF}" } else { "\u{FEFF}" });
@@ -461,8 +467,8 @@ fn report(run: &mut Interp<'_, Out>, findings: &[Finding], stack: bool) -> bool 
     let mut bad = false;
     for finding in findings {
         let fault = &finding.fault;
-        let text = match fault.rs {
-            Some(rs) => fill(rs.text(), &fault.args),
+        let text = match fault.rs_text() {
+            Some(text) => text,
             // Our own limits; doubts that the real command does not have are not told.
             None if fault.code.def().severity == gr_spec::Severity::Error => fill(fault.code.def().message, &fault.args),
             None => continue,
