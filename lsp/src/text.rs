@@ -3,7 +3,7 @@
 //! Lines end with LF, CRLF or a lone CR, as the protocol has it. Positions outside of the text are taken back to its
 //! nearest place.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use gr_text::Span;
 use tower_lsp::ls_types::{Position, Range};
@@ -26,6 +26,8 @@ struct Piece {
     text: Box<str>,
     /// Line ends.
     lines: u32,
+    /// Of an exchange file: ids and bytes of the instances that begin here, ascending; made when first asked for.
+    instances: OnceLock<Box<[(u64, u32)]>>,
 }
 
 /// A text.
@@ -50,7 +52,7 @@ fn split(text: &str) -> Vec<Arc<Piece>> {
     while !rest.is_empty() {
         let cut = if rest.len() <= PIECE { None } else { memchr::memchr(b'\n', &rest.as_bytes()[PIECE..]).map(|n| PIECE + n + 1) };
         let (head, tail) = rest.split_at(cut.unwrap_or(rest.len()));
-        pieces.push(Arc::new(Piece { text: head.into(), lines: line_ends(head) }));
+        pieces.push(Arc::new(Piece { text: head.into(), lines: line_ends(head), instances: OnceLock::new() }));
         rest = tail;
     }
     pieces
@@ -190,6 +192,19 @@ impl Text {
         }
         out
     }
+    /// Byte of the `#` of an instance of an exchange file. Pieces that an edit left alone are not looked at again, so
+    /// that this is quick in files of any size; a statement whose beginning is hidden in a string or comment over
+    /// several lines may be missed.
+    pub fn instance(&self, id: u64) -> Option<u32> {
+        self.pieces.iter().zip(&self.starts).find_map(|(p, (start, _))| {
+            let list = p.instances.get_or_init(|| {
+                let mut all: Vec<(u64, u32)> = gr_p21::index(p.text.as_bytes()).entries.iter().map(|e| (e.id, e.start)).collect();
+                all.sort_unstable();
+                all.into()
+            });
+            list.binary_search_by_key(&id, |e| e.0).ok().map(|n| start + list[n].1)
+        })
+    }
     /// Pieces in order, with the first byte of each.
     pub fn pieces(&self) -> impl Iterator<Item = (u32, &str)> {
         self.pieces.iter().zip(&self.starts).map(|(p, s)| (s.0, &*p.text))
@@ -266,6 +281,13 @@ mod tests {
         assert_eq!(text.position(at + 3, Columns::Utf16), Position { line: 4_321, character: 3 });
         text.edit(0..at, "");
         assert_eq!(text.line(0), ("G1 X4321".into(), 0));
+        assert_eq!(text.instance(1), None);
+        let plan: String = (1..5_000).map(|i| format!("#{i}=A(#{});\n", i + 1)).collect();
+        let mut plan = Text::new(&plan);
+        let at = plan.instance(4_000).expect("it is there");
+        assert!(plan.slice(Span::new(at, at + 9)).starts_with("#4000=A(#"));
+        plan.edit(0..0, "/* new */\n");
+        assert_eq!(plan.instance(4_000), Some(at + 10));
         assert_eq!(text.offset(Position { line: 9_999_999, character: 0 }, Columns::Utf16), text.len());
     }
 }

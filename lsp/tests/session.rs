@@ -1,5 +1,8 @@
-//! A client's conversation with the server, over streams in memory.
+//! Random edits over streams in memory: what the server says of a text must not depend on how the text came about.
 
+use std::sync::Arc;
+
+use proptest::prelude::*;
 use serde_json::{Value, json};
 use tokio::io::{AsyncReadExt, AsyncWriteExt, DuplexStream};
 
@@ -11,6 +14,16 @@ struct Client {
 }
 
 impl Client {
+    async fn start() -> Client {
+        let (to, input) = tokio::io::duplex(1 << 20);
+        let (output, from) = tokio::io::duplex(1 << 20);
+        tokio::spawn(gr_lsp::serve(input, output, Arc::new(gr_lsp::host::Plain)));
+        let mut c = Client { to, from, pending: Vec::new(), next: 0 };
+        let hello = c.request("initialize", json!({ "capabilities": {} })).await;
+        assert_eq!(hello["capabilities"]["positionEncoding"], "utf-16");
+        c.notify("initialized", json!({})).await;
+        c
+    }
     async fn send(&mut self, mut message: Value) {
         message["jsonrpc"] = "2.0".into();
         let body = message.to_string();
@@ -27,73 +40,133 @@ impl Client {
                     return serde_json::from_slice(&body).expect("JSON");
                 }
             }
-            let mut buffer = [0; 4096];
-            let wait = std::time::Duration::from_secs(20);
+            let mut buffer = [0; 1 << 16];
+            let wait = std::time::Duration::from_secs(60);
             let n = tokio::time::timeout(wait, self.from.read(&mut buffer)).await.expect("an answer in time").expect("readable");
             assert!(n > 0, "the server hung up");
             self.pending.extend(&buffer[..n]);
         }
     }
-    async fn until(&mut self, wanted: impl Fn(&Value) -> bool) -> Value {
-        loop {
-            let message = self.receive().await;
-            if wanted(&message) {
-                return message;
-            }
-        }
-    }
-    async fn request(&mut self, method: &str, params: Value) -> Value {
+    async fn begin(&mut self, method: &str, params: Value) -> i64 {
         self.next += 1;
         let id = self.next;
         self.send(json!({ "id": id, "method": method, "params": params })).await;
-        self.until(|m| m["id"] == id).await["result"].clone()
+        id
+    }
+    async fn request(&mut self, method: &str, params: Value) -> Value {
+        let id = self.begin(method, params).await;
+        loop {
+            let m = self.receive().await;
+            if m["id"] == id {
+                return if m.get("error").is_some() { m } else { m["result"].clone() };
+            }
+        }
     }
     async fn notify(&mut self, method: &str, params: Value) {
         self.send(json!({ "method": method, "params": params })).await;
     }
-    async fn diagnostics(&mut self) -> Value {
-        self.until(|m| m["method"] == "textDocument/publishDiagnostics").await["params"]["diagnostics"].clone()
+    async fn open(&mut self, uri: &str, text: &str) {
+        let document = json!({ "uri": uri, "languageId": "gcode", "version": 1, "text": text });
+        self.notify("textDocument/didOpen", json!({ "textDocument": document })).await;
+    }
+    /// Everything that the server says of a document, without what counts versions.
+    async fn all(&mut self, uri: &str) -> Vec<(String, Value)> {
+        let document = json!({ "textDocument": { "uri": uri } });
+        let mut out = Vec::new();
+        for method in ["diagnostic", "documentSymbol", "foldingRange", "codeLens", "semanticTokens/full", "documentLink"] {
+            let mut answer = self.request(&format!("textDocument/{method}"), document.clone()).await;
+            if let Some(o) = answer.as_object_mut() {
+                o.remove("resultId");
+            }
+            out.push((method.to_string(), answer));
+        }
+        let range = json!({ "start": { "line": 0, "character": 0 }, "end": { "line": 60, "character": 0 } });
+        out.push(("inlayHint".into(), self.request("textDocument/inlayHint", json!({ "textDocument": { "uri": uri }, "range": range })).await));
+        for line in [0, 2, 5] {
+            let at = json!({ "textDocument": { "uri": uri }, "position": { "line": line, "character": 1 } });
+            for method in ["hover", "definition", "completion"] {
+                out.push((format!("{method} {line}"), self.request(&format!("textDocument/{method}"), at.clone()).await));
+            }
+        }
+        out
     }
 }
 
-const URI: &str = "file:///programs/part.ngc";
+/// Byte of a position in UTF-16 columns, as the protocol has it.
+fn offset(text: &str, line: u32, column: u32) -> usize {
+    let bytes = text.as_bytes();
+    let mut start = 0;
+    let mut at = 0;
+    for (i, b) in bytes.iter().enumerate() {
+        if at == line {
+            break;
+        }
+        if *b == b'\n' || (*b == b'\r' && bytes.get(i + 1) != Some(&b'\n')) {
+            at += 1;
+            start = i + 1;
+        }
+    }
+    if at < line {
+        return text.len();
+    }
+    let mut units = 0;
+    for (i, c) in text[start..].char_indices() {
+        if units >= column || matches!(c, '\n' | '\r') {
+            return start + i;
+        }
+        units += c.len_utf16() as u32;
+    }
+    text.len()
+}
 
-#[test]
-fn diagnostics_follow_edits_and_features_answer() {
-    let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_time().build().expect("a runtime");
-    runtime.block_on(async {
-        let (to, input) = tokio::io::duplex(1 << 16);
-        let (output, from) = tokio::io::duplex(1 << 16);
-        tokio::spawn(gr_lsp::serve(input, output));
-        let mut c = Client { to, from, pending: Vec::new(), next: 0 };
-        let hello = c.request("initialize", json!({ "capabilities": {} })).await;
-        assert_eq!(hello["capabilities"]["positionEncoding"], "utf-16");
-        c.notify("initialized", json!({})).await;
+/// Lines that do something, and pieces of them.
+fn piece() -> impl Strategy<Value = String> {
+    prop::sample::select(vec![
+        "G1 X10 F100\n", "G2 X5 Y5 I2.5 J2.5\n", "#1 = [#2 + 3]\n", "#<a> = 4\n", "X#<a>\n", "o1 if [#1 GT 2]\n", "o1 endif\n", "o<s> sub\n", "o<s> endsub\n",
+        "o<s> call [1]\n", "G91\n", "G90\n", "T1 M6\n", "(größe 𝄞)\n", "; note\n", "M2\n", "%\n", "G83 Z-1 R1 Q.5\n", "X", "1", "\n", "\r\n", "\r", "(", ")", "#", "[", "é", "",
+    ])
+    .prop_map(str::to_string)
+}
 
-        let text = "(größe)\nG21 G90 F100\nG2 X10 Y0 I4 J0\nM2\n";
-        c.notify("textDocument/didOpen", json!({ "textDocument": { "uri": URI, "languageId": "gcode", "version": 1, "text": text } })).await;
-        let found = c.diagnostics().await;
-        let first = found.as_array().and_then(|d| d.iter().find(|d| d["code"] == "E0203")).expect("the arc").clone();
-        assert_eq!((first["range"]["start"]["line"].as_u64(), first["severity"].as_u64()), (Some(2), Some(1)));
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 40, ..ProptestConfig::default() })]
 
-        // I4 → I5: the arc is right.
-        let change = json!({ "textDocument": { "uri": URI, "version": 2 }, "contentChanges": [
-            { "range": { "start": { "line": 2, "character": 11 }, "end": { "line": 2, "character": 12 } }, "text": "5" },
-            { "range": { "start": { "line": 0, "character": 1 }, "end": { "line": 0, "character": 6 } }, "text": "part" } ] });
-        c.notify("textDocument/didChange", change).await;
-        let found = c.diagnostics().await;
-        assert!(!found.to_string().contains("E0203"), "{found}");
-
-        let at = json!({ "textDocument": { "uri": URI }, "position": { "line": 2, "character": 1 } });
-        let hover = c.request("textDocument/hover", at).await;
-        assert!(hover["contents"]["value"].as_str().is_some_and(|t| t.starts_with("**G2**")), "{hover}");
-        let at = json!({ "textDocument": { "uri": URI }, "position": { "line": 1, "character": 2 } });
-        let items = c.request("textDocument/completion", at).await;
-        assert!(items.as_array().is_some_and(|i| i.iter().any(|c| c["label"] == "G21")), "{items}");
-        let symbols = c.request("textDocument/documentSymbol", json!({ "textDocument": { "uri": URI } })).await;
-        assert_eq!(symbols[0]["name"], "part");
-        let edits = c.request("textDocument/formatting", json!({ "textDocument": { "uri": URI }, "options": { "tabSize": 2, "insertSpaces": true } })).await;
-        assert!(edits.is_array());
-        assert_eq!(c.request("shutdown", Value::Null).await, Value::Null);
-    });
+    #[test]
+    fn edits_lead_where_a_fresh_text_leads(
+        start in prop::collection::vec(piece(), 0..10),
+        edits in prop::collection::vec((0u32..14, 0u32..12, 0u32..3, 0u32..12, piece(), any::<bool>()), 1..12),
+    ) {
+        let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_time().build().expect("a runtime");
+        let result = runtime.block_on(async {
+            let uri = "file:///programs/part.ngc";
+            let mut text = start.concat();
+            let mut c = Client::start().await;
+            c.open(uri, &text).await;
+            for (n, (line, column, lines, until, new, ask)) in edits.into_iter().enumerate() {
+                let (from, to) = (offset(&text, line, column), offset(&text, line + lines, until));
+                let range = json!({ "start": { "line": line, "character": column }, "end": { "line": line + lines, "character": until } });
+                text.replace_range(from..to.max(from), &new);
+                let change = json!([{ "range": range, "text": new }]);
+                c.notify("textDocument/didChange", json!({ "textDocument": { "uri": uri, "version": n + 2 }, "contentChanges": change })).await;
+                if ask {
+                    // Questions in between, some cancelled, must not disturb anything.
+                    let at = json!({ "textDocument": { "uri": uri }, "position": { "line": line, "character": column } });
+                    let id = c.begin("textDocument/hover", at).await;
+                    if column % 2 == 0 {
+                        c.notify("$/cancelRequest", json!({ "id": id })).await;
+                    }
+                }
+            }
+            let edited = c.all(uri).await;
+            let mut fresh = Client::start().await;
+            fresh.open(uri, &text).await;
+            let expected = fresh.all(uri).await;
+            (text, edited, expected)
+        });
+        let (text, edited, expected) = result;
+        for ((name, a), (_, b)) in edited.iter().zip(&expected) {
+            prop_assert_eq!(a, b, "{} of {:?}", name, text);
+        }
+        runtime.shutdown_background();
+    }
 }

@@ -36,11 +36,31 @@ fn location(uri: &lsp::Uri, file: &gr_gcode::File, span: Span, view: &View) -> l
     lsp::Location { uri: uri.clone(), range: Text::new(&text).range(span, view.columns) }
 }
 
+/// Larger exchange files are not parsed to follow a reference, bytes.
+const BIG_EXCHANGE: u32 = 8_000_000;
+
+/// The statement of the `#id` under the cursor, found without reading the file as a whole.
+fn quick_definition(view: &View, at: lsp::Position) -> Option<Span> {
+    let (line, start) = view.text.line(at.line);
+    let column = (view.offset(at) - start) as usize;
+    let hash = line.get(..line.len().min(column + 1))?.rfind('#')?;
+    let digits = line[hash + 1..].bytes().take_while(u8::is_ascii_digit).count();
+    if digits == 0 || column > hash + 1 + digits {
+        return None;
+    }
+    let id: u64 = line[hash + 1..hash + 1 + digits].parse().ok()?;
+    let found = view.text.instance(id)?;
+    Some(Span::new(found, found + 1 + digits as u32))
+}
+
 /// Where the name under the cursor is defined.
 pub fn definition(mut view: View, at: lsp::Position) -> Answer<Vec<lsp::Location>> {
     let offset = view.offset(at);
-    let own = |span: Span| lsp::Location { uri: view.uri.clone(), range: view.range(span) };
     if matches!(view.kind, Kind::Exchange) {
+        let own = |span: Span| lsp::Location { uri: view.uri.clone(), range: view.range(span) };
+        if view.text.len() > BIG_EXCHANGE {
+            return Ok(quick_definition(&view, at).map(own).into_iter().collect());
+        }
         let exchange = view.exchange();
         let doc = exchange_doc(&exchange);
         let found = p21::names::name_at(doc, offset).and_then(|(id, _)| p21::names::definition(doc, id));

@@ -5,7 +5,7 @@ use super::{Emitted, Language, Options};
 use crate::sources::Words;
 use gr_ir::Sources;
 use gr_ir::{Axes, FeedMode, Note, Op, Plane, Program, Source, State, Stop, Turn, Units, View};
-use gr_text::{Code, Diagnostic, Severity, code};
+use gr_text::{Code, Diagnostic, FileId, Severity, code};
 
 /// Findings reported at most.
 const MOST_FAULTS: usize = 100;
@@ -21,7 +21,7 @@ pub fn emit(program: &Program, options: &Options, sources: &dyn Sources) -> Resu
     if emitter.found.iter().any(|d| d.severity == Severity::Error) {
         Err(emitter.found)
     } else {
-        Ok(Emitted { text: emitter.w.text, notes: emitter.found })
+        Ok(Emitted { text: emitter.w.text, lines: emitter.w.lines, notes: emitter.found })
     }
 }
 
@@ -132,6 +132,14 @@ impl<'a> Emitter<'a> {
         Some(words)
     }
 
+    /// Line of the main file: of a block elsewhere, the line that called it.
+    fn main_line(&self, source: Source) -> u32 {
+        if source.file == FileId(0) {
+            return source.line;
+        }
+        self.program.call_stack(source).find(|f| f.file == FileId(0)).map_or(u32::MAX, |f| f.line)
+    }
+
     fn run(&mut self, program: &Program) {
         let skip = prologue(program);
         let epilogue = epilogue(program);
@@ -140,6 +148,7 @@ impl<'a> Emitter<'a> {
         let mut cursor = program.cursor();
         while let Some(view) = cursor.next() {
             let index = view.index;
+            self.w.source = self.main_line(view.source);
             if let Op::Units(units) = view.op {
                 self.adrift |= units != self.units && self.frame.tool_offset != [0.0; 9];
                 self.units = units;

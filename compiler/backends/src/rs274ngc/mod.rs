@@ -171,6 +171,8 @@ impl Options {
 pub struct Emitted {
     /// Its text.
     pub text: String,
+    /// Line of the main source file that each line comes from, from 0; `u32::MAX` = none.
+    pub lines: Vec<u32>,
     /// Hints and warnings.
     pub notes: Vec<Diagnostic>,
 }

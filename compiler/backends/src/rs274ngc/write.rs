@@ -6,6 +6,9 @@ use gr_ir::Units;
 /// The text so far and how numbers look.
 pub(super) struct Writer {
     pub text: String,
+    /// Source line that is being written, and that of each line so far; `u32::MAX` = none.
+    pub source: u32,
+    pub lines: Vec<u32>,
     /// mm per length unit.
     pub unit: f64,
     pub places: usize,
@@ -19,6 +22,8 @@ impl Writer {
         let unit = if options.units == Units::Inch { 25.4 } else { 1.0 };
         Writer {
             text: String::new(),
+            source: u32::MAX,
+            lines: Vec::new(),
             unit,
             places: options.places(),
             language: options.language,
@@ -31,6 +36,7 @@ impl Writer {
     pub fn bare(&mut self, line: &str) {
         self.text.push_str(line);
         self.text.push('\n');
+        self.lines.push(self.source);
     }
 
     /// A block.

@@ -1,17 +1,19 @@
 //! `gcc-robot lsp`: what the language server asks of the command. Project files, machines, plans and targets are read
 //! and made here as `check` and `build` do.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
 use clap::Parser;
+use gr_canon::{At, Call, CallFrame, FrameId, Mark, Printer, Sink};
 use gr_lsp::Settings;
 use gr_lsp::host::{Host, Made, MadeFile, OutputJob, Plan, Station};
 use gr_text::{Diagnostic, Encoding, FileId};
 
 use crate::emit::{Artifact, Built, Goal, TargetOptions, build, stem};
 use crate::options::{LintArgs, SetupArgs, UnitArg};
-use crate::pipeline::{Unit, motion};
+use crate::pipeline::{Unit, motion, run};
 use crate::project::Project;
 use crate::render::Renderer;
 use crate::setup::{assembled, modeline};
@@ -135,12 +137,56 @@ impl Host for Editor {
             return Err(format!("the machine {machine} can't be read"));
         }
         let unit = Unit::new(job.path, job.text.clone(), Encoding::Utf8, station);
+        if job.target == "canon" && !unit.exchange {
+            return Ok(canon(job, &unit));
+        }
         let goal = Goal { target: job.target, options: &options, machine: station.machine.as_ref(), from_line: None, file: None };
         match build(&unit, &goal) {
             Err(checked) => Ok(Made { files: Vec::new(), found: checked.found }),
             Ok(Err(mistake)) => Err(mistake),
             Ok(Ok((built, checked))) => Ok(made(job, built, checked.found)),
         }
+    }
+}
+
+/// Canonical calls, each with the line it comes from.
+fn canon(job: &OutputJob<'_>, unit: &Unit) -> Made {
+    let printer = Printer::new(Vec::new(), crate::setup::version_of(unit.setup.dialect));
+    match run(unit, Mapped { printer, lines: Vec::new(), callers: BTreeMap::new() }) {
+        Err(checked) => Made { files: Vec::new(), found: checked.found },
+        Ok((mapped, _, checked)) => {
+            let artifact = Artifact { lines: mapped.lines, ..Artifact::new("", mapped.printer.into_inner()) };
+            made(job, Built { artifacts: vec![artifact], ..Built::default() }, checked.found)
+        }
+    }
+}
+
+/// Notes for every call that is printed which line of the program asked for it.
+struct Mapped {
+    printer: Printer<Vec<u8>>,
+    lines: Vec<u32>,
+    /// Line of the main file that a call leads back to.
+    callers: BTreeMap<FrameId, u32>,
+}
+
+impl Sink for Mapped {
+    fn call(&mut self, at: &At<'_>, call: &Call) {
+        self.printer.call(at, call);
+        let line = if at.file == FileId(0) { at.line } else { self.callers.get(&at.frame).copied().unwrap_or(u32::MAX) };
+        self.lines.resize(usize::try_from(self.printer.count()).unwrap_or(self.lines.len()), line);
+    }
+    fn frame(&mut self, id: FrameId, frame: &CallFrame) {
+        let line = if frame.file == FileId(0) { Some(frame.line) } else { self.callers.get(&frame.parent).copied() };
+        if let Some(line) = line {
+            self.callers.insert(id, line);
+        }
+        self.printer.frame(id, frame);
+    }
+    fn mark(&mut self, at: &At<'_>, mark: &Mark) {
+        self.printer.mark(at, mark);
+    }
+    fn print(&mut self, text: &str) {
+        self.printer.print(text);
     }
 }
 
@@ -161,9 +207,13 @@ fn made(job: &OutputJob<'_>, built: Built, mut found: Vec<Diagnostic>) -> Made {
     let extension = gr_spec::TargetDef::find(job.target).map_or("txt", |t| t.extension);
     let name = stem(job.path);
     let file = |a: Artifact| MadeFile {
-        name: if a.suffix.is_empty() { format!("{name}.{extension}") } else { format!("{name}{}", a.suffix) },
+        name: match a.name {
+            Some(own) => own,
+            None if a.suffix.is_empty() => format!("{name}.{extension}"),
+            None => format!("{name}{}", a.suffix),
+        },
         bytes: a.bytes,
-        lines: Vec::new(),
+        lines: a.lines,
     };
     Made { files: built.artifacts.into_iter().map(file).collect(), found }
 }

@@ -10,6 +10,8 @@ pub mod lenses;
 pub mod modes;
 pub mod names;
 pub mod outline;
+#[cfg(test)]
+mod tests;
 pub mod tokens;
 
 pub use doc::Doc;

@@ -7,6 +7,8 @@ pub mod hover;
 pub mod lenses;
 pub mod names;
 pub mod outline;
+#[cfg(test)]
+mod tests;
 
 use gr_p21::{Exchange, Kind, Value};
 use gr_step::{Attribute, Entity, Model, Node, Type};

@@ -1,0 +1,99 @@
+//! Machine files, the project file, tool tables.
+
+use serde_json::json;
+
+use crate::client::{Client, tree};
+
+const MACHINE: &str = "\
+format = 1
+id = \"shop/mill\"
+title = \"Our mill\"
+kind = \"mill\"
+source = \"maker's manual, page 3\"
+
+[kinematics]
+kind = \"cartesian\"
+
+[[joint]]
+name = \"X\"
+type = \"prismatic\"
+word = \"X\"
+min = -400
+max = 400
+speed = 400
+";
+
+#[test]
+fn machine_files() {
+    let mut c = Client::new(&[("mill.toml", MACHINE)], json!({}));
+    let uri = c.open("mill.toml", None);
+    let found = c.diagnostics(&uri);
+    assert!(found.is_empty(), "{found:?}");
+    c.edit(&uri, "min = -400", "minn = -400");
+    let found = c.diagnostics(&uri);
+    assert_eq!(found[0]["code"], "E0501", "{found:?}");
+    assert_eq!(c.place(&uri, &found[0]["range"]), "mill.toml:14 minn");
+    c.edit(&uri, "minn = -400", "min = -400");
+    let h = c.hover(&uri, "ma|x = 400");
+    assert!(h.starts_with("**max** (number)") && h.contains("maker's manual, page 3"), "{h}");
+    c.edit(&uri, "speed = 400\n", "speed = 400\n\ntype = \"\n");
+    let keys = c.labels(&uri, "speed = 400\n|\n");
+    assert!(keys.contains(&"rapid".to_string()) && !keys.contains(&"min".to_string()), "{keys:?}");
+    assert_eq!(c.labels(&uri, "type = \"|\n"), ["revolute", "prismatic"]);
+    let symbols = c.request("textDocument/documentSymbol", json!({ "textDocument": { "uri": uri } }));
+    assert_eq!(tree(&symbols, 0), "kinematics [3] 6-7\njoint (X) [3] 9-17\n");
+    let folds = c.request("textDocument/foldingRange", json!({ "textDocument": { "uri": uri } }));
+    assert_eq!(folds.as_array().map(Vec::len), Some(2));
+    c.shut_down();
+}
+
+#[test]
+fn project_files() {
+    let text = "schema = 1\n[project]\nsorces = []\n";
+    let mut c = Client::new(&[("gcc-robot.toml", text)], json!({}));
+    let uri = c.open("gcc-robot.toml", None);
+    let found = c.diagnostics(&uri);
+    assert_eq!(c.place(&uri, &found[0]["range"]), "gcc-robot.toml:3 sorces");
+    c.edit(&uri, "sorces = []", "sources = []\nmachine = \"generic/mi\n");
+    assert!(c.labels(&uri, "machine = \"generic/mi|").contains(&"generic/mill3".to_string()));
+    assert!(c.hover(&uri, "sour|ces").contains("Programs: files"));
+    c.shut_down();
+}
+
+#[test]
+fn a_broken_project_is_told_in_its_file() {
+    let mut c = Client::new(&[("gcc-robot.toml", "schema = 1\n[project]\ntools = \"none.tbl\"\ndialect = \"klingon\"\n[[dialects]]\nfiles = \"*\"\ndialect = \"elvish\"\n"), ("a.ngc", "G21\nM2\n")], json!({}));
+    let uri = c.open("a.ngc", None);
+    let _ = c.diagnostics(&uri);
+    assert!(c.found.keys().any(|u| u.ends_with(".tbl") || u.ends_with("gcc-robot.toml")) || c.lives());
+    c.shut_down();
+}
+
+#[test]
+fn tool_tables() {
+    let text = "T1 P1 D10 Z50 ;end mill\nT2 P2 D\n";
+    let mut c = Client::new(&[("tools.tbl", text)], json!({}));
+    let uri = c.open("tools.tbl", None);
+    let found = c.diagnostics(&uri);
+    assert_eq!(c.place(&uri, &found[0]["range"]), "tools.tbl:2 D");
+    c.edit(&uri, "T2 P2 D\n", "T2 P2 D6 \n");
+    assert!(c.diagnostics(&uri).is_empty());
+    assert!(c.hover(&uri, "D1|0 Z50").contains("**T1** pocket 1, diameter 10 mm, offset Z50"));
+    assert_eq!(c.labels(&uri, "T2 P2 D6 |")[0], "Z");
+    let symbols = c.request("textDocument/documentSymbol", json!({ "textDocument": { "uri": uri } }));
+    assert_eq!(tree(&symbols, 0), "T1 (⌀10 end mill) [14] 0-0\nT2 (⌀6 ) [14] 1-1\n");
+    c.shut_down();
+}
+
+#[test]
+fn programs_follow_their_tool_table() {
+    let part = "G21\nT7 M6\nG43 H7\nM2\n";
+    let mut c = Client::new(&[("a.ngc", part), ("tools.tbl", "T7 P7 Z10 ;old\n"), ("gcc-robot.toml", "schema = 1\n[project]\ntools = \"tools.tbl\"\n")], json!({}));
+    let uri = c.open("a.ngc", None);
+    assert!(c.hover(&uri, "T|7 M6").contains("old"));
+    std::fs::write(c.path("tools.tbl"), "T7 P7 Z10 ;new\n").expect("written");
+    let changed = c.uri("tools.tbl");
+    c.notify("workspace/didChangeWatchedFiles", json!({ "changes": [{ "uri": changed, "type": 2 }] }));
+    assert!(c.hover(&uri, "T|7 M6").contains("new"));
+    c.shut_down();
+}

@@ -1,0 +1,389 @@
+//! G-code.
+
+use serde_json::{Value, json};
+
+use crate::client::{Client, apply, tree, with_hints};
+
+pub const PART: &str = "\
+(--- part of the tests)
+G21 G17 G90 G40 G49
+#<depth> = 2
+#101 = [#<depth> * 3]
+T1 M6 (end mill)
+S3000 M3
+G43 H1
+G0 X0 Y0 Z5
+(--- slot)
+G1 Z-#<depth> F300
+X10
+G2 X20 Y10 I0 J10 F600
+G3 X10 Y20 R10
+G91
+X-5
+G90
+o<hole> sub
+  G0 X#1 Y#2
+  G81 Z-5 R1 F100
+  G80
+o<hole> endsub
+T2 M6 (drill)
+G43 H2
+o<hole> call [30] [40]
+o<hole> call [50] [#101]
+o100 if [#101 GT 5]
+  G0 Z20
+o100 endif
+M5 M9
+M2
+";
+
+pub const TABLE: &str = "T1 P1 D10 Z50 ;end mill ten\nT2 P2 D5 Z60.5 ;drill five\n";
+pub const PROJECT: &str = "schema = 1\n\n[project]\nsources = [\"*.ngc\"]\ntools = \"tools.tbl\"\n";
+
+pub fn part() -> (Client, String) {
+    let mut c = Client::new(&[("part.ngc", PART), ("tools.tbl", TABLE), ("gcc-robot.toml", PROJECT)], json!({}));
+    let uri = c.open("part.ngc", None);
+    (c, uri)
+}
+
+fn whole(c: &Client, uri: &str) -> Value {
+    json!({ "textDocument": { "uri": uri }, "range": { "start": { "line": 0, "character": 0 }, "end": { "line": c.text(uri).lines().count(), "character": 0 } } })
+}
+
+#[test]
+fn diagnostics_are_pushed_and_follow_edits() {
+    let (mut c, uri) = part();
+    let errors = |found: &[Value]| found.iter().filter(|d| d["severity"] == 1).map(|d| d["code"].as_str().unwrap_or("").to_string()).collect::<Vec<_>>();
+    let found = c.diagnostics(&uri);
+    assert_eq!(errors(&found), [""; 0], "{found:?}");
+    c.edit(&uri, "I0 J10", "I0 J9");
+    let found = c.diagnostics(&uri);
+    assert_eq!(errors(&found), ["E0203"]);
+    let arc = found.iter().find(|d| d["code"] == "E0203").expect("the arc");
+    assert_eq!(c.place(&uri, &arc["range"]), "part.ngc:12 I0 J9");
+    assert!(arc["message"].as_str().is_some_and(|m| m.contains("radius")), "{arc}");
+    assert_eq!(arc["data"]["slug"], "arc/radius-mismatch");
+    c.edit(&uri, "I0 J9", "I0 J10");
+    assert_eq!(errors(&c.diagnostics(&uri)), [""; 0]);
+    c.notify("textDocument/didClose", json!({ "textDocument": { "uri": uri } }));
+    c.shut_down();
+}
+
+#[test]
+fn diagnostics_are_pulled() {
+    let (mut c, uri) = part();
+    c.edit(&uri, "R10", "R1");
+    let document = json!({ "textDocument": { "uri": uri } });
+    let report = c.request("textDocument/diagnostic", document.clone());
+    assert_eq!(report["kind"], "full");
+    assert!(report["items"].as_array().is_some_and(|i| i.iter().any(|d| d["code"] == "E0204")), "{report}");
+    let mut again = document;
+    again["previousResultId"] = report["resultId"].clone();
+    assert_eq!(c.request("textDocument/diagnostic", again)["kind"], "unchanged");
+    c.shut_down();
+}
+
+#[test]
+fn hover_words_blocks_parameters_tools() {
+    let (mut c, uri) = part();
+    let mut all = String::new();
+    for at in ["G2| X20", "G1 Z-#<de|pth> F300", "#1|01 = [", "T|1 M6", "F6|00", "G8|1 Z-5", "o100 i|f", "#101 G|T 5", "X|-5\n", "M|2\n", "(--- s|lot)"] {
+        all += &format!("=== {at}\n{}\n", c.hover(&uri, at));
+    }
+    insta::assert_snapshot!(all);
+    c.shut_down();
+}
+
+#[test]
+fn inlay_hints_and_their_switches() {
+    let (mut c, uri) = part();
+    let range = whole(&c, &uri);
+    let hints = c.request("textDocument/inlayHint", range.clone());
+    insta::assert_snapshot!(with_hints(PART, &hints));
+    // Each kind can be switched off.
+    c.settings = json!({ "hints": { "motion": false, "position": "off", "feed": false, "modes": false, "time": false, "arc": false, "values": false } });
+    c.notify("workspace/didChangeConfiguration", json!({ "settings": {} }));
+    c.wait_for("workspace/inlayHint/refresh");
+    assert_eq!(c.request("textDocument/inlayHint", range.clone()), json!([]));
+    c.settings = json!({ "hints": { "motion": false, "position": "all", "feed": false, "modes": false, "time": false, "arc": false, "values": false } });
+    c.asked.clear();
+    c.notify("workspace/didChangeConfiguration", json!({ "settings": {} }));
+    c.wait_for("workspace/inlayHint/refresh");
+    let all = c.request("textDocument/inlayHint", range).to_string();
+    assert!(all.contains("→ X20 Y10") && !all.contains("R10"), "{all}");
+    c.shut_down();
+}
+
+#[test]
+fn completion_knows_the_modal_state() {
+    let (mut c, uri) = part();
+    let has = |list: &[String], label: &str| list.iter().any(|l| l == label);
+    c.edit(&uri, "G80\n", "G80\n  \n  G83 Z-5 \n  T\n  G1 X#<\n  G1 X[S\n  o<ho\n  (M\n");
+    let codes = c.labels(&uri, "G80\n  |\n");
+    assert!(has(&codes, "G1") && has(&codes, "M3") && has(&codes, "G83 X Y Z R Q"), "{codes:?}");
+    // What G83 still needs comes first; no second motion code.
+    let words = c.labels(&uri, "G83 Z-5 |");
+    assert_eq!(words[..2], ["R", "Q"], "{words:?}");
+    assert!(!has(&words, "G1") && has(&words, "G90"), "{words:?}");
+    assert_eq!(c.labels(&uri, "  T|\n  G1"), ["T1", "T2"]);
+    let names = c.labels(&uri, "X#<|");
+    assert!(names[0] == "#<depth>" && has(&names, "#<_x>"), "{names:?}");
+    assert_eq!(c.labels(&uri, "X[S|"), ["SIN", "SQRT"]);
+    assert_eq!(c.labels(&uri, "o<ho|\n"), ["o<hole> call"]);
+    assert_eq!(c.labels(&uri, "(M|\n"), ["MSG"]);
+    c.shut_down();
+}
+
+#[test]
+fn signatures_of_cycles_and_calls() {
+    let (mut c, uri) = part();
+    c.edit(&uri, "M5 M9", "G83 Z-5 R1 Q\no<hole> call [1] [\nM5 M9");
+    let at = c.at(&uri, "G83 Z-5 R1 Q|");
+    let help = c.request("textDocument/signatureHelp", at);
+    let label = help["signatures"][0]["label"].as_str().unwrap_or("").to_string();
+    let active = help["activeParameter"].as_u64().expect("a word") as usize;
+    let range = &help["signatures"][0]["parameters"][active]["label"];
+    let part = &label[range[0].as_u64().unwrap() as usize..range[1].as_u64().unwrap() as usize];
+    assert!(label.starts_with("G83") && part.contains('Q'), "{help}");
+    let at = c.at(&uri, "call [1] [|");
+    let help = c.request("textDocument/signatureHelp", at);
+    assert_eq!((help["signatures"][0]["label"].as_str(), help["activeParameter"].as_u64()), (Some("o<hole> call [#1] [#2]"), Some(1)));
+    c.shut_down();
+}
+
+#[test]
+fn definition_and_references() {
+    let (mut c, uri) = part();
+    let mut go = |at: &str| {
+        let at = c.at(&uri, at);
+        let found = c.request("textDocument/definition", at);
+        c.places(&found)
+    };
+    assert_eq!(go("o<ho|le> call [30]"), ["part.ngc:17 hole"]);
+    assert_eq!(go("G1 Z-#<dep|th>"), ["part.ngc:3 depth"]);
+    assert_eq!(go("o100 end|if"), [""; 0]);
+    assert_eq!(go("o1|00 endif"), ["part.ngc:26 100"]);
+    assert_eq!(go("T|2 M6"), ["tools.tbl:2 T2 P2 D5 Z60.5 ;drill five"]);
+    let mut at = c.at(&uri, "#10|1 = ");
+    at["context"] = json!({ "includeDeclaration": true });
+    let found = c.request("textDocument/references", at);
+    assert_eq!(c.places(&found), ["part.ngc:25 101", "part.ngc:26 101", "part.ngc:4 101"]);
+    let at = c.at(&uri, "#<dep|th> = 2");
+    let lights = c.request("textDocument/documentHighlight", at);
+    let kinds: Vec<_> = lights.as_array().expect("a list").iter().map(|h| h["kind"].as_u64()).collect();
+    assert_eq!(kinds, [Some(3), Some(2), Some(2)]);
+    c.shut_down();
+}
+
+#[test]
+fn names_over_files() {
+    let sub = "o<pocket> sub\n  G1 X#1\no<pocket> endsub\n";
+    let main = "G21 G90 F100\no<pocket> call [1]\nM2\n";
+    let other = "G21\no<pocket> call [2]\no<pocket> call [3]\nM2\n";
+    let mut c = Client::new(&[("main.ngc", main), ("other.ngc", other), ("pocket.ngc", sub)], json!({}));
+    let uri = c.open("main.ngc", None);
+    let at = c.at(&uri, "o<poc|ket> call");
+    let found = c.request("textDocument/definition", at.clone());
+    assert_eq!(c.places(&found), ["pocket.ngc:1 pocket"]);
+    let mut references = at.clone();
+    references["context"] = json!({ "includeDeclaration": false });
+    let found = c.request("textDocument/references", references);
+    assert_eq!(c.places(&found), ["main.ngc:2 pocket", "other.ngc:2 pocket", "other.ngc:3 pocket", "pocket.ngc:3 pocket"]);
+    let mut rename = at.clone();
+    rename["newName"] = "slot".into();
+    let edit = c.request("textDocument/rename", rename);
+    assert_eq!(edit["changes"].as_object().map(|o| o.len()), Some(3));
+    assert_eq!(c.edited(&uri, &edit), main.replace("pocket", "slot"));
+    assert_eq!(apply(sub, &edit["changes"][c.uri("pocket.ngc")]), sub.replace("pocket", "slot"));
+    let links = c.request("textDocument/documentLink", json!({ "textDocument": { "uri": uri } }));
+    assert_eq!(links[0]["target"], c.uri("pocket.ngc"));
+    // Call hierarchy over files.
+    let item = c.request("textDocument/prepareCallHierarchy", at)[0].clone();
+    assert_eq!((item["name"].as_str(), item["detail"].as_str()), (Some("o<pocket>"), Some("pocket.ngc")));
+    let sub_uri = c.open("pocket.ngc", None);
+    let _ = c.diagnostics(&sub_uri);
+    let calls = c.request("callHierarchy/incomingCalls", json!({ "item": item }));
+    let mut from: Vec<String> = calls.as_array().expect("a list").iter().map(|f| format!("{} {}", f["from"]["name"].as_str().unwrap_or(""), f["fromRanges"].as_array().map_or(0, Vec::len))).collect();
+    from.sort();
+    assert_eq!(from, ["main.ngc 1", "other.ngc 2"]);
+    let symbols = c.request("workspace/symbol", json!({ "query": "pok" }));
+    assert_eq!(symbols[0]["name"], "o<pocket>");
+    c.shut_down();
+}
+
+#[test]
+fn rename_of_parameters_and_labels() {
+    let (mut c, uri) = part();
+    let at = c.at(&uri, "#<dep|th> = 2");
+    let range = c.request("textDocument/prepareRename", at.clone());
+    assert_eq!(range["placeholder"], "depth");
+    let mut rename = at;
+    rename["newName"] = "#<deep>".into();
+    let edit = c.request("textDocument/rename", rename.clone());
+    assert_eq!(c.edited(&uri, &edit), PART.replace("<depth>", "<deep>"));
+    rename["newName"] = "a b".into();
+    let id = c.begin("textDocument/rename", rename);
+    assert!(c.answer(id)["error"]["message"].as_str().is_some_and(|m| m.contains("letters")), "bad names are refused");
+    let mut rename = c.at(&uri, "o1|00 if");
+    rename["newName"] = "7".into();
+    let edit = c.request("textDocument/rename", rename);
+    assert_eq!(c.edited(&uri, &edit), PART.replace("o100", "o7"));
+    let at = c.at(&uri, "o1|00 if");
+    let linked = c.request("textDocument/linkedEditingRange", at);
+    assert_eq!(linked["ranges"].as_array().map(Vec::len), Some(2));
+    c.shut_down();
+}
+
+#[test]
+fn jumps_to_line_numbers() {
+    let text = "O0001\nN10 G21 G90 F100\nN20 G1 X1.\nIF [#100 GT 3] GOTO 40\n#100=#100+1\nGOTO 20\nN40 M30\n";
+    let mut c = Client::new(&[("a.ngc", text), ("gcc-robot.toml", "schema = 1\n[project]\ndialect = \"fanuc-mill\"\n")], json!({}));
+    let uri = c.open("a.ngc", None);
+    let at = c.at(&uri, "GOTO 2|0");
+    let found = c.request("textDocument/definition", at);
+    assert_eq!(c.places(&found), ["a.ngc:3 20"]);
+    let mut rename = c.at(&uri, "N4|0");
+    rename["newName"] = "50".into();
+    let edit = c.request("textDocument/rename", rename);
+    assert_eq!(c.edited(&uri, &edit), text.replace("40", "50"));
+    c.shut_down();
+}
+
+#[test]
+fn outline_folding_selection() {
+    let (mut c, uri) = part();
+    let document = json!({ "textDocument": { "uri": uri } });
+    let symbols = c.request("textDocument/documentSymbol", document.clone());
+    insta::assert_snapshot!(tree(&symbols, 0));
+    let folds = c.request("textDocument/foldingRange", document);
+    let lines: Vec<_> = folds.as_array().expect("a list").iter().map(|f| (f["startLine"].as_u64(), f["endLine"].as_u64())).collect();
+    assert_eq!(lines, [(Some(4), Some(20)), (Some(16), Some(20)), (Some(21), Some(29)), (Some(25), Some(27))]);
+    let positions = json!({ "textDocument": { "uri": uri }, "positions": [c.position(&uri, "X1|0\nG2")] });
+    let mut chain = c.request("textDocument/selectionRange", positions)[0].clone();
+    let mut sizes = Vec::new();
+    while !chain.is_null() {
+        sizes.push(c.place(&uri, &chain["range"]).split_once(' ').map_or(0, |p| p.1.len()));
+        chain = chain["parent"].clone();
+    }
+    assert_eq!(sizes[..2], [2, 3]);
+    assert!(sizes.is_sorted() && sizes.last() == Some(&PART.len()), "{sizes:?}");
+    c.shut_down();
+}
+
+#[test]
+fn lenses_of_tools_and_subs() {
+    let (mut c, uri) = part();
+    let lenses = c.request("textDocument/codeLens", json!({ "textDocument": { "uri": uri } }));
+    let all: Vec<String> = lenses.as_array().expect("a list").iter().map(|l| format!("{}: {}", l["range"]["start"]["line"], l["command"]["title"].as_str().unwrap_or(""))).collect();
+    insta::assert_snapshot!(all.join("\n"));
+    c.shut_down();
+}
+
+#[test]
+fn tokens_full_range_delta() {
+    let (mut c, uri) = part();
+    let types: Vec<String> = c.capabilities["semanticTokensProvider"]["legend"]["tokenTypes"].as_array().expect("a legend").iter().map(|t| t.as_str().unwrap_or("").into()).collect();
+    let document = json!({ "textDocument": { "uri": uri } });
+    let full = c.request("textDocument/semanticTokens/full", document.clone());
+    let show = |data: &Value| -> Vec<String> {
+        let n: Vec<u64> = data.as_array().expect("numbers").iter().filter_map(Value::as_u64).collect();
+        let (mut line, mut column) = (0, 0);
+        n.chunks(5)
+            .map(|t| {
+                (line, column) = (line + t[0], if t[0] == 0 { column + t[1] } else { t[1] });
+                let text: String = PART.lines().nth(line as usize).unwrap_or("").chars().skip(column as usize).take(t[2] as usize).collect();
+                format!("{text}={}", types[t[3] as usize])
+            })
+            .collect()
+    };
+    let all = show(&full["data"]);
+    assert_eq!(all[..3], ["(--- part of the tests)=comment", "G21=macro", "G17=macro"]);
+    assert!(["#<depth>=variable", "G2=keyword", "10=number", "M6=method", "o=keyword", "sub=keyword", "GT=operator"].iter().all(|t| all.iter().any(|a| a == t)), "{all:?}");
+    let mut range = document.clone();
+    range["range"] = json!({ "start": { "line": 11, "character": 0 }, "end": { "line": 11, "character": 20 } });
+    let some = c.request("textDocument/semanticTokens/range", range);
+    assert_eq!(show(&some["data"])[0], "G2=keyword");
+    c.edit(&uri, "X20", "X21");
+    let mut delta = document.clone();
+    delta["previousResultId"] = full["resultId"].clone();
+    let none = c.request("textDocument/semanticTokens/full/delta", delta.clone());
+    assert_eq!(none["edits"], json!([]));
+    c.edit(&uri, "X21", "X[20]");
+    delta["previousResultId"] = none["resultId"].clone();
+    let some = c.request("textDocument/semanticTokens/full/delta", delta);
+    assert_eq!(some["edits"].as_array().map(Vec::len), Some(1), "{some}");
+    c.shut_down();
+}
+
+#[test]
+fn formatting_document_range_and_while_typing() {
+    let text = "g21 g90\nn10 g1x1y2f100\no1 if [1]\ng0x5\no1 endif\nm2\n";
+    let mut c = Client::new(&[("a.ngc", text)], json!({}));
+    let uri = c.open("a.ngc", None);
+    let options = json!({ "tabSize": 2, "insertSpaces": true });
+    let edits = c.request("textDocument/formatting", json!({ "textDocument": { "uri": uri }, "options": options }));
+    assert_eq!(apply(text, &edits), "G21 G90\nN10 G1 X1 Y2 F100\no1 if [1]\n  G0 X5\no1 endif\nM2\n");
+    let range = json!({ "start": { "line": 3, "character": 0 }, "end": { "line": 4, "character": 0 } });
+    let edits = c.request("textDocument/rangeFormatting", json!({ "textDocument": { "uri": uri }, "range": range, "options": options }));
+    assert_eq!(apply(text, &edits), text.replace("g0x5", "  G0 X5"));
+    c.edit(&uri, "f100\n", "f100\n\n");
+    let edits = c.request(
+        "textDocument/onTypeFormatting",
+        json!({ "textDocument": { "uri": uri }, "position": { "line": 2, "character": 0 }, "ch": "\n", "options": options }),
+    );
+    assert_eq!(apply(c.text(&uri), &edits), "g21 g90\nN10 G1 X1 Y2 F100\nN20 \no1 if [1]\ng0x5\no1 endif\nm2\n");
+    c.shut_down();
+}
+
+/// Titles of the actions at a place, and the text after one of them.
+fn act(c: &mut Client, uri: &str, at: &str, wanted: &str) -> String {
+    let position = c.position(uri, at);
+    let params = json!({ "textDocument": { "uri": uri }, "range": { "start": position, "end": position }, "context": { "diagnostics": [] } });
+    let actions = c.request("textDocument/codeAction", params);
+    let list = actions.as_array().expect("a list");
+    let titles: Vec<&str> = list.iter().filter_map(|a| a["title"].as_str()).collect();
+    let action = list.iter().find(|a| a["title"].as_str().is_some_and(|t| t.starts_with(wanted)));
+    let action = action.unwrap_or_else(|| panic!("{wanted} is not among {titles:?}"));
+    c.edited(uri, &action["edit"])
+}
+
+#[test]
+fn actions_rewrite() {
+    let (mut c, uri) = part();
+    assert_eq!(act(&mut c, &uri, "G|2 X20", "Write the arc with its radius"), PART.replace("I0 J10 F600", "R10 F600"));
+    assert_eq!(act(&mut c, &uri, "G|3 X10", "Write the arc with its centre"), PART.replace("R10", "I-10 J0"));
+    let expanded = act(&mut c, &uri, "o<hole> c|all [30]", "Write out this call");
+    insta::assert_snapshot!(expanded.lines().skip(22).take(9).collect::<Vec<_>>().join("\n"));
+    let numbered = act(&mut c, &uri, "G|2 X20", "Number blocks");
+    assert!(numbered.contains("N10 G21") && numbered.contains("N20 #<depth>"), "{numbered}");
+    c.shut_down();
+}
+
+#[test]
+fn actions_for_cycles_compensation_units_and_ends() {
+    let text = "G21 G90 G17 F100 S1000 M3\nG0 X0 Y0 Z5\nG83 X5 Y5 Z-2 R1 Q1\nG80\nG41.1 D4\nG1 X10 Y0\nX20\nY20\nG40\n";
+    let mut c = Client::new(&[("a.ngc", text)], json!({}));
+    let uri = c.open("a.ngc", None);
+    insta::assert_snapshot!(act(&mut c, &uri, "G8|3", "Write out this G83"));
+    insta::assert_snapshot!(act(&mut c, &uri, "X|20\n", "Write out this compensated move"));
+    assert_eq!(act(&mut c, &uri, "G2|1", "Add M5 M2"), format!("{text}M5\nM2\n"));
+    let inch = act(&mut c, &uri, "G2|1", "Convert the program to inch");
+    assert!(inch.starts_with("G20 G90 G17 F3.93701 S1000 M3\nG0 X0 Y0 Z0.19685\n"), "{inch}");
+    c.shut_down();
+}
+
+#[test]
+fn fixes_of_diagnostics() {
+    let text = "G21 G90 F100 S100 M3\nG1 XO\nM2\n";
+    let mut c = Client::new(&[("a.ngc", text)], json!({}));
+    let uri = c.open("a.ngc", None);
+    let found = c.diagnostics(&uri);
+    let with_fix = found.iter().find(|d| d["data"]["fixes"].as_u64().unwrap_or(0) > 0);
+    // Whatever diagnostics carry is offered at their place.
+    if let Some(d) = with_fix {
+        let params = json!({ "textDocument": { "uri": uri }, "range": d["range"], "context": { "diagnostics": [d], "only": ["quickfix"] } });
+        let actions = c.request("textDocument/codeAction", params);
+        assert!(actions.as_array().is_some_and(|a| a.iter().any(|a| a["kind"] == "quickfix" && !a["diagnostics"].is_null())), "{actions}");
+    }
+    c.shut_down();
+}

@@ -1,0 +1,168 @@
+//! What a client may do to the server, and what it must survive.
+
+use serde_json::{Value, json};
+
+use crate::client::Client;
+
+#[test]
+fn it_says_what_it_can() {
+    let c = Client::new(&[], json!({}));
+    let cap = &c.capabilities;
+    assert_eq!((cap["positionEncoding"].as_str(), cap["textDocumentSync"]["change"].as_u64()), (Some("utf-16"), Some(2)));
+    for provider in crate::table::PROVIDERS {
+        assert!(!cap[provider].is_null(), "{provider}");
+    }
+    c.shut_down();
+}
+
+#[test]
+fn columns_in_bytes_and_utf16() {
+    let text = "(größe 𝄞) G1 XO\nM2\n";
+    let column = |general: Value| {
+        let mut c = Client::with(&[("a.ngc", text)], json!({}), general);
+        let uri = c.open("a.ngc", None);
+        let found = c.diagnostics(&uri);
+        let at = found.iter().find(|d| d["severity"] == 1).expect("an error")["range"]["start"]["character"].as_u64();
+        c.shut_down();
+        at.expect("a number")
+    };
+    let utf16 = column(json!({}));
+    let utf8 = column(json!({ "positionEncodings": ["utf-8", "utf-16"] }));
+    // ö and ß are a byte longer than a unit, the clef two.
+    assert_eq!(utf8 - utf16, 4);
+}
+
+#[test]
+fn edits_beyond_the_text_and_foreign_messages() {
+    let mut c = Client::new(&[("a.ngc", "G21\n")], json!({}));
+    let uri = c.open("a.ngc", None);
+    let far = json!({ "start": { "line": 900, "character": 7 }, "end": { "line": 4_294_967_295u32, "character": 4_294_967_295u32 } });
+    c.change(&uri, json!([{ "range": far, "text": "M2\n" }]), "G21\nM2\n".into());
+    let back = json!({ "start": { "line": 1, "character": 0 }, "end": { "line": 0, "character": 0 } });
+    c.change(&uri, json!([{ "range": back, "text": "" }]), "G21\nM2\n".into());
+    let _ = c.diagnostics(&uri);
+    let far = json!({ "textDocument": { "uri": uri }, "position": { "line": 88, "character": 99 } });
+    for method in ["hover", "completion", "definition", "prepareRename", "signatureHelp", "documentHighlight", "prepareCallHierarchy", "linkedEditingRange"] {
+        let id = c.begin(&format!("textDocument/{method}"), far.clone());
+        assert!(c.answer(id).get("error").is_none(), "{method}");
+    }
+    let id = c.begin("textDocument/hover", json!({ "wrong": true }));
+    assert!(c.answer(id)["error"].is_object());
+    let id = c.begin("no/such", json!({}));
+    assert!(c.answer(id)["error"].is_object());
+    let id = c.begin("textDocument/hover", json!({ "textDocument": { "uri": "untitled:Untitled-1" }, "position": { "line": 0, "character": 0 } }));
+    assert_eq!(c.answer(id)["result"], Value::Null);
+    c.raw(b"Content-Length: 9\r\n\r\n{\"a\": [1,");
+    c.raw(b"Content-Length: 2\r\n\r\n\xFF\xFE");
+    let at = json!({ "textDocument": { "uri": uri }, "position": { "line": 0, "character": 1 } });
+    assert!(c.request("textDocument/hover", at)["contents"]["value"].as_str().is_some_and(|t| t.starts_with("**G21**")));
+    c.shut_down();
+}
+
+#[test]
+fn any_bytes_are_a_document() {
+    let mut c = Client::new(&[], json!({}));
+    let strange = ["", "\u{0}\u{1}\u{7f}", "((((((((", "#<#<#<[[[[", "o o o o", "G\u{301}1 X\u{1F600}", "%\n%\n%", "\r\r\n\n\r", "ISO-10303-21;#1=(((((", "ISO-10303-21;'"];
+    for (n, text) in strange.iter().enumerate() {
+        let uri = c.open(&format!("{n}.ngc"), Some(text));
+        let _ = c.diagnostics(&uri);
+        let document = json!({ "textDocument": { "uri": uri } });
+        for method in ["documentSymbol", "foldingRange", "codeLens", "semanticTokens/full", "documentLink"] {
+            let _ = c.request(&format!("textDocument/{method}"), document.clone());
+        }
+        for character in 0..4 {
+            let at = json!({ "textDocument": { "uri": uri }, "position": { "line": 0, "character": character } });
+            for method in ["hover", "completion", "definition", "signatureHelp"] {
+                let _ = c.request(&format!("textDocument/{method}"), at.clone());
+            }
+        }
+    }
+    assert!(c.lives());
+    c.shut_down();
+}
+
+#[test]
+fn a_runaway_loop_is_cut_short_by_the_next_key() {
+    let text = "#1 = 0\no1 while [1 EQ 1]\n  #1 = [#1 + 1]\n  o2 while [1 EQ 1]\n    #2 = [#2 + 1]\n  o2 endwhile\no1 endwhile\nM2\n";
+    let mut c = Client::new(&[("a.ngc", text)], json!({}));
+    let uri = c.open("a.ngc", None);
+    std::thread::sleep(std::time::Duration::from_millis(300));
+    c.edit(&uri, "o1 while [1 EQ 1]", "o1 while [1 EQ 2]");
+    c.edit(&uri, "o2 while [1 EQ 1]", "o2 while [1 EQ 2]");
+    let began = std::time::Instant::now();
+    let _ = c.diagnostics(&uri);
+    assert!(began.elapsed() < std::time::Duration::from_secs(20), "{:?}", began.elapsed());
+    c.shut_down();
+}
+
+#[test]
+fn requests_can_be_cancelled() {
+    let text = format!("#1 = 0\no1 while [#1 LT 900000]\n#1 = [#1 + 1]\no1 endwhile\n{}M2\n", "G0 X1\n".repeat(10));
+    let mut c = Client::new(&[("a.ngc", &text)], json!({}));
+    let uri = c.open("a.ngc", None);
+    let at = json!({ "textDocument": { "uri": uri }, "position": { "line": 6, "character": 1 } });
+    let id = c.begin("textDocument/hover", at.clone());
+    c.notify("$/cancelRequest", json!({ "id": id }));
+    let answer = c.answer(id);
+    assert!(answer["error"]["code"] == -32800 || answer["result"].is_object(), "{answer}");
+    // Everything goes on.
+    let other = c.open("b.ngc", Some("G21\nM2\n"));
+    assert!(c.hover(&other, "G2|1").starts_with("**G21**"));
+    c.shut_down();
+}
+
+#[test]
+fn big_files_show_progress() {
+    let text = format!("G21 G90 F100\n{}M2\n", "G1 X1.25 Y2.5 Z-0.125\n".repeat(200_000));
+    let mut c = Client::new(&[], json!({}));
+    let uri = c.open("big.ngc", Some(&text));
+    let _ = c.diagnostics(&uri);
+    c.wait_for("window/workDoneProgress/create");
+    let symbols = c.request("textDocument/documentSymbol", json!({ "textDocument": { "uri": uri } }));
+    assert_eq!(symbols, json!([]));
+    c.shut_down();
+}
+
+#[test]
+fn several_folders() {
+    let other = tempfile::tempdir().expect("a folder");
+    std::fs::write(other.path().join("lib.ngc"), "o<far> sub\no<far> endsub\n").expect("written");
+    let mut c = Client::new(&[("a.ngc", "o<far> call\nM2\n")], json!({}));
+    let uri = c.open("a.ngc", None);
+    let at = c.at(&uri, "o<f|ar> call");
+    assert_eq!(c.request("textDocument/definition", at.clone()), json!([]));
+    let folder = format!("file://{}", other.path().display());
+    c.notify("workspace/didChangeWorkspaceFolders", json!({ "event": { "added": [{ "uri": folder, "name": "lib" }], "removed": [] } }));
+    let found = c.request("textDocument/definition", at.clone());
+    assert!(found[0]["uri"].as_str().is_some_and(|u| u.ends_with("lib.ngc")), "{found}");
+    c.notify("workspace/didChangeWorkspaceFolders", json!({ "event": { "added": [], "removed": [{ "uri": folder, "name": "lib" }] } }));
+    assert_eq!(c.request("textDocument/definition", at), json!([]));
+    c.shut_down();
+}
+
+#[test]
+fn called_files_are_read_again_when_saved() {
+    let mut c = Client::new(&[("a.ngc", "G21 F100\no<b> call\nM2\n"), ("b.ngc", "o<b> sub\nG1 XO\no<b> endsub\n"), ("gcc-robot.toml", "schema = 1\n[project]\nsubs = [\".\"]\n")], json!({}));
+    let uri = c.open("a.ngc", None);
+    let _ = c.diagnostics(&uri);
+    let item = c.at(&uri, "o<|b> call");
+    let found = c.request("textDocument/definition", item);
+    assert_eq!(c.places(&found), ["b.ngc:1 b"]);
+    std::fs::write(c.path("b.ngc"), "o<b> sub\nG1 X0\no<b> endsub\n").expect("written");
+    let saved = c.uri("b.ngc");
+    c.notify("textDocument/didSave", json!({ "textDocument": { "uri": saved } }));
+    c.edit(&uri, "F100", "F101");
+    let after = c.diagnostics(&uri);
+    assert!(after.iter().all(|d| d["severity"] != 1), "{after:?}");
+    c.shut_down();
+}
+
+#[test]
+fn the_dialect_is_what_file_project_and_settings_say() {
+    let mut c = Client::new(&[("a.nc", "G21\nM2\n"), ("sub/gcc-robot.toml", "schema = 1\n[project]\ndialect = \"fanuc-mill\"\n"), ("sub/b.nc", "G21\nM2\n")], json!({ "dialect": "grbl" }));
+    let a = c.open("a.nc", None);
+    assert!(c.hover(&a, "G2|1").to_lowercase().contains("grbl"), "{}", c.hover(&a, "G2|1"));
+    let b = c.open("sub/b.nc", None);
+    assert!(!c.hover(&b, "G2|1").to_lowercase().contains("grbl"));
+    c.shut_down();
+}
