@@ -214,7 +214,11 @@ pub fn unb2013(unit: &Unit, settings: Option<&Path>) -> Result<(Converted, Check
             Ok((Converted { program: out.program, table: out.table, files }, checked))
         }
         Err(faults) => {
-            checked.found.extend(faults);
+            for fault in faults {
+                if !checked.found.contains(&fault) {
+                    checked.found.push(fault);
+                }
+            }
             Err(checked)
         }
     }

@@ -92,6 +92,11 @@ struct Writer<'a> {
     out: Vec<Diagnostic>,
     data: Vec<String>,
     plan: Vec<usize>,
+    operations: Vec<usize>,
+    /// Where the feature's statement was begun; its operations are known at the end.
+    feature_head: String,
+    /// The first feed of the program: technology needs one even before it is used.
+    first_feed: f64,
     elements: Vec<Element>,
     name: String,
     tools: BTreeMap<i32, usize>,
@@ -117,6 +122,12 @@ impl<'a> Writer<'a> {
             out: Vec::new(),
             data: Vec::new(),
             plan: Vec::new(),
+            operations: Vec::new(),
+            feature_head: String::new(),
+            first_feed: program.steps().find_map(|s| match s.op {
+                Op::Feed { linear, .. } if linear > 0.0 => Some(linear),
+                _ => None,
+            }).unwrap_or_default(),
             elements: Vec::new(),
             name: String::new(),
             tools: BTreeMap::new(),
@@ -132,7 +143,8 @@ impl<'a> Writer<'a> {
         w.workpiece = w.add("WORKPIECE('part',$,$,$,$,$,())".into());
         let zero = w.placement([0.0; 3], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]);
         let depth = w.add(format!("PLANE('depth',#{zero})"));
-        w.feature = w.add(format!("TOOLPATH_FEATURE('path',#{},(),#{zero},#{depth})", w.workpiece));
+        w.feature = w.add(String::new());
+        w.feature_head = format!("#{zero},#{depth}");
         w
     }
     fn add(&mut self, text: String) -> usize {
@@ -256,7 +268,7 @@ impl<'a> Writer<'a> {
         }
         let new = Technology {
             tool: s.tool,
-            feed: s.feed,
+            feed: if s.feed > 0.0 { s.feed } else { self.first_feed },
             speed: spindle.speed,
             turn: spindle.turn,
             flood: s.flood,
@@ -293,7 +305,7 @@ impl<'a> Writer<'a> {
             Turn::Ccw => real(t.speed / 60.0),
             Turn::Stop => "0.".into(),
         };
-        let feed = if t.feed > 0.0 { real(t.feed / 1000.0) } else { "$".into() };
+        let feed = real(t.feed.max(0.0) / 1000.0);
         let flag = |b: bool| if b { ".T." } else { ".F." };
         let id = self.add(format!(
             "MILLING_TECHNOLOGY({feed},.TCP.,$,{speed},$,.F.,{},{},$)",
@@ -338,6 +350,7 @@ impl<'a> Writer<'a> {
             "FREEFORM_OPERATION(#{list},$,{},$,$,#{tool},#{technology},#{functions},$,$,$,$)",
             string(&name)
         ));
+        self.operations.push(operation);
         // Rapids are safe where the program leaves the tool.
         let plane = self.placement([0.0, 0.0, height], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]);
         let security = self.add(format!("PLANE('security plane',#{plane})"));
@@ -412,6 +425,9 @@ impl<'a> Writer<'a> {
         let mounted = self.add(format!("WORKPIECE_SETUP(#{},#{zero},$,$,())", self.workpiece));
         let setup = self.add(format!("SETUP('setup',$,#{security},(#{mounted}))"));
         let main = self.add(format!("WORKPLAN('main workplan',({}),$,#{setup},$)", plan.join(",")));
+        let operations: Vec<String> = self.operations.iter().map(|i| format!("#{i}")).collect();
+        let (feature, head) = (self.feature - 1, &self.feature_head);
+        self.data[feature] = format!("TOOLPATH_FEATURE('path',#{},({}),{head})", self.workpiece, operations.join(","));
         self.data[0] = format!("PROJECT({},#{main},(#{}),$,$,$)", string(&self.options.name), self.workpiece);
         let name = string(&self.options.name);
         let mut out = format!(

@@ -7,7 +7,7 @@ use gr_gcode::{Case, Form, FormatOptions, Keyword, LeadingZeros, LineKind, Node,
 use gr_spec::{Dialect, Family};
 use gr_text::{Decoded, Encoding, Span, code};
 
-use crate::exchange::is_exchange;
+use crate::exchange::{is_exchange, not_one};
 use crate::exit::Exit;
 use crate::options::{CaseArg, FmtArgs, Global, LintArgs, RenumberArgs, SetupArgs, StyleArgs, ZerosArg};
 use crate::output::{to_stdout, write_all};
@@ -190,6 +190,15 @@ impl Work {
             Ok(d) => d,
             Err((code, args)) => return self.complain(path, code, &args),
         };
+        if is_exchange(path, &decoded.text)
+            && let Some(d) = not_one(&decoded.text)
+        {
+            let mut sources = Sources::default();
+            sources.add(path.display().to_string(), decoded.text);
+            self.renderer.forget();
+            self.renderer.show(&sources, &d);
+            return Exit::Findings;
+        }
         let text = formatted(path, &decoded.text, &self.station, options);
         if check {
             if text == decoded.text {
