@@ -126,9 +126,32 @@ fn never_converging(bench: &mut Bench, lines: u32, scale: f64) {
     report("G91 at the top, whole file", &mut whole, (150.0 * scale, 150.0 * scale));
 }
 
+/// A subroutine at the top that is called, a loop, and then plain lines.
+fn sub_and_loop(lines: usize) -> String {
+    let drill = "o100 sub\nG0 X#1 Y#2\nG1 Z-1\nG0 Z5\no100 endsub\n";
+    let rows = "#100=0\no101 while [#100 LT 10]\no100 call [#100] [5]\n#100=[#100+1]\no101 endwhile\n";
+    let plain = generate::big(lines.saturating_sub(10));
+    let (header, moves) = plain.split_at(plain.find("G1 X").unwrap_or(0));
+    format!("{drill}{header}{rows}{moves}")
+}
+
+/// A call of a subroutine at the top every hundred lines.
+fn calls(lines: usize) -> String {
+    let plain = generate::big(lines - lines / 100 - 3);
+    let mut text = String::with_capacity(plain.len() + lines);
+    text.push_str("o100 sub\nG1 Z-1\no100 endsub\n");
+    for (n, line) in plain.lines().enumerate() {
+        text.push_str(line);
+        text.push_str(if n % 100 == 99 { "\no100 call\n" } else { "\n" });
+    }
+    text
+}
+
 fn main() {
     for (lines, budget) in [(100_000, (0.5, 5.0)), (1_000_000, (3.0, 20.0))] {
-        for (kind, make) in [("big", generate::big as fn(usize) -> String), ("mixed", generate::mixed)] {
+        let kinds: [(&str, fn(usize) -> String); 4] =
+            [("big", generate::big), ("mixed", generate::mixed), ("sub and loop", sub_and_loop), ("calls everywhere", calls)];
+        for (kind, make) in kinds {
             let text = make(lines);
             let before = resident() - text.len() as f64 / 1e6;
             let mut bench = Bench::open(&format!("{kind}, {lines} lines"), text, before);

@@ -52,7 +52,7 @@ impl<'a> Library<'a> {
             subs: Vec::new(),
             empty: File::default(),
         };
-        for id in known {
+        for id in known.filter(|id| *id != main) {
             if let Some(file) = sub_file(db, run, id) {
                 library.keep(id, file);
             }

@@ -279,6 +279,91 @@ fn a_line_above_moves_diagnostics_and_interprets_nothing_below() {
     assert_eq!(second.iter().map(|d| d.primary().1.start).collect::<Vec<_>>(), moved);
 }
 
+/// A subroutine and a loop at the top, plain lines with a call in the middle.
+fn structured_program(lines: usize) -> String {
+    let moves = |from: usize| (from..from + lines / 2).map(|i| format!("G1 X{}.5 Y{}\n", i % 97, i % 89)).collect::<String>();
+    let top = "G21 G90 G17\nS1000 M3\nF100\no100 sub\nG1 Z#1\nG0 Z5\no100 endsub\n";
+    let rows = "#100=0\no101 while [#100 LT 10]\no100 call [-#100]\n#100=[#100+1]\no101 endwhile\n";
+    format!("{top}{rows}{}o100 call [-1]\n{}M5\nM2\n", moves(0), moves(7))
+}
+
+#[test]
+fn a_keystroke_in_a_plain_chunk_runs_no_control_flow() {
+    let mut text = structured_program(4000);
+    let mut session = Session::new();
+    let file = session.open("part.ngc", &text, options(100));
+    assert_eq!(session.check(file).diagnostics, vec![]);
+    // Before the call in the middle, and behind it.
+    for from in [10_000, text.len() - 10_000] {
+        let before = session.executed();
+        let at = text[from..].find(".5").unwrap() + from;
+        text.replace_range(at..at + 2, ".25");
+        session.edit(file, at as u32..at as u32 + 2, ".25");
+        session.check(file);
+        let after = session.executed();
+        assert_eq!((after.scans - before.scans, after.flows - before.flows), (1, 0));
+        assert!(after.steps - before.steps <= 2, "{} steps", after.steps - before.steps);
+    }
+}
+
+#[test]
+fn an_edit_of_a_subroutine_runs_its_callers() {
+    let mut text = structured_program(4000);
+    let mut session = Session::new();
+    let file = session.open("part.ngc", &text, options(100));
+    session.check(file);
+    let before = session.executed();
+    let at = text.find("G0 Z5").unwrap();
+    text.replace_range(at..at + 5, "G0 Z6");
+    session.edit(file, at as u32..at as u32 + 5, "G0 Z6");
+    assert_eq!(session.check(file), scratch(&text, 256));
+    let after = session.executed();
+    assert_eq!(after.scans - before.scans, 1);
+    // The top with its loop, and the call in the middle.
+    assert_eq!(after.flows - before.flows, 2);
+}
+
+#[test]
+fn a_line_behind_a_call_leaves_the_call_alone() {
+    let text = structured_program(4000);
+    let mut session = Session::new();
+    let file = session.open("part.ngc", &text, options(100));
+    session.check(file);
+    let before = session.executed();
+    let at = text.len() as u32 - 20_000;
+    let at = at + text[at as usize..].find('\n').unwrap() as u32 + 1;
+    session.edit(file, at..at, "(one more line)\n");
+    session.check(file);
+    let after = session.executed();
+    assert_eq!(after.flows, before.flows);
+    assert!(after.steps - before.steps <= 1);
+}
+
+#[test]
+fn an_open_subroutine_file_comes_before_the_one_on_disk() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("mill.ngc"), "o<mill> sub\nG1 X1 F100\no<mill> endsub\nM2\n").unwrap();
+    let path = |name: &str| folder.path().join(name).to_string_lossy().into_owned();
+    let mut options = options(4);
+    let dir = folder.path().to_string_lossy().into_owned();
+    options.setup.ini.values.insert(("rs274ngc".into(), "subroutine_path".into()), vec![dir]);
+    let mut session = Session::new();
+    let main = session.open(&path("main.ngc"), "G21\no<mill> call\nM2\n", options.clone());
+    let codes = |session: &Session| session.check(main).diagnostics.iter().map(|d| d.code.def().slug).collect::<Vec<_>>();
+    assert_eq!(codes(&session), Vec::<&str>::new());
+    let sub = session.open(&path("./mill.ngc"), "o<mill> sub\nG1 X1 F0\no<mill> endsub\nM2\n", options);
+    assert_eq!(codes(&session), ["feed/missing"]);
+    assert_eq!(session.check(main).diagnostics[0].primary().0, sub);
+    let text = session.text(sub).unwrap();
+    let at = text.find("F0").unwrap() as u32;
+    session.edit(sub, at..at + 2, "F9");
+    assert_eq!(codes(&session), Vec::<&str>::new());
+    session.edit(sub, at..at + 2, "F0");
+    assert_eq!(codes(&session), ["feed/missing"]);
+    session.close(sub);
+    assert_eq!(codes(&session), Vec::<&str>::new());
+}
+
 #[test]
 fn visible_lines_first() {
     let text = program(20_000);
