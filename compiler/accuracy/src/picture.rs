@@ -337,7 +337,7 @@ mod tests {
     #[test]
     fn round_ticks() {
         assert_eq!(ticks(0.0, 10.0, 5), [0.0, 2.0, 4.0, 6.0, 8.0, 10.0]);
-        assert_eq!(ticks(604.1, 1053.6, 8).first(), Some(&650.0));
+        assert_eq!(ticks(604.1, 1053.6, 8).first(), Some(&700.0));
         assert_eq!(ticks(1.0, 1.0, 5), [1.0]);
         assert_eq!(number(0.5, 3.0), "0.5");
         assert_eq!(number(-0.0, 3.0), "0");

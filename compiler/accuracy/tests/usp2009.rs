@@ -215,12 +215,12 @@ proptest! {
 /// the thesis) and after all.
 #[test]
 fn compensation() {
-    use gr_accuracy::compensate::{compensated, real_place};
+    use gr_accuracy::compensate::Corrector;
     use gr_machine::math::Frame;
     let m = machine();
     let k = legs(&m);
     let g = golden();
-    let (nominal, real) = (m.kinematics(), m.deviated(&SYMMETRIC));
+    let corrector = Corrector::new(&m, &SYMMETRIC);
     for (p, key) in [
         ([800.0, 0.0, 0.0], "compensation_(800.0, 0.0, 0.0)"),
         ([735.0, -400.0, 0.0], "compensation_(735.0, -400.0, 0.0)"),
@@ -228,7 +228,7 @@ fn compensation() {
     ] {
         let want = &g["extensions"][key];
         let error = |command: V3| {
-            let got = real_place(&*nominal, &*real, &Frame::shift(command), &[]).unwrap();
+            let got = corrector.real_place(&Frame::shift(command), &Frame::IDENTITY, &[]).unwrap();
             [0, 1, 2].map(|i| (got[i] - p[i]) * 1e3)
         };
         let first = geometric(k, k.place_of(p), &SYMMETRIC);
@@ -239,7 +239,7 @@ fn compensation() {
             close(first[i] * 1e3, numbers(&want["first_order_um"])[i], 1e-9, "first order");
             close(once[i], numbers(&want["residual_um"])[i], 1e-6, "left over");
         }
-        let command = compensated(&m, &SYMMETRIC, &Frame::shift(p), &[]).unwrap();
+        let (command, _) = corrector.command(&Frame::shift(p), &Frame::IDENTITY, &[]).unwrap();
         assert!(norm(error(command.position)) < 1e-6, "{:?}", error(command.position));
     }
 }

@@ -193,6 +193,15 @@ impl Cell {
         for (word, s) in &self.io {
             out += &format!("{word}: {}\n", s.describe());
         }
+        for (what, source) in [
+            ("accuracy", self.accuracy.as_ref().map(|a| &a.source)),
+            ("stiffness", self.stiffness.as_ref().map(|a| &a.source)),
+            ("as built", self.as_built.as_ref().map(|a| &a.source)),
+        ] {
+            if let Some(source) = source {
+                out += &format!("{what}: {source}\n");
+            }
+        }
         out + &self.controller.describe()
     }
 }

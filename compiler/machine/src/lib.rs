@@ -328,6 +328,10 @@ impl Machine {
                 speed(j.rapid.or(j.speed)),
             );
         }
+        let names: Vec<String> = self.parameters().into_iter().map(|p| p.name).collect();
+        if !names.is_empty() {
+            out += &format!("geometry: {}\n", names.join(" "));
+        }
         out + &self.cell.describe(&self.joints)
     }
 }
