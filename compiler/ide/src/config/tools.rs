@@ -48,7 +48,8 @@ pub fn hover(text: &str, offset: u32, units: Units) -> Option<Hover> {
     if column > body.trim_end().len() {
         return None;
     }
-    let from = body.get(..column)?.rfind(char::is_whitespace).map_or(0, |p| p + 1);
+    let blank = |(_, c): &(usize, char)| c.is_whitespace();
+    let from = body.get(..column)?.char_indices().rev().find(blank).map_or(0, |(at, c)| at + c.len_utf8());
     let word = body.get(from..)?.split_whitespace().next()?;
     let letter = word.chars().next()?.to_ascii_uppercase();
     let (_, what, unit) = WORDS.iter().find(|w| w.0 == letter)?;

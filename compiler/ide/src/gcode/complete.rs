@@ -39,7 +39,8 @@ pub fn complete(doc: Doc<'_>, offset: u32, around: Around<'_>) -> Vec<Completion
     if let Some(found) = label(doc, before, start, offset, &around) {
         return found;
     }
-    let word = before.rfind(|c: char| !c.is_ascii_alphanumeric() && c != '.').map_or(0, |p| p + 1);
+    let outside = |(_, c): &(usize, char)| !c.is_ascii_alphanumeric() && *c != '.';
+    let word = before.char_indices().rev().find(outside).map_or(0, |(at, c)| at + c.len_utf8());
     let typed = &before[word..];
     let replace = Span::new(start + word as u32, offset);
     if depth(before) > 0 {
