@@ -37,6 +37,7 @@ impl Language for Delmia {
         let mut w = Writer { text: String::new(), count: 0, motions: BTreeMap::new(), accuracies: BTreeMap::new(), angles: [0.0; 3] };
         let mut out = walk(program, sources, options, &TRAITS, &mut w);
         if !any_error(&out.findings) {
+            names.tell(&mut out, TRAITS.title);
             let text = w.whole(&name, program);
             out.files = vec![OutputFile::new(format!("{name}.xml"), text)];
         }
@@ -99,7 +100,7 @@ impl Writer {
     }
 
     fn motion(&mut self, cx: &Cx, kind: &str, t: &Target, profile: &str, zone: Option<f64>) {
-        let (value, fly) = zone.map_or(("0".to_string(), "Off"), |r| (num(r / 1000.0, 9), "On"));
+        let (value, fly) = zone.map_or(("0".to_string(), "Off"), |r| (num(libm::floor(r * 1e5 + 1e-6) / 1e8, 9), "On"));
         let accuracy = format!("<FlyByMode>{fly}</FlyByMode><AccuracyType>Distance</AccuracyType><AccuracyValue Units=\"m\">{value}</AccuracyValue>");
         let accuracy = Self::profile(&mut self.accuracies, accuracy, "Accuracy");
         let name = |n: Option<&String>| n.map_or(String::new(), |n| escape(n));

@@ -31,6 +31,7 @@ impl Language for Denso {
         let mut w = Writer { out: Lines::new("  ", "'"), speed: String::new() };
         let mut out = walk(program, sources, options, &TRAITS, &mut w);
         if !any_error(&out.findings) {
+            names.tell(&mut out, TRAITS.title);
             let text = format!("PROGRAM {name}\r\n  TAKEARM\r\n{}  GIVEARM\r\nEND\r\n", w.out.text);
             out.files = vec![OutputFile::new(format!("{name}.pac"), text)];
         }

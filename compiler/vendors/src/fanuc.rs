@@ -43,6 +43,7 @@ impl Language for Fanuc {
         };
         let mut out = walk(program, sources, options, &TRAITS, &mut w);
         if !any_error(&out.findings) {
+            names.tell(&mut out, TRAITS.title);
             out.files = w.files(&name, &mut names);
         }
         out
@@ -72,7 +73,7 @@ impl Writer {
         let mut main = String::new();
         let mut count = 0;
         for (i, (text, (points, lines))) in parts.iter().zip(&self.closed).enumerate() {
-            let inner = names.give(&format!("{}_{:03}", &name[..name.len().min(4)], i + 1), "P");
+            let inner = names.fresh(&format!("{}_{:03}", &name[..name.len().min(4)], i + 1));
             count += 1;
             let _ = write!(main, "{count:4}:  CALL {inner}    ;\r\n");
             files.push(OutputFile::new(format!("{inner}.LS"), whole(&inner, text, points, *lines)));
@@ -210,10 +211,7 @@ impl Body for Writer {
                 let text: String = format!("{number}: {text}").chars().take(32).collect();
                 self.line(&format!("  !{}", text.trim_end().replace(';', ",")));
             }
-            Op::Home(t) => {
-                let n = self.joint_point(cx, t);
-                self.line(&format!("J P[{n}] 20% FINE   "));
-            }
+            Op::Home(t) => self.start(cx, t),
             Op::Joint { to, share, zone } => {
                 self.room(4);
                 let q = cx.degrees(to);
@@ -235,15 +233,11 @@ impl Body for Writer {
                 self.line(&format!("C P[{via}]    \r\n    :  P[{to}] {speed} {}   ", stop(zone)));
             }
             Op::Tool(i) => {
-                self.room(16);
-                let tool = &cx.program.tools[i];
-                self.set_frame(&format!("UTOOL[{}]", i + 1), REGISTER + 1, &tool.frame);
+                self.room(4);
                 self.line(&format!("  UTOOL_NUM={}", i + 1));
             }
             Op::Frame(i) => {
-                self.room(16);
-                let frame = &cx.program.frames[i];
-                self.set_frame(&format!("UFRAME[{}]", i + 1), REGISTER, &frame.frame);
+                self.room(4);
                 self.line(&format!("  UFRAME_NUM={}", i + 1));
             }
             Op::Set { name, value, word } => {
@@ -256,7 +250,7 @@ impl Body for Writer {
             }
             Op::Call { name, value } => {
                 self.room(4);
-                let name = cx.known(name, "routine").to_string();
+                let name = cx.known(name, "routine").to_ascii_uppercase();
                 let value = value.map_or(String::new(), |v| format!("({})", num(v, 3)));
                 self.line(&format!("  CALL {name}{value}   "));
             }
@@ -289,6 +283,24 @@ impl Body for Writer {
 }
 
 impl Writer {
+    /// Frames and tools are set before the first move: a position names the numbers it stands under, and they must
+    /// be in use.
+    fn start(&mut self, cx: &mut Cx, home: &Target) {
+        if cx.program.frames.len() > 9 || cx.program.tools.len() > 10 {
+            cx.cannot("more than 9 frames or 10 tools");
+        }
+        for (i, tool) in cx.program.tools.iter().enumerate().take(10) {
+            self.set_frame(&format!("UTOOL[{}]", i + 1), REGISTER + 1, &tool.frame);
+        }
+        for (i, frame) in cx.program.frames.iter().enumerate().take(9) {
+            self.set_frame(&format!("UFRAME[{}]", i + 1), REGISTER, &frame.frame);
+        }
+        self.line("  UFRAME_NUM=1");
+        self.line("  UTOOL_NUM=1");
+        let n = self.joint_point(cx, home);
+        self.line(&format!("J P[{n}] 20% FINE   "));
+    }
+
     fn wait(&mut self, cx: &mut Cx, name: &str, on: bool, timeout: Option<f64>) {
         self.room(16);
         let input = format!("DI[{}]={}", cx.number(name, "wait"), if on { "ON" } else { "OFF" });

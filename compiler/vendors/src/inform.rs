@@ -40,6 +40,7 @@ impl Language for Inform {
         };
         let mut out = walk(program, sources, options, &TRAITS, &mut w);
         if !any_error(&out.findings) {
+            names.tell(&mut out, TRAITS.title);
             out.files = w.files(&name, &mut names);
         }
         out
@@ -69,7 +70,7 @@ impl Writer {
         }
         let (mut files, mut main) = (Vec::new(), String::new());
         for (i, (text, closed)) in parts.iter().zip(&self.closed).enumerate() {
-            let inner = names.give(&format!("{}_{:03}", &name[..name.len().min(4)], i + 1), "P");
+            let inner = names.fresh(&format!("{}_{:03}", &name[..name.len().min(4)], i + 1));
             let _ = write!(main, "CALL JOB:{inner}\r\n");
             files.push(OutputFile::new(format!("{inner}.JBI"), whole(&inner, text, closed)));
         }
@@ -220,12 +221,16 @@ impl Body for Writer {
                 let n = cx.number(name, word);
                 match value {
                     Value::Digital(on) => self.parts.line(&format!("DOUT OT#({n}) {}", if on { "ON" } else { "OFF" })),
-                    Value::Analog(v) => self.parts.line(&format!("AOUT AO#({n}) {}", fix(v, 2))),
+                    Value::Analog(v) => {
+                        // Volts: the spindle's greatest speed is taken as 10 V.
+                        let volts = if word == "S" { 10.0 * cx.share(v, word, name) } else { v };
+                        self.parts.line(&format!("AOUT AO#({n}) {}", fix(volts, 2)));
+                    }
                 }
             }
             Op::Call { name, value } => {
                 self.room(6);
-                let name = cx.known(name, "routine").to_string();
+                let name = cx.known(name, "routine").to_ascii_uppercase();
                 let value = value.map_or(String::new(), |v| format!(" ARGF{}", num(v, 3)));
                 self.parts.line(&format!("CALL JOB:{name}{value}"));
             }

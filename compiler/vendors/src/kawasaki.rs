@@ -32,6 +32,7 @@ impl Language for Kawasaki {
         let mut w = Writer { out: Lines::new("  ", ";"), angles: [0.0; 3], set: [String::new(), String::new()] };
         let mut out = walk(program, sources, options, &TRAITS, &mut w);
         if !any_error(&out.findings) {
+            names.tell(&mut out, TRAITS.title);
             let text = format!(".PROGRAM {name}()\r\n{}.END\r\n", w.out.text);
             out.files = vec![OutputFile::new(format!("{name}.as"), text)];
         }

@@ -47,6 +47,7 @@ impl Language for Krl {
         };
         let mut out = walk(program, sources, options, &TRAITS, &mut w);
         if !any_error(&out.findings) {
+            names.tell(&mut out, TRAITS.title);
             out.files = w.files(&name);
         }
         out

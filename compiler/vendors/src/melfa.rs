@@ -34,6 +34,7 @@ impl Language for Melfa {
         let mut w = Writer { out: Lines::new("", "'"), data: String::new(), counts: [0; 2], angles: [0.0; 3], set: Default::default() };
         let mut out = walk(program, sources, options, &TRAITS, &mut w);
         if !any_error(&out.findings) {
+            names.tell(&mut out, TRAITS.title);
             let text = format!("{}End\r\n{}", w.out.text, w.data);
             out.files = vec![OutputFile::new(format!("{name}.prg"), text)];
         }

@@ -32,6 +32,7 @@ impl Language for Nachi {
         let mut w = Writer { out: Lines::new("", "REM"), angles: [0.0; 3] };
         let mut out = walk(program, sources, options, &TRAITS, &mut w);
         if !any_error(&out.findings) {
+            names.tell(&mut out, TRAITS.title);
             let text = format!("{}END\r\n", w.out.text);
             out.files = vec![OutputFile::new(format!("{name}-A.txt"), text)];
         }

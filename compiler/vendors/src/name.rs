@@ -1,5 +1,7 @@
 //! Names a controller accepts: made of letters, digits and `_`, short enough, unique, not reserved.
 
+use crate::Output;
+use gr_text::{Diagnostic, FileId, Span, code};
 use std::collections::BTreeSet;
 
 /// What names look like in a language.
@@ -17,15 +19,38 @@ pub(crate) struct Rule {
 pub(crate) struct Names {
     rule: Rule,
     taken: BTreeSet<String>,
+    /// What was wanted and what was given.
+    changed: Vec<(String, String)>,
 }
 
 impl Names {
     pub(crate) fn new(rule: Rule) -> Names {
-        Names { rule, taken: BTreeSet::new() }
+        Names { rule, taken: BTreeSet::new(), changed: Vec::new() }
     }
 
     /// A name as near to the wanted one as the language allows; `prefix` where that begins with no letter.
     pub(crate) fn give(&mut self, wanted: &str, prefix: &str) -> String {
+        let name = self.find(wanted, prefix);
+        if !name.eq_ignore_ascii_case(wanted) {
+            self.changed.push((wanted.to_string(), name.clone()));
+        }
+        name
+    }
+
+    /// A name for something of our own.
+    pub(crate) fn fresh(&mut self, wanted: &str) -> String {
+        self.find(wanted, "x")
+    }
+
+    /// Tells which names of the program are others in its text.
+    pub(crate) fn tell(&self, out: &mut Output, title: &str) {
+        for (wanted, name) in &self.changed {
+            let args = [wanted.clone(), name.clone(), title.to_string()];
+            out.findings.push(Diagnostic::new(code::VENDOR_NAME_CHANGED, FileId(0), Span::default(), &args));
+        }
+    }
+
+    fn find(&mut self, wanted: &str, prefix: &str) -> String {
         let mut base: String = wanted.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
         if !base.starts_with(|c: char| c.is_ascii_alphabetic()) {
             base = format!("{prefix}{base}");

@@ -55,7 +55,7 @@ pub(crate) fn zyz(m: &M3, before: [f64; 3]) -> [f64; 3] {
     let lean = libm::hypot(m[0][2], m[1][2]);
     let o = if lean < POLE { before[0] } else { libm::atan2(m[1][2], m[0][2]) };
     let (s, c) = libm::sincos(o);
-    let a = libm::atan2(c * m[0][2] + s * m[1][2], m[2][2]);
+    let a = libm::atan2(if lean < POLE { 0.0 } else { c * m[0][2] + s * m[1][2] }, m[2][2]);
     let t = libm::atan2(c * m[1][0] - s * m[0][0], c * m[1][1] - s * m[0][1]);
     [o, a, t]
 }

@@ -54,6 +54,7 @@ impl Language for Rapid {
         };
         let mut out = walk(program, sources, options, &TRAITS, &mut w);
         if !any_error(&out.findings) {
+            w.names.tell(&mut out, TRAITS.title);
             out.files = w.files(&module, program);
         }
         out
@@ -112,8 +113,8 @@ impl Writer {
             head += one;
         } else {
             for (i, part) in parts.iter().enumerate() {
-                let inner = names.give(&format!("{module}_{:03}", i + 1), "P");
-                let routine = names.give(&format!("r{module}_{:03}", i + 1), "P");
+                let inner = names.fresh(&format!("{module}_{:03}", i + 1));
+                let routine = names.fresh(&format!("r{module}_{:03}", i + 1));
                 head += &format!("    {routine};\r\n");
                 let text = format!("%%%\r\n  VERSION:1\r\n  LANGUAGE:ENGLISH\r\n%%%\r\nMODULE {inner}\r\n  PROC {routine}()\r\n{part}  ENDPROC\r\nENDMODULE\r\n");
                 list.push(format!("{inner}.mod"));
@@ -160,11 +161,12 @@ impl Writer {
 
     fn speed(&mut self, mm: f64, turn: f64, prefix: &str) -> String {
         let value = format!("[{},{},5000,1000]", single(mm), single(turn));
-        let next = self.speeds.len() + 1;
         if let Some(name) = self.speeds.get(&value) {
             return name.clone();
         }
-        let name = self.names.give(&format!("v{prefix}{next}"), "v");
+        let start = format!("v{prefix}");
+        let next = self.speeds.values().filter(|n| n.starts_with(&start)).count() + 1;
+        let name = self.names.fresh(&format!("{start}{next}"));
         self.speeds.insert(value, name.clone());
         name
     }
@@ -177,7 +179,7 @@ impl Writer {
         if let Some(name) = self.zones.get(&value) {
             return name.clone();
         }
-        let name = self.names.give(&format!("zP{next}"), "z");
+        let name = self.names.fresh(&format!("zP{next}"));
         self.zones.insert(value, name.clone());
         name
     }

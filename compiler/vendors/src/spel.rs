@@ -32,6 +32,7 @@ impl Language for Spel {
         let mut w = Writer { out: Lines::new("  ", "'"), angles: [0.0; 3], set: Default::default() };
         let mut out = walk(program, sources, options, &TRAITS, &mut w);
         if !any_error(&out.findings) {
+            names.tell(&mut out, TRAITS.title);
             let text = format!("Function {name}\r\n  Motor On\r\n{}Fend\r\n", w.out.text);
             out.files = vec![OutputFile::new(format!("{name}.prg"), text)];
         }

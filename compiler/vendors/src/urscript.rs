@@ -37,6 +37,7 @@ impl Language for UrScript {
         let mut w = Writer { text: String::new(), points: 0, waits: 0 };
         let mut out = walk(program, sources, options, &TRAITS, &mut w);
         if !any_error(&out.findings) {
+            names.tell(&mut out, TRAITS.title);
             let text = format!("def {name}():\n{}end\n{name}()\n", w.text);
             out.files = vec![OutputFile::new(format!("{name}.script"), text)];
         }
@@ -100,7 +101,7 @@ fn pose(frame: &Frame, decimals: usize) -> String {
 fn blend(cx: &Cx, zone: Option<f64>) -> String {
     let Some(r) = zone.filter(|_| !cx.arc_next) else { return "0".into() };
     let Some(next) = cx.next_length else { return "0".into() };
-    num(r.min(cx.length * 0.49).min(next * 0.49) / 1000.0, 6)
+    num(libm::floor(r.min(cx.length * 0.49).min(next * 0.49) * 1000.0 + 1e-6) / 1e6, 6)
 }
 
 impl Body for Writer {

@@ -53,6 +53,7 @@ impl Language for Val3 {
         };
         let mut out = walk(program, sources, options, &TRAITS, &mut w);
         if !any_error(&out.findings) {
+            names.tell(&mut out, TRAITS.title);
             out.files = w.files(&project, program);
         }
         out

@@ -35,6 +35,7 @@ impl Language for VPlus {
         let mut w = Writer { out: Lines::new("        ", ";"), frames, angles: [0.0; 3], speed: String::new() };
         let mut out = walk(program, sources, options, &TRAITS, &mut w);
         if !any_error(&out.findings) {
+            names.tell(&mut out, TRAITS.title);
             let text = format!(".PROGRAM {name}()\r\n{}        BREAK\r\n.END\r\n", w.out.text);
             out.files = vec![OutputFile::new(format!("{name}.v2"), text)];
         }

@@ -105,6 +105,8 @@ pub(crate) struct Cx<'p> {
     pub length: f64,
     /// Where the tool was before this motion.
     pub before: Option<Target>,
+    /// Something has moved since home.
+    moved: bool,
     at: Option<Source>,
     sources: &'p dyn Sources,
     kinematics: Box<dyn Kinematics>,
@@ -144,6 +146,7 @@ pub(crate) fn walk<'p>(
         next_length: None,
         length: 0.0,
         before: None,
+        moved: false,
         at: None,
         sources,
         kinematics: program.machine.kinematics(),
@@ -183,6 +186,8 @@ impl<'p> Cx<'p> {
     fn run(&mut self, body: &mut dyn Body) {
         let program = self.program;
         body.op(self, Op::Home(&program.home));
+        self.before = Some(program.home);
+        self.before = self.moved_before();
         let mut last = None;
         for (i, step) in program.steps.iter().enumerate() {
             self.at = step.source;
@@ -210,13 +215,14 @@ impl<'p> Cx<'p> {
         match action {
             Action::Joint { to, speed, zone } => {
                 let Some(to) = self.target(*to) else { return };
-                let home = self.before.is_none() && to.joints == self.program.home.joints;
+                let home = !self.moved && to.joints == self.program.home.joints;
                 self.look_ahead(index, to);
                 self.length = 0.0;
                 if !home {
                     body.op(self, Op::Joint { to, share: *speed, zone: radius(*zone) });
                 }
                 self.before = Some(*to);
+                self.moved = true;
             }
             Action::Linear { to, speed, zone, .. } => {
                 let Some(to) = self.target(*to) else { return };
@@ -312,7 +318,7 @@ impl<'p> Cx<'p> {
             return;
         }
         body.op(self, Op::Linear { to, speed, zone });
-        self.before = Some(*to);
+        (self.before, self.moved) = (Some(*to), true);
     }
 
     fn arc(&mut self, body: &mut dyn Body, via: &Target, to: &Target, shape: &Shape, speed: f64, zone: Option<f64>) {
@@ -339,7 +345,7 @@ impl<'p> Cx<'p> {
             } else {
                 self.say(code::VENDOR_FEED_RANGE, &[num(speed, 6), "mm/s".into(), self.traits.title.into(), "more than 0".into()]);
             }
-            self.before = Some(*to);
+            (self.before, self.moved) = (Some(*to), true);
             return;
         };
         self.pieces(body, &from, to, shape, (radius, rise), (speed, zone), &why);
@@ -420,12 +426,12 @@ impl<'p> Cx<'p> {
         if let Some(name) = &signal.routine {
             body.op(self, Op::Call { name, value: signal.value.or(value) });
         } else if let Some(name) = &signal.signal {
-            let analog = matches!(word, "S" | "M67" | "M68" | "M6");
+            // A number of the machine file is a switch when it can be one; one of the program never is.
+            let analog = matches!(word, "S" | "M67" | "M68");
             let value = match (signal.value, value) {
-                (Some(v), _) if v != 0.0 && v != 1.0 => Value::Analog(v),
-                (Some(v), _) if !analog => Value::Digital(v != 0.0),
-                (None, Some(v)) if analog => Value::Analog(v),
+                (Some(v), _) if !analog && (v == 0.0 || v == 1.0) => Value::Digital(v != 0.0),
                 (Some(v), _) => Value::Analog(v),
+                (None, Some(v)) if analog || word == "M6" => Value::Analog(v),
                 (None, _) => Value::Digital(true),
             };
             body.op(self, Op::Set { name, value, word });

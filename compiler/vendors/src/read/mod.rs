@@ -158,10 +158,13 @@ impl Place {
         let (tool, frame) = (self.tool.unwrap_or(*tool), self.frame.unwrap_or(*frame));
         let flange = frame.then(&self.pose?).then(&tool.inverse());
         let all = machine.kinematics().inverse_frame(&flange).ok()?;
+        // A straight move keeps the way the arm stands.
+        let kept = if self.configuration == Configuration::Same { way_of(machine, before) } else { None };
         let mut best: Option<(f64, Vec<f64>)> = None;
         for s in all {
             let mut joints = s.joints.clone();
             let mut cost = self.posture_cost(machine, s.branch, &joints);
+            cost += if kept.is_some_and(|k| k != s.branch) { 1e6 } else { 0.0 };
             for i in 0..joints.len() {
                 let (turned, off) = self.best_turn(machine, i, joints[i], before);
                 joints[i] = turned;
@@ -232,6 +235,17 @@ impl Place {
             Configuration::Letters(..) => small,
         }
     }
+}
+
+/// Which of the ways an arm can stand these joint values are.
+fn way_of(machine: &Machine, joints: &[f64]) -> Option<u8> {
+    let kinematics = machine.kinematics();
+    let all = kinematics.inverse_frame(&kinematics.forward_frame(joints).ok()?).ok()?;
+    let off = |v: &[f64]| -> f64 {
+        let turn = std::f64::consts::TAU;
+        v.iter().zip(joints).map(|(a, b)| (a - b) - turn * libm::round((a - b) / turn)).map(f64::abs).sum()
+    };
+    all.iter().min_by(|a, b| off(&a.joints).total_cmp(&off(&b.joints))).map(|s| s.branch)
 }
 
 fn rconf_cost(r: &[u8; 6], i: usize, v: f64) -> f64 {
