@@ -15,6 +15,10 @@
 //! | `solver` | joint values and limits |
 //! | `choose` | one configuration per chain of cuts, chosen over all of them |
 //! | `emit` | targets, speed checks, figures |
+//! | `reference` | the solver of a publication |
+//! | `joints` | moves cut to joint positions by tolerance; joint-space G-code |
+//! | `setpoints` | positions, velocities, accelerations at a fixed rate |
+//! | `verify` | joint values against targets: table, CSV, pictures |
 
 // Joints are walked by index; a value that is not a number must fail the test.
 #![allow(clippy::neg_cmp_op_on_partial_ord, clippy::needless_range_loop)]
@@ -23,11 +27,15 @@ mod cell;
 mod choose;
 mod emit;
 mod gather;
+pub mod joints;
 mod options;
 mod path;
 mod plan;
 mod program;
+pub mod reference;
+pub mod setpoints;
 mod solver;
+pub mod verify;
 
 pub use options::{Options, Placement, Planned, Singularity, Summary};
 pub use plan::plan;

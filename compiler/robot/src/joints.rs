@@ -1,0 +1,396 @@
+//! A planned program as joint positions: every move cut so that, with all joints moving evenly between two of them, the
+//! tool point stays within a tolerance of its path. Forward kinematics between the positions prove it.
+
+use std::fmt::Write as _;
+
+use gr_ir::Source;
+use gr_machine::math::{Frame, norm, sub};
+use gr_machine::JointKind;
+
+use crate::choose::unwrap;
+use crate::gather::{ArcPiece, Gathered, Move, Way};
+use crate::path::{Mount, Path};
+use crate::solver::{Branches, Joints, Limits, Solver};
+use crate::{Action, MAX_JOINTS, RobotProgram, Target, Zone};
+
+/// What can be chosen.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct JointOptions {
+    /// Greatest distance of the tool point from its path between two positions, mm.
+    pub tolerance: f64,
+    /// Greatest time between two positions, s; none = as far as the tolerance allows.
+    pub interval: Option<f64>,
+    /// Greatest speed of every joint in rapids, rad/s or mm/s, besides the machine's own.
+    pub joint_speed: Option<f64>,
+    /// Positions at most.
+    pub most: usize,
+}
+
+impl Default for JointOptions {
+    fn default() -> JointOptions {
+        JointOptions { tolerance: 0.01, interval: None, joint_speed: None, most: 20_000_000 }
+    }
+}
+
+/// A joint position.
+#[derive(Clone, PartialEq, Debug)]
+pub struct JointPoint {
+    /// Joint values, rad or mm.
+    pub joints: [f64; MAX_JOINTS],
+    /// Tool point and turn in the base.
+    pub tool: Frame,
+    /// Time of the way here, s.
+    pub seconds: f64,
+    /// Whether the way here is a rapid.
+    pub rapid: bool,
+    /// Whether the machine comes to rest here.
+    pub stop: bool,
+    /// Where it comes from.
+    pub source: Option<Source>,
+}
+
+/// Positions and, between them, what else is done.
+#[derive(Clone, PartialEq, Debug)]
+pub enum Event {
+    /// Go there.
+    Point(JointPoint),
+    /// Step of the program that is no move.
+    Do(usize),
+}
+
+/// A program as joint positions.
+#[derive(Clone, PartialEq, Debug)]
+pub struct JointPath {
+    /// Home first.
+    pub events: Vec<Event>,
+}
+
+impl JointPath {
+    /// The positions.
+    pub fn points(&self) -> impl Iterator<Item = &JointPoint> {
+        self.events.iter().filter_map(|e| if let Event::Point(p) = e { Some(p) } else { None })
+    }
+}
+
+/// More positions than allowed.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct TooMany {
+    /// Allowed.
+    pub most: usize,
+    /// Where.
+    pub source: Option<Source>,
+}
+
+struct Run<'a> {
+    program: &'a RobotProgram,
+    options: &'a JointOptions,
+    solver: Solver,
+    limits: Limits,
+    rapid: Joints,
+    g: Gathered,
+    out: Vec<Event>,
+    tool: u16,
+    frame: u16,
+    here: Target,
+    points: usize,
+}
+
+/// Cuts the moves of a program.
+pub fn joint_path(program: &RobotProgram, options: &JointOptions) -> Result<JointPath, TooMany> {
+    let mut rapid = crate::plan::speeds(&program.machine);
+    if let Some(limit) = options.joint_speed {
+        rapid.iter_mut().for_each(|s| *s = s.min(limit));
+    }
+    let g = Gathered {
+        items: Vec::new(),
+        turns: Vec::new(),
+        arcs: Vec::new(),
+        tools: program.tools.clone(),
+        frames: program.frames.clone(),
+        wait_seconds: 0.0,
+    };
+    let solver = Solver::new(&program.machine);
+    let mut run = Run {
+        program,
+        options,
+        limits: Limits::new(&program.machine),
+        rapid,
+        g,
+        out: Vec::new(),
+        tool: 0,
+        frame: 0,
+        here: program.home,
+        points: 0,
+        solver,
+    };
+    run.push(program.home.joints, 0.0, true, true, None)?;
+    for (i, step) in program.steps.iter().enumerate() {
+        run.step(i, &step.action, step.source)?;
+    }
+    Ok(JointPath { events: run.out })
+}
+
+impl Run<'_> {
+    fn step(&mut self, i: usize, action: &Action, source: Option<Source>) -> Result<(), TooMany> {
+        match action {
+            Action::UseTool(t) => self.tool = *t,
+            Action::UseFrame(f) => self.change_frame(*f),
+            Action::Joint { to, speed, zone } => {
+                let to = self.program.targets[*to as usize];
+                let seconds = self.joint_time(&self.here.joints, &to.joints) / speed;
+                self.even(&to.joints, seconds, zone == &Zone::Stop, source)?;
+                self.here = to;
+            }
+            Action::Linear { to, speed, zone, rapid } => self.path(*to, None, *speed, *zone, *rapid, source)?,
+            Action::Arc { via, to, center, normal, angle, speed, zone } => {
+                let via = self.program.targets[*via as usize].position;
+                let arc = ArcPiece { center: *center, normal: *normal, via, angle: *angle };
+                self.path(*to, Some(arc), *speed, *zone, false, source)?;
+            }
+            _ => self.out.push(Event::Do(i)),
+        }
+        Ok(())
+    }
+
+    /// The same place in another frame.
+    fn change_frame(&mut self, frame: u16) {
+        let (old, new) = (self.g.frames[usize::from(self.frame)].frame, self.g.frames[usize::from(frame)].frame);
+        self.here.position = new.inverse().apply(old.apply(self.here.position));
+        self.frame = frame;
+    }
+
+    fn push(&mut self, joints: Joints, seconds: f64, rapid: bool, stop: bool, source: Option<Source>) -> Result<(), TooMany> {
+        self.points += 1;
+        if self.points > self.options.most {
+            return Err(TooMany { most: self.options.most, source });
+        }
+        let tip = self.g.tools.get(usize::from(self.tool)).map_or(Frame::IDENTITY, |t| t.frame);
+        let tool = self.solver.forward(&joints).map_or(Frame::IDENTITY, |f| f.then(&tip));
+        self.out.push(Event::Point(JointPoint { joints, tool, seconds, rapid, stop, source }));
+        Ok(())
+    }
+
+    fn joint_time(&self, a: &Joints, b: &Joints) -> f64 {
+        (0..self.solver.count).map(|i| (a[i] - b[i]).abs() / self.rapid[i]).fold(0.0, f64::max)
+    }
+
+    /// All joints evenly; cut by time only.
+    fn even(&mut self, to: &Joints, seconds: f64, stop: bool, source: Option<Source>) -> Result<(), TooMany> {
+        if seconds <= 0.0 {
+            return Ok(());
+        }
+        let count = self.options.interval.map_or(1.0, |t| libm::ceil(seconds / t - 1e-9)).clamp(1.0, 1e9) as usize;
+        let from = self.here.joints;
+        for k in 1..=count {
+            let share = k as f64 / count as f64;
+            let mut q = *to;
+            if k < count {
+                (0..self.solver.count).for_each(|i| q[i] = from[i] + (to[i] - from[i]) * share);
+            }
+            self.push(q, seconds / count as f64, true, stop && k == count, source)?;
+        }
+        Ok(())
+    }
+
+    fn path(&mut self, to: u32, arc: Option<ArcPiece>, speed: f64, zone: Zone, rapid: bool, source: Option<Source>) -> Result<(), TooMany> {
+        let to = self.program.targets[to as usize];
+        let turns = (matrix(self.here.quaternion), matrix(to.quaternion));
+        let way = if arc.is_some() { Way::Arc(0) } else { Way::Line };
+        self.g.arcs.clear();
+        self.g.arcs.extend(arc);
+        self.g.turns = vec![turns.0, turns.1];
+        let m = Move {
+            way,
+            position: to.position,
+            turn: u32::from(self.here.quaternion != to.quaternion),
+            frame: self.frame,
+            tool: self.tool,
+            speed,
+            zone,
+            length: 0.0,
+            rapid,
+            free: false,
+            ours: false,
+            source,
+        };
+        let path = Path::new(&self.g, self.here.position, 0, &m);
+        let mount = Mount::new(&self.g, &m, 0.0);
+        let mut seconds = if path.length > 0.0 { path.length / speed } else { self.joint_time(&self.here.joints, &to.joints) };
+        if rapid {
+            seconds = seconds.max(self.joint_time(&self.here.joints, &to.joints));
+        }
+        let looks = path.looks().max(self.options.interval.map_or(1, |t| libm::ceil(seconds / t - 1e-9).clamp(1.0, 1e9) as usize));
+        let tip = self.g.tools.get(usize::from(self.tool)).map_or(Frame::IDENTITY, |t| t.frame);
+        let base = self.g.frames[usize::from(self.frame)].frame;
+        let mut cut = Cut { solver: &self.solver, limits: &self.limits, path: &path, mount: &mount, tip, base, branch: to.branch, tolerance: self.options.tolerance, found: Vec::new() };
+        let mut q = self.here.joints;
+        for k in 1..=looks {
+            let (a, b) = ((k - 1) as f64 / looks as f64, k as f64 / looks as f64);
+            let next = if k == looks { to.joints } else { cut.solve(b, &q) };
+            cut.between(a, &q, b, &next, 24);
+            cut.found.push((b, next));
+            q = next;
+        }
+        let found = cut.merged(self.here.joints, self.options.interval.is_some());
+        let mut last = 0.0;
+        for (share, joints) in found {
+            let end = share >= 1.0;
+            self.push(joints, seconds * (share - last), rapid, end && zone == Zone::Stop, source)?;
+            last = share;
+        }
+        self.here = to;
+        Ok(())
+    }
+}
+
+struct Cut<'a> {
+    solver: &'a Solver,
+    limits: &'a Limits,
+    path: &'a Path,
+    mount: &'a Mount,
+    tip: Frame,
+    base: Frame,
+    branch: u8,
+    tolerance: f64,
+    found: Vec<(f64, Joints)>,
+}
+
+impl Cut<'_> {
+    fn solve(&self, share: f64, near: &Joints) -> Joints {
+        let flange = self.mount.flange(&self.path.at(share));
+        let mut all = Branches::NONE;
+        let mut q = *near;
+        if self.solver.searches() {
+            q = self.solver.near(&flange, near).unwrap_or(q);
+        } else if self.solver.all(&flange, &mut all).is_ok() {
+            let branch = if all.has(self.branch) { self.branch } else { all.good.trailing_zeros() as u8 & 7 };
+            (0..self.solver.count).for_each(|i| q[i] = all.joints[usize::from(branch)][i]);
+        }
+        unwrap(&mut q, near, &self.limits.turns, self.solver.count);
+        q
+    }
+
+    /// Greatest distance of the tool point from its path between two positions.
+    fn off(&self, a: f64, p: &Joints, b: f64, q: &Joints) -> f64 {
+        let each = |part: f64| {
+            let mut r = *p;
+            (0..self.solver.count).for_each(|i| r[i] += (q[i] - p[i]) * part);
+            let aim = self.base.apply(self.path.position(a + (b - a) * part));
+            self.solver.forward(&r).map_or(f64::INFINITY, |f| norm(sub(f.then(&self.tip).position, aim)))
+        };
+        [0.25, 0.5, 0.75].into_iter().map(each).fold(0.0, f64::max)
+    }
+
+    /// Positions between two, so that the tolerance holds. Nine tenths of it, as it is looked at three places only.
+    fn between(&mut self, a: f64, p: &Joints, b: f64, q: &Joints, left: u32) {
+        if left == 0 || self.off(a, p, b, q) <= 0.9 * self.tolerance {
+            return;
+        }
+        let middle = (a + b) / 2.0;
+        let r = self.solve(middle, p);
+        self.between(a, p, middle, &r, left - 1);
+        self.found.push((middle, r));
+        self.between(middle, &r, b, q, left - 1);
+    }
+
+    /// Leaves out positions that the tolerance doesn't need; with an interval all are needed.
+    fn merged(&mut self, start: Joints, all: bool) -> Vec<(f64, Joints)> {
+        let found = std::mem::take(&mut self.found);
+        if all || found.len() < 2 {
+            return found;
+        }
+        let mut out: Vec<(f64, Joints)> = Vec::new();
+        let (mut a, mut p) = (0.0, start);
+        for pair in found.windows(2) {
+            // From the last kept to the one after this: when that is near enough, this one isn't needed.
+            let far = pair[1].0 - a > 0.5 + 1e-9;
+            if far || self.off(a, &p, pair[1].0, &pair[1].1) > 0.9 * self.tolerance {
+                out.push(pair[0]);
+                (a, p) = pair[0];
+            }
+        }
+        out.extend(found.last());
+        out
+    }
+}
+
+/// The matrix of a unit quaternion.
+pub(crate) fn matrix([w, x, y, z]: [f64; 4]) -> gr_machine::math::M3 {
+    [
+        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
+        [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
+        [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
+    ]
+}
+
+/// LinuxCNC words of a machine driven in joint mode: G93, so that each line takes its time.
+pub fn gcode(program: &RobotProgram, path: &JointPath, decimals: usize) -> String {
+    let machine = &program.machine;
+    let letters = ['X', 'Y', 'Z', 'A', 'B', 'C', 'U', 'V', 'W'];
+    let words: Vec<char> = machine.joints.iter().zip(letters).map(|(j, l)| j.word.unwrap_or(l)).collect();
+    let mut out = format!("({}: joint positions of {}; degrees and mm, inverse time)\nG21 G90 G40 G49 G80\nG61\nG93\n", plain(&program.name), plain(&machine.id));
+    let mut first = true;
+    for event in &path.events {
+        match event {
+            Event::Point(p) => {
+                let mut line = String::from("G1");
+                for ((joint, value), word) in machine.joints.iter().zip(&p.joints).zip(&words) {
+                    let shown = if joint.kind == JointKind::Revolute { value.to_degrees() } else { *value };
+                    let _ = write!(line, " {word}{}", number(shown, decimals));
+                }
+                if first {
+                    // The machine stands at home already, or goes there in a second.
+                    let _ = writeln!(out, "{line} F60");
+                } else if p.seconds > 0.0 {
+                    let _ = writeln!(out, "{line} F{}", significant(60.0 / p.seconds));
+                }
+                first = false;
+            }
+            Event::Do(i) => {
+                if let Some(text) = words_of(&program.steps[*i].action) {
+                    out += &text;
+                    out.push('\n');
+                }
+            }
+        }
+    }
+    out + "G94\nM2\n"
+}
+
+fn words_of(action: &Action) -> Option<String> {
+    Some(match action {
+        Action::Dwell(s) => format!("G4 P{}", significant(*s)),
+        Action::Pause { optional } => (if *optional { "M1" } else { "M0" }).to_string(),
+        Action::ChangeTool { number, .. } => format!("T{number} M6"),
+        Action::Message(text) => format!("(MSG, {})", plain(text)),
+        Action::Comment(text) => format!("({})", plain(text)),
+        Action::Signal { word, value, .. } => match (word.as_str(), value) {
+            ("S", Some(v)) => format!("S{}", significant(*v)),
+            ("M3" | "M4", Some(v)) => format!("{word} S{}", significant(*v)),
+            (w, Some(v)) if w.starts_with("M67") || w.starts_with("M68") => {
+                let (code, index) = w.split_once(" P").unwrap_or((w, "0"));
+                format!("{code} E{index} Q{}", significant(*v))
+            }
+            _ => word.clone(),
+        },
+        _ => return None,
+    })
+}
+
+fn plain(text: &str) -> String {
+    text.replace(['(', ')', '\n', '\r'], " ")
+}
+
+/// Fixed decimals without needless zeros.
+fn number(v: f64, decimals: usize) -> String {
+    let text = format!("{v:.decimals$}");
+    let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
+    if text == "-0" { "0".into() } else { text.into() }
+}
+
+/// Thirteen significant digits: times add up to a billionth.
+fn significant(v: f64) -> String {
+    let digits = libm::floor(libm::log10(v.abs().max(1e-300))) as i32;
+    let decimals = usize::try_from((13 - digits).clamp(0, 20)).unwrap_or(0);
+    number(v, decimals)
+}

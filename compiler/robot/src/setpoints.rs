@@ -1,0 +1,488 @@
+//! Set-points for a joint controller: position, velocity and acceleration of every joint at a fixed rate. The tool
+//! keeps to the path exactly; along it the speed rises and falls with limited acceleration, and with limited jerk when
+//! a smoothing time is given (F. R. A. de Oliveira, UFMG 2008, figures 3-1 and 3-2: the step of speed that a
+//! trajectory asks for, and what a controller makes of it).
+//!
+//! The path is parted into moves, each with the time it takes at the programmed feed; the law says how fast that time
+//! runs, from 0 (rest) to 1 (feed). Averaging the law over the smoothing time turns its ramps of speed into S-curves
+//! and leaves the path as it is.
+
+use std::fmt::Write as _;
+
+use gr_ir::Source;
+use gr_machine::JointKind;
+
+use crate::choose::unwrap;
+use crate::gather::{ArcPiece, Gathered, Move, Way};
+use crate::joints::{TooMany, matrix};
+use crate::path::{Mount, Path};
+use crate::solver::{Branches, Joints, Limits, Solver};
+use crate::{Action, MAX_JOINTS, RobotProgram, Target, Zone};
+
+/// What can be chosen.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct SetpointOptions {
+    /// Time between two set-points, s.
+    pub interval: f64,
+    /// Time in which acceleration builds up, s; 0 = at once.
+    pub smoothing: f64,
+    /// Set-points at most.
+    pub most: usize,
+}
+
+impl Default for SetpointOptions {
+    fn default() -> SetpointOptions {
+        SetpointOptions { interval: 0.004, smoothing: 0.0, most: 20_000_000 }
+    }
+}
+
+/// A set-point.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Setpoint {
+    /// Joint values, rad or mm.
+    pub position: [f64; MAX_JOINTS],
+    /// Per second.
+    pub velocity: [f64; MAX_JOINTS],
+    /// Per second².
+    pub acceleration: [f64; MAX_JOINTS],
+}
+
+/// A stream of set-points.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Setpoints {
+    /// Time between two, s.
+    pub interval: f64,
+    /// Joints.
+    pub joints: usize,
+    /// The set-points, the start first.
+    pub rows: Vec<Setpoint>,
+    kinds: Vec<JointKind>,
+    names: Vec<String>,
+}
+
+/// A joint without an acceleration in the machine file reaches its speed in this time, s.
+const RISE: f64 = 0.25;
+/// Speed of a joint the machine file gives none for, rad/s and mm/s.
+const CALM: (f64, f64) = (std::f64::consts::FRAC_PI_2, 200.0);
+
+/// A move as joints over its own time.
+struct Piece {
+    seconds: f64,
+    from: Joints,
+    to: Joints,
+    branch: u8,
+    /// None: all joints evenly.
+    path: Option<(Path, Mount)>,
+    stop: bool,
+    /// Greatest rate, and greatest change of rate per second.
+    rate: f64,
+    change: f64,
+    /// Joint velocities at its ends at rate 1.
+    ends: [Joints; 2],
+}
+
+/// A stretch of the law with constant change of rate.
+#[derive(Clone, Copy)]
+struct Ramp {
+    /// Start, s.
+    at: f64,
+    seconds: f64,
+    /// Own time of the program at the start, rate there, change of rate.
+    time: f64,
+    rate: f64,
+    change: f64,
+    /// Integral of the own time up to the start.
+    sum: f64,
+}
+
+/// Makes the set-points of a program.
+pub fn setpoints(program: &RobotProgram, options: &SetpointOptions) -> Result<Setpoints, TooMany> {
+    let mut made = Maker::new(program, options);
+    made.pieces();
+    let mut slower = 1.0;
+    loop {
+        let out = made.stream(slower)?;
+        let over = made.over(&out.rows);
+        if over <= 1.0 + 1e-6 || slower < 0.05 {
+            return Ok(out);
+        }
+        slower /= over.min(4.0) * 1.02;
+    }
+}
+
+struct Maker<'a> {
+    program: &'a RobotProgram,
+    options: &'a SetpointOptions,
+    solver: Solver,
+    limits: Limits,
+    speed: Joints,
+    acceleration: Joints,
+    list: Vec<Piece>,
+    /// Waits: before which piece, s.
+    waits: Vec<(usize, f64)>,
+    source: Option<Source>,
+}
+
+impl<'a> Maker<'a> {
+    fn new(program: &'a RobotProgram, options: &'a SetpointOptions) -> Maker<'a> {
+        let (mut speed, mut acceleration) = ([1.0; MAX_JOINTS], [1.0; MAX_JOINTS]);
+        for (i, j) in program.machine.joints.iter().enumerate() {
+            speed[i] = j.speed.unwrap_or(if j.kind == JointKind::Revolute { CALM.0 } else { CALM.1 });
+            acceleration[i] = j.acceleration.unwrap_or(speed[i] / RISE);
+        }
+        Maker {
+            program,
+            options,
+            solver: Solver::new(&program.machine),
+            limits: Limits::new(&program.machine),
+            speed,
+            acceleration,
+            list: Vec::new(),
+            waits: Vec::new(),
+            source: None,
+        }
+    }
+
+    fn pieces(&mut self) {
+        let mut g = Gathered {
+            items: Vec::new(),
+            turns: Vec::new(),
+            arcs: Vec::new(),
+            tools: self.program.tools.clone(),
+            frames: self.program.frames.clone(),
+            wait_seconds: 0.0,
+        };
+        let (mut tool, mut frame) = (0u16, 0u16);
+        let mut here = self.program.home;
+        for step in &self.program.steps {
+            self.source = step.source;
+            match &step.action {
+                Action::UseTool(t) => tool = *t,
+                Action::UseFrame(f) => {
+                    let (old, new) = (g.frames[usize::from(frame)].frame, g.frames[usize::from(*f)].frame);
+                    here.position = new.inverse().apply(old.apply(here.position));
+                    frame = *f;
+                }
+                Action::Joint { to, speed, zone } => {
+                    let to = self.program.targets[*to as usize];
+                    let times = (0..self.solver.count).map(|i| (to.joints[i] - here.joints[i]).abs() / self.speed[i]);
+                    let seconds = times.fold(0.0, f64::max) / speed;
+                    self.add(&here, &to, seconds, None, *zone);
+                    here = to;
+                }
+                Action::Linear { to, speed, zone, .. } => {
+                    here = self.cut(&mut g, here, *to, None, *speed, *zone, (tool, frame));
+                }
+                Action::Arc { via, to, center, normal, angle, speed, zone } => {
+                    let via = self.program.targets[*via as usize].position;
+                    let arc = ArcPiece { center: *center, normal: *normal, via, angle: *angle };
+                    here = self.cut(&mut g, here, *to, Some(arc), *speed, *zone, (tool, frame));
+                }
+                Action::Dwell(s) => self.wait(*s),
+                _ => {}
+            }
+        }
+    }
+
+    fn wait(&mut self, seconds: f64) {
+        if let Some(last) = self.list.last_mut() {
+            last.stop = true;
+        }
+        self.waits.push((self.list.len(), seconds));
+    }
+
+    #[allow(clippy::too_many_arguments)]
+    fn cut(&mut self, g: &mut Gathered, here: Target, to: u32, arc: Option<ArcPiece>, speed: f64, zone: Zone, (tool, frame): (u16, u16)) -> Target {
+        let to = self.program.targets[to as usize];
+        g.turns = vec![matrix(here.quaternion), matrix(to.quaternion)];
+        g.arcs.clear();
+        g.arcs.extend(arc);
+        let m = Move {
+            way: if arc.is_some() { Way::Arc(0) } else { Way::Line },
+            position: to.position,
+            turn: u32::from(here.quaternion != to.quaternion),
+            frame,
+            tool,
+            speed,
+            zone,
+            length: 0.0,
+            rapid: false,
+            free: false,
+            ours: false,
+            source: None,
+        };
+        let path = Path::new(g, here.position, 0, &m);
+        let times = (0..self.solver.count).map(|i| (to.joints[i] - here.joints[i]).abs() / self.speed[i]);
+        let least = times.fold(0.0, f64::max);
+        let seconds = if path.length > 0.0 { (path.length / speed).max(least) } else { least };
+        let mount = Mount::new(g, &m, 0.0);
+        self.add(&here, &to, seconds, Some((path, mount)), zone);
+        to
+    }
+
+    fn add(&mut self, from: &Target, to: &Target, seconds: f64, path: Option<(Path, Mount)>, zone: Zone) {
+        if !(seconds > 1e-9) {
+            return;
+        }
+        let mut piece = Piece {
+            seconds,
+            from: from.joints,
+            to: to.joints,
+            branch: to.branch,
+            path,
+            stop: zone == Zone::Stop,
+            rate: 1.0,
+            change: f64::INFINITY,
+            ends: [[0.0; MAX_JOINTS]; 2],
+        };
+        self.bound(&mut piece);
+        self.list.push(piece);
+    }
+
+    /// Joints at a share of a piece.
+    fn at(&self, p: &Piece, share: f64) -> Joints {
+        let mut even = p.from;
+        (0..self.solver.count).for_each(|i| even[i] += (p.to[i] - p.from[i]) * share);
+        let Some((path, mount)) = &p.path else { return even };
+        if share <= 0.0 {
+            return p.from;
+        }
+        if share >= 1.0 {
+            return p.to;
+        }
+        let flange = mount.flange(&path.at(share));
+        let mut q = even;
+        let mut all = Branches::NONE;
+        if self.solver.searches() {
+            q = self.solver.near(&flange, &even).unwrap_or(even);
+        } else if self.solver.all(&flange, &mut all).is_ok() {
+            let branch = if all.has(p.branch) { p.branch } else { all.good.trailing_zeros() as u8 & 7 };
+            (0..self.solver.count).for_each(|i| q[i] = all.joints[usize::from(branch)][i]);
+        }
+        unwrap(&mut q, &even, &self.limits.turns, self.solver.count);
+        q
+    }
+
+    /// How fast a piece may run, from its joints' speeds and accelerations.
+    fn bound(&self, p: &mut Piece) {
+        let looks = p.path.as_ref().map_or(1, |(path, _)| path.looks().clamp(8, 256));
+        let n = looks as f64;
+        let all: Vec<Joints> = (0..=looks).map(|k| self.at(p, k as f64 / n)).collect();
+        let h = p.seconds / n;
+        for i in 0..self.solver.count {
+            for k in 0..looks {
+                let v = (all[k + 1][i] - all[k][i]).abs() / h;
+                if v > 0.0 {
+                    p.rate = p.rate.min(self.speed[i] / v);
+                    p.change = p.change.min(0.5 * self.acceleration[i] / v);
+                }
+                if k > 0 {
+                    let a = (all[k + 1][i] - 2.0 * all[k][i] + all[k - 1][i]).abs() / (h * h);
+                    if a > 0.0 {
+                        p.rate = p.rate.min(libm::sqrt(0.5 * self.acceleration[i] / a));
+                    }
+                }
+            }
+        }
+        let small = 1e-4;
+        let (first, last) = (self.at(p, small), self.at(p, 1.0 - small));
+        for i in 0..self.solver.count {
+            p.ends[0][i] = (first[i] - p.from[i]) / (small * p.seconds);
+            p.ends[1][i] = (p.to[i] - last[i]) / (small * p.seconds);
+        }
+    }
+
+    /// Greatest rate at which one piece may go over into the next.
+    fn junction(&self, a: &Piece, b: &Piece) -> f64 {
+        if a.stop {
+            return 0.0;
+        }
+        let step = self.options.interval.max(self.options.smoothing);
+        let mut rate = a.rate.min(b.rate);
+        for i in 0..self.solver.count {
+            let jump = (a.ends[1][i] - b.ends[0][i]).abs();
+            if jump > 0.0 {
+                rate = rate.min(0.5 * self.acceleration[i] * step / jump);
+            }
+        }
+        if rate < 0.02 { 0.0 } else { rate }
+    }
+
+    /// The law: ramps of the rate over real time.
+    fn law(&self, slower: f64) -> Vec<Ramp> {
+        let n = self.list.len();
+        let mut join = vec![0.0; n + 1];
+        for k in 1..n {
+            let waits = self.waits.iter().any(|w| w.0 == k);
+            join[k] = if waits { 0.0 } else { self.junction(&self.list[k - 1], &self.list[k]) * libm::sqrt(slower) };
+        }
+        let change = |k: usize| self.list[k].change * slower;
+        for k in 0..n {
+            join[k + 1] = join[k + 1].min(libm::sqrt(join[k] * join[k] + 2.0 * change(k) * self.list[k].seconds));
+        }
+        for k in (0..n).rev() {
+            join[k] = join[k].min(libm::sqrt(join[k + 1] * join[k + 1] + 2.0 * change(k) * self.list[k].seconds));
+        }
+        let mut law = Law { ramps: Vec::new(), at: 0.0, time: 0.0, sum: 0.0 };
+        let mut done = 0.0;
+        for k in 0..n {
+            let waited: f64 = self.waits.iter().filter(|w| w.0 == k).map(|w| w.1).sum();
+            let settle = if join[k] == 0.0 { self.options.smoothing } else { 0.0 };
+            law.ramp(waited + settle, 0.0, 0.0);
+            let p = &self.list[k];
+            let (a, top) = (change(k), p.rate * libm::sqrt(slower.min(1.0)));
+            let (v0, v1) = (join[k], join[k + 1]);
+            let peak = libm::sqrt(((v0 * v0 + v1 * v1) / 2.0 + a * p.seconds).max(0.0)).min(top.max(v0).max(v1));
+            let (up, down) = ((peak - v0) / a, (peak - v1) / a);
+            let run = p.seconds - (peak + v0) / 2.0 * up - (peak + v1) / 2.0 * down;
+            law.ramp(up, v0, a);
+            if run > 0.0 {
+                law.ramp(run / peak, peak, 0.0);
+            }
+            law.ramp(down, peak, -a);
+            // Rounding must not add up.
+            done += p.seconds;
+            law.time = done;
+        }
+        let waited: f64 = self.waits.iter().filter(|w| w.0 >= n).map(|w| w.1).sum();
+        law.ramp(waited + self.options.smoothing + self.options.interval, 0.0, 0.0);
+        law.ramps
+    }
+
+    fn stream(&self, slower: f64) -> Result<Setpoints, TooMany> {
+        let law = self.law(slower);
+        let total = law.last().map_or(0.0, |r| r.at + r.seconds);
+        let dt = self.options.interval;
+        let count = libm::ceil(total / dt);
+        if !(count < self.options.most as f64) {
+            return Err(TooMany { most: self.options.most, source: self.source });
+        }
+        let starts: Vec<f64> = self
+            .list
+            .iter()
+            .scan(0.0, |t, p| {
+                let at = *t;
+                *t += p.seconds;
+                Some(at)
+            })
+            .collect();
+        let eps = dt / 4.0;
+        let mut rows = Vec::with_capacity(count as usize + 1);
+        for k in 0..=count as usize {
+            let t = k as f64 * dt;
+            let [a, b, c] = [t - eps, t, t + eps].map(|t| self.position(&law, &starts, t));
+            let mut row = Setpoint { position: b, velocity: [0.0; MAX_JOINTS], acceleration: [0.0; MAX_JOINTS] };
+            for i in 0..self.solver.count {
+                row.velocity[i] = (c[i] - a[i]) / (2.0 * eps);
+                row.acceleration[i] = (c[i] - 2.0 * b[i] + a[i]) / (eps * eps);
+            }
+            rows.push(row);
+        }
+        let names = self.program.machine.joints.iter().map(|j| j.name.clone()).collect();
+        let kinds = self.program.machine.joints.iter().map(|j| j.kind).collect();
+        Ok(Setpoints { interval: dt, joints: self.solver.count, rows, kinds, names })
+    }
+
+    /// Joints at a real time.
+    fn position(&self, law: &[Ramp], starts: &[f64], t: f64) -> Joints {
+        let width = self.options.smoothing;
+        let time = if width > 0.0 { (integral(law, t) - integral(law, t - width)) / width } else { own_time(law, t) };
+        let Some(k) = starts.partition_point(|s| *s <= time).checked_sub(1) else { return self.program.home.joints };
+        let p = &self.list[k];
+        self.at(p, ((time - starts[k]) / p.seconds).clamp(0.0, 1.0))
+    }
+
+    /// Greatest share of an acceleration limit; speeds keep theirs by the rate.
+    fn over(&self, rows: &[Setpoint]) -> f64 {
+        let each = |r: &Setpoint| (0..self.solver.count).map(|i| r.acceleration[i].abs() / self.acceleration[i]).fold(0.0, f64::max);
+        rows.iter().map(each).fold(0.0, f64::max)
+    }
+}
+
+struct Law {
+    ramps: Vec<Ramp>,
+    at: f64,
+    time: f64,
+    sum: f64,
+}
+
+impl Law {
+    fn ramp(&mut self, seconds: f64, rate: f64, change: f64) {
+        if !(seconds > 0.0) {
+            return;
+        }
+        let ramp = Ramp { at: self.at, seconds, time: self.time, rate, change, sum: self.sum };
+        self.at += seconds;
+        self.sum = ramp.integral(seconds);
+        self.time = ramp.time(seconds);
+        self.ramps.push(ramp);
+    }
+}
+
+impl Ramp {
+    fn time(&self, s: f64) -> f64 {
+        self.time + s * (self.rate + s * self.change / 2.0)
+    }
+    fn integral(&self, s: f64) -> f64 {
+        self.sum + s * (self.time + s * (self.rate / 2.0 + s * self.change / 6.0))
+    }
+}
+
+fn ramp_at(law: &[Ramp], t: f64) -> Option<&Ramp> {
+    law.get(law.partition_point(|r| r.at <= t).saturating_sub(1))
+}
+
+fn own_time(law: &[Ramp], t: f64) -> f64 {
+    ramp_at(law, t).map_or(0.0, |r| r.time((t - r.at).clamp(0.0, r.seconds)))
+}
+
+fn integral(law: &[Ramp], t: f64) -> f64 {
+    let Some(r) = ramp_at(law, t).filter(|_| t > 0.0) else { return 0.0 };
+    let inside = (t - r.at).clamp(0.0, r.seconds);
+    // After the end it stands still.
+    r.integral(inside) + (t - r.at - inside).max(0.0) * r.time(inside)
+}
+
+impl Setpoints {
+    fn shown(&self, i: usize, v: f64) -> f64 {
+        if self.kinds.get(i) == Some(&JointKind::Revolute) { v.to_degrees() } else { v }
+    }
+
+    /// As a table: time, then position, velocity and acceleration of each joint, in degrees and mm.
+    pub fn csv(&self) -> String {
+        let mut out = String::from("t");
+        for name in &self.names {
+            let name = name.replace([',', '"', '\n'], " ");
+            let _ = write!(out, ",{name},{name}/s,{name}/s2");
+        }
+        out.push('\n');
+        for (k, row) in self.rows.iter().enumerate() {
+            let _ = write!(out, "{:.6}", k as f64 * self.interval);
+            for i in 0..self.joints {
+                for v in [row.position[i], row.velocity[i], row.acceleration[i]] {
+                    let _ = write!(out, ",{:.6}", self.shown(i, v) + 0.0);
+                }
+            }
+            out.push('\n');
+        }
+        out
+    }
+
+    /// As bytes, little-endian: `GRSP`, version 1 and number of joints (u32 each), interval in s (f64), number of
+    /// set-points (u64); then for each set-point all positions, all velocities, all accelerations as f64, in rad
+    /// and mm.
+    pub fn bytes(&self) -> Vec<u8> {
+        let mut out = Vec::with_capacity(28 + self.rows.len() * self.joints * 24);
+        out.extend(b"GRSP");
+        out.extend(1u32.to_le_bytes());
+        out.extend((self.joints as u32).to_le_bytes());
+        out.extend(self.interval.to_le_bytes());
+        out.extend((self.rows.len() as u64).to_le_bytes());
+        for row in &self.rows {
+            for column in [&row.position, &row.velocity, &row.acceleration] {
+                column[..self.joints].iter().for_each(|v| out.extend(v.to_le_bytes()));
+            }
+        }
+        out
+    }
+}
