@@ -1,7 +1,7 @@
 // Starts `gcc-robot lsp` for G-code and STEP-NC, and adds what the protocol does not have: tool path, output beside
 // the source, builds.
 
-import type * as vscode from "vscode";
+import * as vscode from "vscode";
 import { registerCommands, registerStatus } from "./commands";
 import { Outputs } from "./output";
 import { Previews } from "./preview";
@@ -20,6 +20,11 @@ export async function activate(context: vscode.ExtensionContext) {
   registerStatus(context);
   registerTasks(context);
   registerStepNc(context);
+  context.subscriptions.push(
+    vscode.workspace.onDidChangeConfiguration((e) => {
+      if (e.affectsConfiguration("gccRobot.server.path")) void server?.start();
+    }),
+  );
   await server.start();
 }
 

@@ -1,7 +1,7 @@
 // What a target makes of a document, live beside it: a read-only document whose lines know where they come from.
 
 import * as vscode from "vscode";
-import { analysed, bytes, type Output, output as request } from "./protocol";
+import { bytes, type Output, output as request } from "./protocol";
 import type { Server } from "./server";
 
 export const SCHEME = "gcc-robot-output";
@@ -67,11 +67,9 @@ export class Outputs implements vscode.TextDocumentContentProvider {
     context: vscode.ExtensionContext,
     private readonly server: Server,
   ) {
-    server.onClient((client) => {
-      client.onNotification(analysed, ({ uri }) => this.refresh(client.protocol2CodeConverter.asUri(uri)));
-    });
     context.subscriptions.push(
       this.mark,
+      server.onAnalysed((uri) => void this.refresh(uri)),
       vscode.workspace.registerTextDocumentContentProvider(SCHEME, this),
       vscode.window.onDidChangeTextEditorSelection((e) => this.follow(e)),
       vscode.workspace.onDidCloseTextDocument((d) => this.shown.delete(d.uri.toString())),

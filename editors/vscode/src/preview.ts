@@ -1,7 +1,7 @@
 // The tool path in a panel beside the text. The component is the one of `gcc-robot preview`.
 
 import * as vscode from "vscode";
-import { analysed, bytes, type Path, preview as request } from "./protocol";
+import { bytes, type Path, preview as request } from "./protocol";
 import type { Server } from "./server";
 
 /** How long the text rests before its path is asked for, ms: the server says itself when it is ready. */
@@ -137,12 +137,8 @@ export class Previews {
     private readonly context: vscode.ExtensionContext,
     private readonly server: Server,
   ) {
-    server.onClient((client) => {
-      client.onNotification(analysed, ({ uri }) => {
-        this.panels.get(client.protocol2CodeConverter.asUri(uri).toString())?.refresh();
-      });
-    });
     context.subscriptions.push(
+      server.onAnalysed((uri) => this.panels.get(uri.toString())?.refresh()),
       vscode.window.onDidChangeTextEditorSelection((e) =>
         this.panels.get(e.textEditor.document.uri.toString())?.mark(),
       ),

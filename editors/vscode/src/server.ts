@@ -5,6 +5,7 @@ import { homedir } from "node:os";
 import { delimiter, join } from "node:path";
 import * as vscode from "vscode";
 import { LanguageClient, RevealOutputChannelOn, State } from "vscode-languageclient/node";
+import { analysed } from "./protocol";
 
 export const LANGUAGES = ["gcode", "p21"];
 const SECTION = "gccRobot";
@@ -31,22 +32,17 @@ function settings(): unknown {
 
 export class Server implements vscode.Disposable {
   client: LanguageClient | undefined;
-  /** What waits for a server, whenever one is started. */
-  private readonly waiting: ((client: LanguageClient) => void)[] = [];
+  private readonly analysed = new vscode.EventEmitter<vscode.Uri>();
+  /** The server has finished with a version of a document: what is shown of it can be asked for again. */
+  readonly onAnalysed = this.analysed.event;
 
   constructor(private readonly context: vscode.ExtensionContext) {}
-
-  /** Called with every client that is started. */
-  onClient(then: (client: LanguageClient) => void) {
-    this.waiting.push(then);
-    if (this.client) then(this.client);
-  }
 
   async start() {
     await this.stop();
     const command = program(this.context);
     if (!command) {
-      await missing();
+      void missing();
       return;
     }
     const client = new LanguageClient(
@@ -70,7 +66,7 @@ export class Server implements vscode.Disposable {
       },
     );
     this.client = client;
-    for (const then of this.waiting) then(client);
+    client.onNotification(analysed, ({ uri }) => this.analysed.fire(client.protocol2CodeConverter.asUri(uri)));
     try {
       await client.start();
     } catch (problem) {
