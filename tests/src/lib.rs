@@ -1,5 +1,6 @@
 //! Helpers that the tests of the whole share.
 
+pub mod controller;
 pub mod full;
 pub mod generate;
 pub mod linuxcnc;

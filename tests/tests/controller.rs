@@ -1,0 +1,166 @@
+//! STEP-NC on the real controller: written programs through `rs274` and through LinuxCNC's interpreter in full
+//! precision, one on the simulated machine to its end, and one in AXIS behind the filter, on a screen that is looked at.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::Duration;
+
+use gr_tests::controller::{Controller, Screen};
+use gr_tests::full;
+use gr_tests::oracle::{Job, Verdict, differ, gcc_robot, kept, reference, root, score};
+use gr_tests::process::run;
+
+/// Files that become programs for a mill with three axes.
+const PARTS: [&str; 5] = [
+    "docs/examples/case-study.p21",
+    "tests/linuxcnc/quick.p21",
+    "tests/golden/unb2013/fig4-45_slot-square-u.p21",
+    "tests/golden/unb2013/example-a_conical-hole.p21",
+    "tests/golden/ufsc2016/example1.p21",
+];
+
+fn ours(folder: &Path, args: &[&str]) -> String {
+    let out = run(Command::new(gcc_robot()).args(args).current_dir(folder), Duration::from_secs(60)).expect("runs");
+    assert_eq!(out.status, Some(0), "{args:?}: {}", out.errors());
+    out.output()
+}
+
+/// `rs274` 2.9 is an inch machine.
+fn in_inches(table: &str) -> String {
+    let word = |w: &str| match w.split_at(1) {
+        (l @ ("Z" | "D"), v) => format!("{l}{:.9}", v.parse::<f64>().expect("a number") / 25.4),
+        _ => w.to_string(),
+    };
+    let line = |l: &str| l.split(';').next().unwrap_or("").split_whitespace().map(word).collect::<Vec<_>>().join(" ") + "\n";
+    table.lines().map(line).collect()
+}
+
+/// Number → length.
+fn lengths(table: &str) -> Vec<(i32, f64)> {
+    let value = |l: &str, letter: char| l.split_whitespace().find_map(|w| w.strip_prefix(letter)?.parse::<f64>().ok());
+    table.lines().filter_map(|l| Some((value(l, 'T')? as i32, value(l, 'Z')?))).collect()
+}
+
+#[test]
+fn written_programs_pass_the_interpreter() {
+    let Some(rs274) = reference() else { return };
+    for part in PARTS {
+        let folder = tempfile::tempdir().expect("a folder");
+        let source = root().join(part);
+        for options in [&[][..], &["--cycles"], &["--tool-change-at", "g53"], &["--tool-change-at", "g55"], &["--tool-change-at", "g30"], &["--units", "inch"]] {
+            let mut args = vec!["build", "-q", source.to_str().expect("UTF-8"), "-o", "part.ngc"];
+            args.extend(options);
+            ours(folder.path(), &args);
+            let program = std::fs::read(folder.path().join("part.ngc")).expect("written");
+            let table = std::fs::read_to_string(folder.path().join("part.tbl")).expect("written");
+            let job = Job { tools: Some(in_inches(&table)), ..Job::new(program) };
+            assert_eq!(differ(&job, &rs274), Verdict::Same, "{part} {options:?}");
+            let accepted = job.reference(&rs274);
+            assert!(accepted.ok(), "{part} {options:?}: {}", accepted.ended.errors());
+        }
+        in_full_precision(part, folder.path(), &source);
+    }
+}
+
+/// As a machine in millimeters with the table as it was written: every move ends where ours ends.
+fn in_full_precision(part: &str, folder: &Path, source: &Path) {
+    ours(folder, &["build", "-q", source.to_str().expect("UTF-8"), "-o", "mm.ngc", "--decimals", "7"]);
+    let Some(path) = full::path(&folder.join("mm.ngc"), Some(&folder.join("mm.tbl"))) else { return };
+    assert_eq!(path.end, "ok", "{part}");
+    let table = std::fs::read_to_string(folder.join("mm.tbl")).expect("written");
+    let theirs: Vec<[f64; 3]> = path.moves.iter().map(|m| [m.end[0], m.end[1], m.end[2]]).collect();
+    let csv = ours(folder, &["build", "-q", source.to_str().expect("UTF-8"), "--target", "csv"]);
+    let mut at = 0;
+    for p in ends(&csv, &lengths(&table)) {
+        // A move of nothing has no counterpart there.
+        let next = theirs[at..].iter().take(3).position(|q| (0..3).all(|i| (p[i] - q[i]).abs() < 2e-6));
+        let standing = at > 0 && (0..3).all(|i| (p[i] - theirs[at - 1][i]).abs() < 2e-6);
+        match next {
+            Some(n) => at += n + 1,
+            None => assert!(standing || p[..2] == [0.0, 0.0], "{part}: {p:?} is not among {:?}", &theirs[at..(at + 4).min(theirs.len())]),
+        }
+    }
+    assert!(at + 1 >= theirs.len(), "{part}: {} of {} moves", at, theirs.len());
+}
+
+/// Ends of the moves of a table, in machine coordinates.
+fn ends(csv: &str, lengths: &[(i32, f64)]) -> Vec<[f64; 3]> {
+    let mut out = Vec::new();
+    for row in csv.lines().skip(1).map(|l| l.split(',').collect::<Vec<_>>()).filter(|r| r[1] != "dwell") {
+        let n = |i: usize| row[i].parse::<f64>().expect("a number");
+        let tool = n(14) as i32;
+        let length = lengths.iter().find(|l| l.0 == tool).map_or(0.0, |l| l.1);
+        out.push([n(2), n(3), n(4) + length]);
+    }
+    out
+}
+
+fn distance(p: [f64; 3], a: [f64; 3], b: [f64; 3]) -> f64 {
+    let d: [f64; 3] = std::array::from_fn(|i| b[i] - a[i]);
+    let length: f64 = d.iter().map(|v| v * v).sum();
+    let along: f64 = (0..3).map(|i| (p[i] - a[i]) * d[i]).sum();
+    let t = if length == 0.0 { 0.0 } else { (along / length).clamp(0.0, 1.0) };
+    (0..3).map(|i| (p[i] - a[i] - t * d[i]).powi(2)).sum::<f64>().sqrt()
+}
+
+/// The simulated machine follows our motion: at no millisecond is a joint further from our path than the corner
+/// tolerance that the program asks for, and no corner of the path is left out.
+#[test]
+fn the_machine_follows_the_motion() {
+    let part = root().join("tests/linuxcnc/quick.p21");
+    let Some(machine) = Controller::new("@FOLDER@/drive.py", &part, "part.ngc") else { return };
+    assert_eq!(machine.filter().status, Some(0));
+    let ended = machine.run(Duration::from_secs(120));
+    let log = ended.output();
+    assert!(ended.status == Some(0) && log.lines().any(|l| l == "done"), "{}: {log}\n{}", ended.how(), ended.errors());
+    let text = std::fs::read_to_string(machine.path("samples.txt")).expect("recorded");
+    let samples: Vec<[f64; 3]> = text
+        .lines()
+        .filter_map(|l| {
+            let mut n = l.split_whitespace().map_while(|v| v.parse::<f64>().ok());
+            Some([n.next()?, n.next()?, n.next()?])
+        })
+        .collect();
+    let folder = tempfile::tempdir().expect("a folder");
+    let csv = ours(folder.path(), &["build", "-q", part.to_str().expect("UTF-8"), "--target", "csv", "--arc-tolerance", "0.0005"]);
+    let table = std::fs::read_to_string(machine.path("tool.tbl")).expect("written");
+    let mut path = vec![[0.0; 3]];
+    path.extend(ends(&csv, &lengths(&table)));
+    let program = std::fs::read_to_string(machine.path("part.ngc")).expect("written");
+    let blend: f64 = program.lines().find_map(|l| l.strip_prefix("G64 P")?.parse().ok()).expect("a corner tolerance");
+    let moving: Vec<[f64; 3]> = samples.iter().copied().enumerate().filter(|(i, s)| *i == 0 || samples[i - 1] != *s).map(|(_, s)| s).collect();
+    let to_path = |s: [f64; 3]| path.windows(2).map(|w| distance(s, w[0], w[1])).fold(f64::INFINITY, f64::min);
+    let worst = moving.iter().map(|s| to_path(*s)).fold(0.0, f64::max);
+    // The machine makes 0.04 mm in a millisecond at this feed; corners of rapids are passed faster.
+    let to_samples = |p: [f64; 3]| moving.windows(2).map(|w| distance(p, w[0], w[1])).fold(f64::INFINITY, f64::min);
+    let missed = path.iter().map(|p| to_samples(*p)).fold(0.0, f64::max);
+    score("simulator", &format!("simulator: {} ms, joints at most {worst:.4} mm off our path, corners passed within {missed:.4} mm (G64 P{blend})", samples.len()));
+    assert!(moving.len() > 2000 && samples.len() < 60_000, "{} samples", samples.len());
+    assert!(worst < blend + 0.0015, "{worst} mm off the path");
+    assert!(missed < blend + 0.0015, "a corner is missed by {missed} mm");
+}
+
+/// AXIS opens the shipped part through the filter, runs it, and the viewer marks the workingstep that is running.
+#[test]
+fn axis_opens_and_follows_a_part() {
+    let Some(screen) = Screen::new(1500, 800) else { return };
+    let part = root().join("docs/examples/case-study.p21");
+    let Some(machine) = Controller::new("axis", &part, "part.p21") else { return };
+    assert_eq!(machine.filter().status, Some(0));
+    let mut axis = machine.start(&screen.display);
+    let state = machine.wait_for("state.txt", 90, |t| t.starts_with('6'));
+    // The mark needs a moment to be drawn.
+    std::thread::sleep(Duration::from_secs(2));
+    let picture = screen.picture();
+    let shot: PathBuf = kept("screens").join("axis.ppm");
+    std::fs::write(&shot, picture.ppm()).expect("target is writable");
+    drop(screen);
+    let _ = axis.wait();
+    let state = state.unwrap_or_else(|e| panic!("{e}"));
+    let lines: Vec<&str> = state.lines().collect();
+    assert!(lines[1].ends_with("/part.p21"), "{state}");
+    assert_eq!(lines[2..], ["STEP-NC Program", "52"], "the first workingstep of the plan is running");
+    assert!(picture.count([0xFF, 0xE0, 0x8A]) > 2000, "the statement is marked: {}", shot.display());
+    // AXIS draws feed moves white on black.
+    assert!(picture.count([0, 0, 0]) > 20_000 && picture.count([255, 255, 255]) > 20_000, "{}", shot.display());
+}
