@@ -191,7 +191,7 @@ fn speed_term(cx: &mut Cx, speed: f64) -> String {
         }
         None => {
             let range = "0.1 inch/min to 2000 mm/s";
-            cx.say(code::VENDOR_FEED_RANGE, &[num(speed, 4), "mm/s".into(), TRAITS.title.into(), range.into()]);
+            cx.say(code::VENDOR_FEED_RANGE, &[num(speed, 4), range.into(), TRAITS.title.into()]);
             "1mm/sec".into()
         }
     }

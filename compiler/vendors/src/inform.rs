@@ -126,7 +126,7 @@ impl Writer {
     fn speed(cx: &mut Cx, speed: f64) -> String {
         let written = libm::round(speed * 10.0) / 10.0;
         if !(0.1..=1500.0).contains(&written) {
-            cx.say(code::VENDOR_FEED_RANGE, &[num(speed, 4), "mm/s".into(), TRAITS.title.into(), "0.1 to 1500 mm/s".into()]);
+            cx.say(code::VENDOR_FEED_RANGE, &[num(speed, 4), "0.1 to 1500 mm/s".into(), TRAITS.title.into()]);
         }
         cx.rounded(speed, written, &format!("V={}", fix(written, 1)));
         fix(written, 1)

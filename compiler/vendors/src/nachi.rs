@@ -59,7 +59,7 @@ impl Writer {
     fn motion(&mut self, cx: &mut Cx, kind: &str, place: &str, speed: f64, zone: Option<f64>) {
         let written = libm::round(speed * 100.0) / 100.0;
         if written < 0.01 {
-            let args = [num(speed, 4), "mm/s".into(), TRAITS.title.into(), "0.01 mm/s and more".into()];
+            let args = [num(speed, 4), "0.01 mm/s and more".into(), TRAITS.title.into()];
             cx.say(gr_text::code::VENDOR_FEED_RANGE, &args);
         }
         cx.rounded(speed, written, &format!("S={}", fix(written, 2)));

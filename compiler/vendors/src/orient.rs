@@ -8,6 +8,11 @@ use gr_machine::math::{Frame, M3, rotation_vector, transpose};
 /// Below this sine the pole is reached: 2·10⁻⁶ degrees, less than anything a program is written with.
 const POLE: f64 = 4e-8;
 
+/// Half a turn is written as 180°, not −180°.
+fn half(angle: f64) -> f64 {
+    if angle + std::f64::consts::PI < 1e-9 { std::f64::consts::PI } else { angle }
+}
+
 /// Matrix of a unit quaternion, scalar first.
 pub(crate) fn matrix(q: &[f64; 4]) -> M3 {
     let [w, x, y, z] = *q;
@@ -42,12 +47,12 @@ pub(crate) fn fixed_xyz(m: &M3, before: [f64; 3]) -> [f64; 3] {
     let (sa, ca) = libm::sincos(a);
     let b = libm::atan2(-m[2][0], m[2][1] * sa + m[2][2] * ca);
     let c = libm::atan2(sa * m[0][2] - ca * m[0][1], ca * m[1][1] - sa * m[1][2]);
-    [a, b, c]
+    [a, b, c].map(half)
 }
 
 /// R = Rx(rx)·Ry(ry)·Rz(rz); at the pole rx is that of the point before.
 pub(crate) fn moving_xyz(m: &M3, before: [f64; 3]) -> [f64; 3] {
-    fixed_xyz(&transpose(m), before.map(|v| -v)).map(|v| -v)
+    fixed_xyz(&transpose(m), before.map(|v| -v)).map(|v| half(-v))
 }
 
 /// R = Rz(o)·Ry(a)·Rz(t); at the pole o is that of the point before.
@@ -57,7 +62,7 @@ pub(crate) fn zyz(m: &M3, before: [f64; 3]) -> [f64; 3] {
     let (s, c) = libm::sincos(o);
     let a = libm::atan2(if lean < POLE { 0.0 } else { c * m[0][2] + s * m[1][2] }, m[2][2]);
     let t = libm::atan2(c * m[1][0] - s * m[0][0], c * m[1][1] - s * m[0][1]);
-    [o, a, t]
+    [o, a, t].map(half)
 }
 
 /// Axis times angle.

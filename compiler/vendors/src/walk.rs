@@ -314,7 +314,7 @@ impl<'p> Cx<'p> {
     fn line(&mut self, body: &mut dyn Body, to: &Target, speed: f64, zone: Option<f64>) {
         self.length = self.before.map_or(0.0, |b| norm(sub(to.position, b.position)));
         if !(speed > 0.0 && speed < FAR) {
-            self.say(code::VENDOR_FEED_RANGE, &[num(speed, 6), "mm/s".into(), self.traits.title.into(), "more than 0".into()]);
+            self.say(code::VENDOR_FEED_RANGE, &[num(speed, 6), "more than 0".into(), self.traits.title.into()]);
             return;
         }
         body.op(self, Op::Linear { to, speed, zone });
@@ -343,7 +343,7 @@ impl<'p> Cx<'p> {
             if speed > 0.0 && speed < FAR {
                 body.op(self, Op::Arc { via, to, speed, zone });
             } else {
-                self.say(code::VENDOR_FEED_RANGE, &[num(speed, 6), "mm/s".into(), self.traits.title.into(), "more than 0".into()]);
+                self.say(code::VENDOR_FEED_RANGE, &[num(speed, 6), "more than 0".into(), self.traits.title.into()]);
             }
             (self.before, self.moved) = (Some(*to), true);
             return;

@@ -28,7 +28,6 @@ fn axes(text: &str) -> Option<Vec<f64>> {
 }
 
 fn run(files: &[File], text: &str, home: &str, s: &mut State, depth: u32) -> Result<(), Fault> {
-    let mut distance = 0.0;
     let mut skip = false;
     for raw in text.lines() {
         let line = raw.split(';').next().unwrap_or("").trim();
@@ -37,7 +36,7 @@ fn run(files: &[File], text: &str, home: &str, s: &mut State, depth: u32) -> Res
             skip = line != "ENDIF";
             continue;
         }
-        let zone = line.ends_with("C_DIS").then_some(distance);
+        let zone = line.ends_with("C_DIS").then_some(s.distance);
         if line.is_empty() || line.starts_with('&') || line.starts_with("DEF ") || line == "END" || line == "HALT" {
         } else if line == "PTP XHOME" {
             s.joint(axes(home).ok_or_else(fault)?);
@@ -67,7 +66,7 @@ fn run(files: &[File], text: &str, home: &str, s: &mut State, depth: u32) -> Res
         } else if line.starts_with("$VEL.CP=") {
             s.speed = after(line, "$VEL.CP=").ok_or_else(fault)? * 1000.0;
         } else if line.starts_with("$APO.CDIS=") {
-            distance = after(line, "$APO.CDIS=").ok_or_else(fault)?;
+            s.distance = after(line, "$APO.CDIS=").ok_or_else(fault)?;
         } else if line.starts_with("$OUT[") {
             s.set(signal(line), f64::from(u8::from(line.ends_with("TRUE"))));
         } else if line.starts_with("$ANOUT[") {

@@ -10,13 +10,15 @@ pub(crate) struct State {
     pub frame: Option<Frame>,
     pub speed: f64,
     pub zone: Option<f64>,
+    /// The corner distance that zones take where moves only say that there is one.
+    pub distance: f64,
     /// The first point of an arc given in two statements.
     pub via: Option<Place>,
 }
 
 impl State {
     pub(crate) fn new() -> State {
-        State { events: Vec::new(), tool: None, frame: None, speed: 0.0, zone: None, via: None }
+        State { events: Vec::new(), tool: None, frame: None, speed: 0.0, zone: None, distance: 0.0, via: None }
     }
     pub(crate) fn place(&self, pose: Frame, configuration: Configuration) -> Place {
         Place::of_pose(pose, configuration, self.tool, self.frame)

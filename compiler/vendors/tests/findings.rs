@@ -1,0 +1,114 @@
+//! What can't be written is said, at its line, and nothing is written then.
+
+mod common;
+use common::*;
+use gr_ir::Texts;
+use gr_machine::Signal;
+use gr_robot::{Action, Zone};
+use gr_text::{FileId, Severity};
+use gr_vendors::{Options, Output};
+
+fn one(target: &str, m: Action) -> Output {
+    let (id, home, _) = robot_of(target);
+    let mut b = Builder::new(machine(id), home);
+    b.add(&Move::Other(m));
+    run(target, &b, true)
+}
+
+fn run(target: &str, b: &Builder, allow_unverified: bool) -> Output {
+    let sources = Texts::new([(FileId(0), "T1\nG54\nthe line\nanother\n")]);
+    gr_vendors::language(target).unwrap().emit(&b.program, &sources, &Options { allow_unverified, decimals: None })
+}
+
+fn signal_of(word: &str, value: Option<f64>, signal: Signal) -> Action {
+    Action::Signal { word: word.into(), value, signal }
+}
+
+/// The findings as text, with their place; checks that an error stops everything.
+fn told(output: &Output) -> String {
+    let errors = output.findings.iter().any(|f| f.severity == Severity::Error);
+    assert_eq!(errors, output.files.is_empty());
+    output.findings.iter().map(|f| format!("{:?} {} at {:?}: {}\n", f.severity, f.code.def().code, f.primary().1, f.message)).collect()
+}
+
+#[test]
+fn every_finding() {
+    let mut all = String::new();
+    let mut note = |what: &str, output: Output| all += &format!("{what}\n{}\n", told(&output));
+    let (id, home, _) = robot_of("vplus");
+    note("E0620 unverified", run("vplus", &Builder::new(machine(id), home), false));
+    note("E0621 a signal without a number", one("krl", signal_of("M3", None, signal("doSpindle"))));
+    note("E0621 a signal that is no name", one("rapid", signal_of("M3", None, signal("do spindle"))));
+    note("E0622 nothing to switch", one("rapid", signal_of("M8", None, Signal::default())));
+    let mut b = Builder::new(gr_machine::builtin("kuka/kr16-2").unwrap(), robot_of("krl").1);
+    b.add(&Move::Other(signal_of("S", Some(9000.0), signal("AO[1]"))));
+    note("E0623 speed of an unknown spindle", run("krl", &b, true));
+    note("E0623 too fast", one("urscript", signal_of("S", Some(30000.0), signal("AO[1]"))));
+    let line = |speed: f64, zone: Option<f64>| Move::Line { shift: [5.0, 0.0, 0.0], turn: [0.0; 3], speed, zone };
+    let moved = |target: &str, m: Move| {
+        let (id, home, _) = robot_of(target);
+        let mut b = Builder::new(machine(id), home);
+        assert!(b.add(&m));
+        run(target, &b, true)
+    };
+    note("E0624 rounded feed", moved("inform", line(1000.0 / 60.0, None)));
+    note("E0624 in the unit that rounds least", moved("fanuc-ls", line(33.37, None)));
+    note("E0625 too slow", moved("fanuc-ls", line(0.01, None)));
+    note("E0625 no speed", moved("rapid", line(0.0, None)));
+    note("E0626 a helix", moved("rapid", Move::Helix { radius: 5.0, angle: 90.0, rise: 2.0, speed: 10.0 }));
+    let (id, home, _) = robot_of("urscript");
+    let mut b = Builder::new(machine(id), home);
+    for i in 0..2600 {
+        b.add(&Move::Line { shift: [if i % 2 == 0 { 1.0 } else { -1.0 }, 0.0, 0.0], turn: [0.0; 3], speed: 10.0, zone: None });
+    }
+    note("E0627 a long script", run("urscript", &b, true));
+    b.program.machine.cell.controller.points = Some(100);
+    note("E0635 longer than the machine file allows", run("urscript", &b, true));
+    let (id, home, _) = robot_of("rapid");
+    let mut b = Builder::new(machine(id), home);
+    b.program.name = "module".into();
+    b.program.tools[0].name = "Fräser größer als alle anderen Fräser".into();
+    note("E0628 names", run("rapid", &b, true));
+    let mut b = Builder::new(machine(id), home);
+    assert!(b.add(&line(10.0, None)));
+    b.program.targets[0].position[1] = f64::NAN;
+    note("E0629 no number", run("rapid", &b, true));
+    note("E0630 another kind of machine", run("rapid", &Builder::new(machine("adept/one"), robot_of("vplus").1), true));
+    note("E0631 a whole turn and more", {
+        let mut b = Builder::new(machine("kuka/kr16-2"), &[10.0, -80.0, 85.0, 349.0, 60.0, -30.0]);
+        assert!(b.add(&Move::Joint { by: [1.0, 1.0, 1.0, 0.5, 1.0, 1.0], share: 0.1 }));
+        b.program.targets[0].joints[3] = 6.4;
+        run("krl", &b, true)
+    });
+    note("E0632 no such thing", one("val3", Action::Pause { optional: false }));
+    note("E0633 letters", one("rapid", Action::Message("Fräser wechseln".into())));
+    note("E0634 optional stop", one("rapid", Action::Pause { optional: true }));
+    note("E0637 corners", moved("inform", line(10.0, Some(0.5))));
+    insta::assert_snapshot!(all);
+    for code in 620..=637 {
+        assert!(all.contains(&format!(" E0{code} at")), "E0{code} is never raised");
+    }
+}
+
+#[test]
+fn damaged_programs_do_not_panic() {
+    for target in TARGETS {
+        let mut p = sample(target);
+        p.steps.insert(2, p.steps[4].clone());
+        p.steps.insert(0, gr_robot::Step { action: Action::Linear { to: 9999, speed: 1.0, zone: Zone::Stop, rapid: false }, source: None });
+        assert!(emit(target, &p).files.is_empty(), "{target}");
+        let mut p = sample(target);
+        p.steps.insert(0, gr_robot::Step { action: Action::UseTool(77), source: None });
+        p.steps.insert(0, gr_robot::Step { action: Action::UseFrame(77), source: None });
+        emit(target, &p);
+        let mut p = sample(target);
+        for t in &mut p.targets {
+            t.joints = [f64::INFINITY; gr_robot::MAX_JOINTS];
+        }
+        assert!(emit(target, &p).files.is_empty(), "{target}");
+        let mut p = sample(target);
+        p.tools.clear();
+        p.frames.clear();
+        emit(target, &p);
+    }
+}
