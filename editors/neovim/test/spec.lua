@@ -296,6 +296,56 @@ test("explain shows the long text of a diagnostic", function()
   contains(shown, "E0203")
 end)
 
+-- One request over a socket; the page's browser speaks the same.
+local function http(address, method, path, body)
+  local host, port, base = address:match("^http://([%d.]+):(%d+)(/.*)$")
+  local answer, closed = "", false
+  local socket = vim.loop.new_tcp()
+  socket:connect(host, tonumber(port), function()
+    socket:write(("%s %s%s HTTP/1.1\r\nHost: %s:%s\r\nContent-Length: %d\r\n\r\n%s"):format(method, base, path, host, port, #body, body))
+    socket:read_start(function(_, data)
+      answer = answer .. (data or "")
+      closed = data == nil
+    end)
+  end)
+  wait("the answer of " .. address, function()
+    return closed
+  end)
+  socket:close()
+  return answer
+end
+
+test("preview: the page is served, follows the text, and moves the cursor", function()
+  local robot = require("gcc-robot")
+  local address
+  robot.options.open = function(given)
+    address = given
+  end
+  local buffer = open("docs/examples/flange.ngc", "shown.ngc")
+  vim.cmd("GccRobotPreview")
+  wait("the page", function()
+    return address
+  end)
+  equal(require("gcc-robot.preview").address(buffer), address)
+  contains(http(address, "GET", "", ""), "<gcc-robot-preview>")
+  contains(http(address, "GET", "path", ""), '"positions"')
+  contains(http(address:gsub("/%x+/$", "/0/"), "GET", "path", ""), "404")
+  contains(http(address, "POST", "choose", "52"), "204")
+  wait("the chosen line", function()
+    return vim.api.nvim_win_get_cursor(0)[1] == 53
+  end)
+  vim.api.nvim_buf_set_lines(buffer, 52, 53, false, { "G3 I-13 J1 F900 Q" })
+  vim.cmd("doautocmd TextChanged")
+  wait("the mistake in the page", function()
+    return http(address, "GET", "path", ""):find("line 53", 1, true)
+  end)
+  vim.cmd("GccRobotPreviewStop")
+  wait("the end", function()
+    return require("gcc-robot.preview").address(buffer) == nil
+  end)
+  robot.options.open = nil
+end)
+
 test("numbers of the requests", function()
   equal(require("gcc-robot.commands").integers("AQAAAP////8="), { 1, 4294967295 })
 end)

@@ -100,6 +100,7 @@ export class Preview extends HTMLElement {
   /** Shows a path. The camera stays where it is when one was shown before. */
   setScene(scene: Scene) {
     const first = this.scene.count === 0;
+    const whole = this.seconds >= this.end();
     this.scene = scene;
     this.points = [];
     this.pause();
@@ -108,8 +109,7 @@ export class Preview extends HTMLElement {
     if (first) this.camera.fit(scene.bounds);
     this.describe();
     this.findMarked();
-    this.seconds = Math.min(this.seconds, this.end());
-    if (first || this.seconds >= this.end()) this.seconds = this.end();
+    this.seconds = first || whole ? this.end() : Math.min(this.seconds, this.end());
     this.draw(false);
   }
 

@@ -224,7 +224,7 @@ test("errors are underlined; hover tells what is wrong", async () => {
 
 test("a fix is offered and applied", async () => {
   const source = readFileSync(join(workspace, "workplan.stp"), "utf8").split(/\r?\n/);
-  const line = source.findIndex((l) => l.includes("CENTER_DRILL")) + 1;
+  const line = source.findIndex((l) => l.includes("CENTER_DRILL(")) + 1;
   await open("workplan.stp");
   await retry("the language", async () => /STEP-NC/.test(await language()));
   await place(line, 6);
@@ -236,7 +236,7 @@ test("a fix is offered and applied", async () => {
   await retry("the corrected line", async () =>
     (await lines(".editor-group-container")).some((l) => l.includes("CENTERDRILL(")),
   );
-  assert.ok(!(await lines(".editor-group-container")).some((l) => l.includes("CENTER_DRILL")));
+  assert.ok(!(await lines(".editor-group-container")).some((l) => l.includes("CENTER_DRILL(")));
   await page.keyboard.press("Control+s");
   await retry("the saved file", () => readFileSync(join(workspace, "workplan.stp"), "utf8").includes("CENTERDRILL("));
   await command("View: Close All Editors");
