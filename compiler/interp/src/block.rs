@@ -45,6 +45,8 @@ pub struct Block {
     pub user_m: i16,
     /// The motion this block makes (G-code times ten), −1 = none.
     pub motion: i16,
+    /// Fanuc: G68 or G69 (times ten), −1 = none.
+    pub turning: i16,
     /// Steps of execution that are done already (a remapped block is executed in several goes).
     pub(crate) done: u32,
     /// Steps of execution that a remap takes over.
@@ -62,6 +64,7 @@ impl Default for Block {
             m_count: 0,
             user_m: -1,
             motion: -1,
+            turning: -1,
             done: 0,
             remapped: 0,
         }
@@ -109,6 +112,7 @@ impl Block {
             self.user_m = -1;
         }
         self.motion = -1;
+        self.turning = -1;
         self.done = 0;
         self.remapped = 0;
     }

@@ -67,6 +67,14 @@ impl<S: Sink> Interp<'_, S> {
         // Fanuc controls repeat K times; older ones L times.
         let letter = if self.is_fanuc() && self.block.has(b'k') { b'k' } else { b'l' };
         let repeats = self.block.get(letter).map_or(1, |l| l as i32);
+        if self.is_fanuc() {
+            if !crate::check::is_cycle(self.m.motion as i16) {
+                self.m.before_cycle = self.m.motion;
+            }
+            if repeats == 0 && letter == b'k' {
+                return self.store_cycle(g, plane, r);
+            }
+        }
         if repeats <= 0 {
             let needed = format!("{} of at least 1", letter.to_ascii_uppercase() as char);
             return Err(word_missing(&needed, rs274::CYCLE_NO_REPEATS).at(letter));
@@ -76,6 +84,24 @@ impl<S: Sink> Interp<'_, S> {
         self.m.cycle_l = repeats;
         self.m.cycle_r = r;
         self.m.motion = g;
+        Ok(())
+    }
+
+    /// K0 of a Fanuc control: the words are kept, nothing is drilled.
+    fn store_cycle(&mut self, g: i32, plane: Plane, r: f64) -> Res {
+        let axes = plane_axes(plane);
+        let again = self.m.motion == g;
+        if !again && !self.block.has(LETTERS[axes[2]]) {
+            return Err(normal_missing(plane));
+        }
+        if self.m.cycle_il_set == 0 {
+            (self.m.cycle_il, self.m.cycle_il_set) = (self.m.current[axes[2]], 1);
+        }
+        let given = self.block.get(LETTERS[axes[2]]).unwrap_or(self.m.cycle_cc);
+        let mut hole = self.hole(g, plane, axes, r, given);
+        self.cycle_words(&mut hole, again)?;
+        self.keep_cycle_words(&hole);
+        (self.m.cycle_cc, self.m.cycle_r, self.m.motion) = (given, r, g);
         Ok(())
     }
 

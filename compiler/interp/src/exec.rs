@@ -320,6 +320,10 @@ impl<S: Sink> Interp<'_, S> {
             330 | 331 | 760 => self.convert_straight(motion),
             382..=385 => self.convert_probe(motion),
             800 => {
+                if self.is_fanuc() {
+                    self.m.motion = self.m.before_cycle;
+                    return Ok(());
+                }
                 self.remark("interpreter: motion mode set to none");
                 self.m.motion = 800;
                 Ok(())

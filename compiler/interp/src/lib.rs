@@ -22,6 +22,7 @@ mod block;
 mod carry;
 mod comp;
 mod cycles;
+mod fanuc;
 mod fault;
 mod files;
 mod params;

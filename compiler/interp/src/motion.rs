@@ -60,7 +60,7 @@ impl<S: Sink> Interp<'_, S> {
     }
 
     /// The programmed point that words count from.
-    fn start_point(&self) -> Axes {
+    pub(crate) fn start_point(&self) -> Axes {
         let m = &self.m;
         let mut start = m.current;
         if m.comp_side != 0 && m.comp_first == 0 {

@@ -2,9 +2,10 @@
 
 use gr_canon::{Sink, Version};
 use gr_gcode::{Form, Scan, Target, Word};
-use gr_spec::{Family, code, rs274};
+use gr_spec::{code, rs274};
 
 use crate::block::slot;
+use crate::fanuc::is_lathe;
 use crate::eval::{not_whole, to_int, whole};
 use crate::io::Comment;
 use crate::{Fault, Interp, Res};
@@ -16,9 +17,6 @@ pub(crate) enum Slot {
     /// Index into the names of the chunk.
     Named(u32),
 }
-
-/// The dialect whose G90, G92, G94, G98 and G99 are those of G-code system A.
-const TURN: &str = "fanuc-turn";
 
 /// Modal group of each G-code times ten; −1 = not a code.
 static G_GROUPS: [i8; 1000] = g_groups();
@@ -234,6 +232,7 @@ impl<S: Sink> Interp<'_, S> {
                     return negative(if letter == b'f' { rs274::RT_NEGATIVE_F } else { rs274::RT_NEGATIVE_S });
                 }
             }
+            b'h' if is_lathe(self.setup.dialect) => self.put(letter, value)?,
             b't' | b'h' | b'l' => {
                 if self.block.has(letter) {
                     return Err(repeated(letter));
@@ -262,7 +261,7 @@ impl<S: Sink> Interp<'_, S> {
                 self.block.set(letter, f64::from(to_int(value)));
             }
             b'a' | b'b' | b'c' | b'd' | b'e' | b'i' | b'j' | b'k' | b'r' => self.put(letter, value)?,
-            b'u' | b'v' | b'w' if self.setup.uvw || self.in_contour => self.put(letter, value)?,
+            b'u' | b'v' | b'w' if self.setup.uvw || self.in_contour || is_lathe(self.setup.dialect) => self.put(letter, value)?,
             _ => {
                 let shown = upper(letter).to_string();
                 return Err(Fault::new(code::SYNTAX_BAD_CHARACTER, rs274::BAD_CHARACTER)
@@ -290,7 +289,7 @@ impl<S: Sink> Interp<'_, S> {
         if n < 0 {
             return Err(Fault::new(code::WORD_NEGATIVE, rs274::RT_NEGATIVE_G).arg("G").at(b'g'));
         }
-        if self.is_fanuc() && self.setup.dialect.id == TURN {
+        if is_lathe(self.setup.dialect) {
             // G-code system A: feed per minute and per revolution.
             n = match n {
                 980 => 940,
@@ -298,6 +297,9 @@ impl<S: Sink> Interp<'_, S> {
                 940 => return Err(self.not_carried_out(rs274::RT_UNKNOWN_G, "G94".into()).at(b'g')),
                 _ => n,
             };
+        }
+        if self.is_fanuc() && self.take_fanuc_g(n) {
+            return Ok(());
         }
         let remapped = self.config.g_remap(n).map(|r| r.group);
         let group = match remapped {
@@ -353,14 +355,9 @@ impl<S: Sink> Interp<'_, S> {
         Ok(())
     }
 
-    #[inline]
-    pub(crate) fn is_fanuc(&self) -> bool {
-        self.setup.dialect.family == Family::Fanuc
-    }
-
     /// Codes that a Fanuc control knows with another meaning than ours: better refused than done wrongly.
     fn means_otherwise(&self, n: i32) -> bool {
-        if self.setup.dialect.id == TURN {
+        if is_lathe(self.setup.dialect) {
             matches!(n, 100 | 700 | 710 | 720 | 730 | 740 | 750 | 760 | 830..=890 | 900 | 920)
         } else {
             matches!(n, 760 | 870)

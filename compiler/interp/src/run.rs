@@ -412,6 +412,7 @@ impl<'a, S: Sink> Interp<'a, S> {
         self.emit(Call::SetG92Offset(self.m.g92));
         self.emit(Call::SetXyRotation(self.m.rotation));
         self.emit(Call::SetFeedReferenceXyz);
+        self.fanuc_power_up();
         self.run_startup();
     }
 
@@ -665,7 +666,14 @@ impl<'a, S: Sink> Interp<'a, S> {
     /// After the words are read: checks, settings, execution.
     #[inline]
     pub(crate) fn execute_line(&mut self) -> Res {
+        let fanuc = self.is_fanuc();
+        if fanuc {
+            self.fanuc_words()?;
+        }
         self.enhance()?;
+        if fanuc && self.m.turned != 0 {
+            self.turn_words()?;
+        }
         self.check()?;
         self.note_remaps();
         if !self.settings.is_empty() {

@@ -70,6 +70,12 @@ pub struct Modal {
     /// Where the last G5 ended: a G5 without I and J continues it only from there. (What it continues with is in
     /// `cycle_i` and `cycle_j`, which G87 shares, as in the controller.)
     pub spline_tail: [f64; 2],
+    /// Fanuc, G68: centre of the rotation in the plane, angle in degrees.
+    pub turn: [f64; 3],
+    /// Fanuc: motion code that G80 goes back to.
+    pub before_cycle: i32,
+    /// Keeps what follows in place.
+    pub pad_before: i32,
     /// Canned cycle repeats.
     pub cycle_l: i32,
     /// Tool orientation 0 … 9 for lathe compensation.
@@ -140,8 +146,10 @@ pub struct Modal {
     pub input_wanted: u8,
     /// Parameters that hold a stand-in for what only the machine knows: bit 0 an input, bit 1 a probe.
     pub stand_ins: u8,
+    /// Fanuc: G68 is on.
+    pub turned: u8,
     /// Always 0; keeps the size a multiple of eight.
-    pub pad: [u8; 5],
+    pub pad: [u8; 4],
 }
 
 impl Modal {
@@ -198,8 +206,14 @@ impl State {
         // A Fanuc control wakes up in G0 (or G1, as its parameters say); LinuxCNC in no motion at all.
         modal.motion = if setup.dialect.family == Family::Fanuc { 0 } else { 800 };
         modal.plane = Plane::Xy as u8;
+        if crate::fanuc::is_lathe(setup.dialect) {
+            (modal.plane, modal.lathe_diameter, modal.feed_mode) = (Plane::Xz as u8, 1, 2);
+        }
         modal.units = Units::Mm as u8;
         modal.retract_r = 1;
+        if setup.dialect.family == Family::Fanuc {
+            modal.retract_r = 0; // G98
+        }
         modal.path_mode = 2;
         modal.comp_first = 1;
         modal.feed_override = 1;

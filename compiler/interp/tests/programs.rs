@@ -238,7 +238,7 @@ fn every_code_of_the_fanuc_lists_is_known() {
                 }
             }
         }
-        for code in ["G27", "G65", "G68"] {
+        for code in ["G27", "G66", "G51"] {
             assert_eq!(refused.contains(&code), Dialect::find(id).unwrap().code(code).is_some(), "{id}: {code}");
         }
         for code in ["G0", "G1", "G2", "G4", "G28", "G54", "M3", "M30", "M98"] {
@@ -273,6 +273,75 @@ fn a_fanuc_mill_wakes_up_in_g0_and_repeats_with_k() {
     assert_eq!(calls.iter().filter(|c| c.starts_with("STRAIGHT_FEED")).count(), 3);
     let (old, _) = run_fanuc("fanuc-mill", &text.replace("K3", "L3"));
     assert_eq!(calls, old);
+}
+
+fn moves_of(calls: &[String]) -> Vec<String> {
+    let kinds = [("STRAIGHT_TRAVERSE(", "rapid "), ("STRAIGHT_FEED(", "feed "), ("ARC_FEED(", "arc ")];
+    let numbers = |rest: &str, n: usize| {
+        let all: Vec<f64> = rest.trim_end_matches(')').split(", ").filter_map(|v| v.parse().ok()).collect();
+        all[..n.min(all.len())].iter().map(|v| format!("{}", v + 0.0)).collect::<Vec<_>>().join(" ")
+    };
+    let one = |c: &String| {
+        let (rest, name) = kinds.iter().find_map(|(k, name)| Some((c.strip_prefix(k)?, *name)))?;
+        Some(format!("{name}{}", numbers(rest, if name == "arc " { 5 } else { 3 })))
+    };
+    calls.iter().filter_map(one).collect()
+}
+
+/// Fanuc Series 0i/30i, lathe, G-code system A (B-63944, B-64484): X and U are diameters, U W H are increments, the
+/// control wakes up in G18 and G99; I of an arc is a radius.
+#[test]
+fn a_fanuc_lathe_has_diameters_and_increments() {
+    let text = "O1\nG21\nG97 S500 M3\nG0 X100. Z5.\nG1 U-20. W-10. F0.2\nX60.\nU10.\nG2 U20. W-10. R10.\nG3 U20. W10. I0. K10.\nG98 F100.\nG1 W-1. H5.\nG28 U0. W0.\nM30\n";
+    let (calls, outcome) = run_fanuc("fanuc-turn", text);
+    assert!(outcome.ok(), "{:?}", outcome.findings);
+    assert!(calls.iter().any(|c| c == "SET_FEED_MODE(0, 1)"), "{calls:?}");
+    assert_eq!(
+        moves_of(&calls)[..8],
+        ["rapid 50 0 5", "feed 40 0 -5", "feed 30 0 -5", "feed 35 0 -5", "arc -15 45 -5 45 -1", "arc -5 55 -5 45 1", "feed 55 0 -6", "rapid 55 0 -6"]
+    );
+    let feeds = calls.iter().position(|c| c == "SET_FEED_RATE(100.0000)").expect("F of G98");
+    assert!(calls[..feeds].iter().filter(|c| *c == "SET_FEED_MODE(0, 0)").count() == 1);
+    assert!(calls.iter().any(|c| c == "STRAIGHT_FEED(55.0000, 0.0000, -6.0000, 0.0000, 0.0000, 5.0000)"), "{calls:?}");
+    let (_, outcome) = run_fanuc("fanuc-turn", "G0 X10. U5.\nM30\n");
+    assert_eq!(outcome.findings[0].fault.code, code::WORD_REPEATED);
+}
+
+/// The same manual, machining center: coordinate system rotation (G68, G69).
+#[test]
+fn a_fanuc_mill_turns_coordinates() {
+    let text = "G21 G90 F100.\nG68 X0. Y0. R90.\nG1 X20. Y5.\nX30.\nG91 X5.\nG90 G2 X45. I5. J0.\nG0 Z10.\nG81 X10. Y0. Z-5. R2.\nX12.\nG80\nG69\nG0 X1. Y1.\nG68 X10. Y10. R180.\nX0. Y0.\nG69\nG68 R90.\nG0 X30. Y20.\nG69\nM30\n";
+    let (calls, outcome) = run_fanuc("fanuc-mill", text);
+    assert!(outcome.ok(), "{:?}", outcome.findings);
+    assert_eq!(
+        moves_of(&calls),
+        [
+            "feed -5 20 0", "feed -5 30 0", "feed -5 35 0", "arc -5 45 -5 40 -1", "rapid -5 45 10", // G90 and G91, arc
+            "rapid 0 10 10", "rapid 0 10 2", "feed 0 10 -5", "rapid 0 10 10", "rapid 0 12 10", "rapid 0 12 2", "feed 0 12 -5",
+            "rapid 0 12 10", "rapid 1 1 10", "rapid 20 20 10", "rapid 20 30 10", // about another centre, about here
+        ]
+    );
+    for text in ["G68 X0. Y0. R5.\nG28 X0.\nM30\n", "G68 R5.\nG18\nM30\n", "G91\nG68 R5.\nM30\n", "G68 R5.\nG55\nM30\n"] {
+        let (_, outcome) = run_fanuc("fanuc-mill", text);
+        assert_eq!(outcome.findings[0].fault.code, code::CODE_NOT_CARRIED_OUT, "{text}");
+    }
+    let (_, outcome) = run_fanuc("fanuc-mill", "G68 X1. Y1.\nM30\n");
+    assert_eq!(outcome.findings[0].fault.code, code::WORD_MISSING);
+}
+
+/// The same manual, canned cycles: K0 stores the data and drills nothing; G80 goes back to the motion of group 01.
+#[test]
+fn fanuc_cycles_store_and_cancel() {
+    let text = "G21 G90\nG1 X1. F100.\nG81 X5. Z-5. R2. K0\nX10.\nG80\nX9.\nG81 X6. Z-5. R2.\nG80 Z50.\nM30\n";
+    let (calls, outcome) = run_fanuc("fanuc-mill", text);
+    assert!(outcome.ok(), "{:?}", outcome.findings);
+    assert_eq!(
+        moves_of(&calls),
+        [
+            "feed 1 0 0", "rapid 1 0 2", "rapid 10 0 2", "feed 10 0 -5", "rapid 10 0 2", "feed 9 0 2", "rapid 6 0 2", "feed 6 0 -5",
+            "rapid 6 0 2", "feed 6 0 50",
+        ]
+    );
 }
 
 #[test]

@@ -1,0 +1,167 @@
+//! What a Fanuc control does otherwise than LinuxCNC: increments U V W H and diameters of a lathe, rotation of
+//! coordinates (G68, G69), G80 that goes back to the motion before the cycle. Sources stand with the rows of the
+//! dialects.
+
+use gr_canon::{Call, Plane, Sink};
+use gr_spec::{Dialect, Family, code, rs274};
+
+use crate::block::{Group, letters};
+use crate::motion::rotate;
+use crate::queue::plane_axes;
+use crate::{Fault, Interp, Res};
+
+/// The lathe: G-code system A.
+const TURN: &str = "fanuc-turn";
+
+/// Increments of a lathe, and the axis that each moves.
+const INCREMENTS: [(u8, u8); 4] = [(b'u', b'x'), (b'v', b'y'), (b'w', b'z'), (b'h', b'c')];
+const INCREMENT_MASK: u32 = letters(b"uvwh");
+const LETTERS: [u8; 9] = *b"xyzabcuvw";
+const CENTRES: [u8; 3] = *b"ijk";
+
+/// A lathe of G-code system A: X is a diameter, U V W H are increments, G98 and G99 choose the feed.
+pub(crate) fn is_lathe(dialect: &Dialect) -> bool {
+    dialect.id == TURN
+}
+
+impl<S: Sink> Interp<'_, S> {
+    #[inline]
+    pub(crate) fn is_fanuc(&self) -> bool {
+        self.setup.dialect.family == Family::Fanuc
+    }
+
+    /// What the control says of itself when it is switched on.
+    pub(crate) fn fanuc_power_up(&mut self) {
+        if is_lathe(self.setup.dialect) {
+            self.emit(Call::SelectPlane(Plane::Xz));
+            self.emit(Call::SetFeedMode(0, 1));
+        }
+    }
+
+    /// Codes with no place among those of LinuxCNC: true when it is one.
+    pub(crate) fn take_fanuc_g(&mut self, n: i32) -> bool {
+        let known = matches!(n, 680 | 690) && self.setup.dialect.code(if n == 680 { "G68" } else { "G69" }).is_some();
+        if known {
+            self.block.turning = n as i16;
+        }
+        known
+    }
+
+    /// Before the block is looked at as a whole: words that mean something else here become those that it knows.
+    pub(crate) fn fanuc_words(&mut self) -> Res {
+        if self.block.turning != -1 {
+            return self.turn_coordinates();
+        }
+        let dwell = self.block.g(Group::NonModal) == 40;
+        if is_lathe(self.setup.dialect) && self.block.has_any_of(INCREMENT_MASK) && !dwell {
+            self.increments()?;
+        }
+        // G80 goes back to the motion of group 01, which a bare axis word then makes.
+        if self.block.g(Group::Motion) == 800 && self.has_axes() {
+            self.m.motion = self.m.before_cycle;
+            self.m.cycle_il_set = 0;
+            self.block.g[Group::Motion as usize] = -1;
+            self.block.g_mask &= !(1 << Group::Motion as u32);
+        }
+        Ok(())
+    }
+
+    /// U V W H of a lathe: distances from where the axis is.
+    fn increments(&mut self) -> Res {
+        for (letter, axis) in INCREMENTS {
+            let Some(by) = self.block.get(letter) else { continue };
+            if self.block.has(axis) {
+                let both = format!("{} beside {}", upper(letter), upper(axis));
+                return Err(Fault::new(code::WORD_REPEATED, rs274::MULTIPLE_WORDS).arg(both).at(letter));
+            }
+            // A diameter, like X.
+            let by = if letter == b'u' { by / 2.0 } else { by };
+            let at = LETTERS.iter().position(|l| *l == axis).unwrap_or(0);
+            let from = if self.block.g(Group::NonModal) == 530 { self.machine_position()[at] } else { self.start_point()[at] };
+            self.block.unset(letter);
+            self.block.set(axis, from + by);
+        }
+        Ok(())
+    }
+
+    /// G68 X Y R, G69.
+    fn turn_coordinates(&mut self) -> Res {
+        let on = std::mem::replace(&mut self.block.turning, -1) == 680;
+        if !on {
+            self.m.turned = 0;
+            return Ok(());
+        }
+        let refuse = |what: &str| {
+            Err(Fault::new(code::CODE_NOT_CARRIED_OUT, rs274::RT_UNKNOWN_G).arg(format!("G68 {what}")).arg("Coordinate rotation").at(b'g'))
+        };
+        if self.m.incremental != 0 {
+            return refuse("in G91");
+        }
+        if self.m.comp_side != 0 {
+            return refuse("while cutter compensation is on");
+        }
+        if self.block.g_mask & !(1 << Group::Plane as u32) != 0 || self.block.g(Group::Plane) != -1 {
+            return refuse("together with another G-code");
+        }
+        let [one, two, _] = plane_axes(self.m.plane());
+        let Some(angle) = self.block.get(b'r') else {
+            return Err(Fault::new(code::WORD_MISSING, rs274::RT_UNKNOWN_G).arg("G68").arg("R").at(b'g'));
+        };
+        // Without a centre the present position is it.
+        let centre = [one, two].map(|i| self.block.get(LETTERS[i]).unwrap_or(self.m.current[i]));
+        self.m.turn = [centre[0], centre[1], angle];
+        self.m.turned = 1;
+        self.block.present = 0;
+        Ok(())
+    }
+
+    /// While G68 is on, the words of the plane become those of the work frame.
+    pub(crate) fn turn_words(&mut self) -> Res {
+        let special = self.block.g(Group::NonModal);
+        let system = self.block.g(Group::CoordSystem) != -1;
+        if self.block.g(Group::Plane) != -1 || system || !matches!(special, -1 | 40) {
+            let what = if special > 0 && special != 40 { crate::check::code_name(special) } else { "a change of plane or coordinate system".into() };
+            return Err(Fault::new(code::CODE_NOT_CARRIED_OUT, rs274::RT_UNKNOWN_G).arg(format!("{what} while G68 is on")).arg("Coordinate rotation").at(b'g'));
+        }
+        let [one, two, _] = plane_axes(self.m.plane());
+        let [cx, cy, angle] = self.m.turn;
+        let (a, b) = (LETTERS[one], LETTERS[two]);
+        if matches!(self.block.motion, 20 | 30) && !self.block.has(b'r') {
+            let (i, j) = (CENTRES[one], CENTRES[two]);
+            if self.block.has(i) || self.block.has(j) {
+                let (mut x, mut y) = (self.block.or_zero(i), self.block.or_zero(j));
+                rotate(&mut x, &mut y, angle);
+                self.block.set(i, x);
+                self.block.set(j, y);
+            }
+        }
+        if !self.block.has(a) && !self.block.has(b) || self.block.motion == -1 {
+            return Ok(());
+        }
+        let incremental = match self.block.g(Group::Distance) {
+            910 => true,
+            900 => false,
+            _ => self.m.incremental != 0,
+        };
+        if incremental {
+            let (mut x, mut y) = (self.block.or_zero(a), self.block.or_zero(b));
+            rotate(&mut x, &mut y, angle);
+            self.block.set(a, x);
+            self.block.set(b, y);
+            return Ok(());
+        }
+        let start = self.start_point();
+        let (mut x, mut y) = (start[one] - cx, start[two] - cy);
+        rotate(&mut x, &mut y, -angle);
+        x = self.block.get(a).map_or(x, |v| v - cx);
+        y = self.block.get(b).map_or(y, |v| v - cy);
+        rotate(&mut x, &mut y, angle);
+        self.block.set(a, x + cx);
+        self.block.set(b, y + cy);
+        Ok(())
+    }
+}
+
+fn upper(letter: u8) -> char {
+    char::from(letter.to_ascii_uppercase())
+}
