@@ -12,7 +12,7 @@ use gr_tests::process::run;
 
 /// Files that become programs for a mill with three axes.
 const PARTS: [&str; 5] = [
-    "docs/examples/case-study.p21",
+    "docs/examples/stepnc/case-study.p21",
     "tests/linuxcnc/quick.p21",
     "tests/golden/unb2013/fig4-45_slot-square-u.p21",
     "tests/golden/unb2013/example-a_conical-hole.p21",
@@ -144,7 +144,7 @@ fn the_machine_follows_the_motion() {
 #[test]
 fn axis_opens_and_follows_a_part() {
     let Some(screen) = Screen::new(1500, 800) else { return };
-    let part = root().join("docs/examples/case-study.p21");
+    let part = root().join("docs/examples/stepnc/case-study.p21");
     let Some(machine) = Controller::new("axis", &part, "part.p21") else { return };
     assert_eq!(machine.filter().status, Some(0));
     let mut axis = machine.start(&screen.display);

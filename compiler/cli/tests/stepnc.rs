@@ -14,7 +14,7 @@ fn golden(name: &str) -> String {
 }
 
 fn case_study() -> String {
-    root().join("docs/examples/case-study.p21").to_string_lossy().into_owned()
+    root().join("docs/examples/stepnc/case-study.p21").to_string_lossy().into_owned()
 }
 
 struct Folder(tempfile::TempDir);
