@@ -1,6 +1,7 @@
 //! From findings to diagnostics: whole-file byte positions, labels, the way execution took, one message for one
 //! mistake.
 
+use std::cell::OnceCell;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::sync::Arc;
@@ -11,7 +12,7 @@ use gr_spec::{Code, Severity, code};
 use gr_text::{Diagnostic, FileId, Frame, Span};
 
 use crate::db::{Database, Db, Document, scanned, shape};
-use crate::layout::{Layout, layout};
+use crate::layout::{Layout, bytes, layout};
 use crate::library::sub_file;
 use crate::engine::End;
 use crate::lints::Found;
@@ -69,6 +70,8 @@ struct Assembly<'a> {
     document: Document,
     id: FileId,
     layout: &'a Layout,
+    /// First byte of each chunk.
+    bytes: OnceCell<Vec<u32>>,
     timeline: &'a Timeline<'a>,
     /// The same finding in every pass of a loop is one diagnostic.
     seen: BTreeMap<(FileId, u32, Code, Option<u8>, Option<(u32, u32)>), usize>,
@@ -88,6 +91,7 @@ impl<'a> Assembly<'a> {
             document,
             id,
             layout: layout(db, document),
+            bytes: OnceCell::new(),
             timeline,
             seen: BTreeMap::new(),
             told: BTreeSet::new(),
@@ -151,6 +155,10 @@ impl<'a> Assembly<'a> {
         self.passes.push(1);
     }
 
+    fn first_byte(&self, chunk: usize) -> u32 {
+        self.bytes.get_or_init(|| bytes(self.db, self.document))[chunk]
+    }
+
     /// The chunk a line is in.
     fn source(&self, file: FileId, line: u32) -> Option<Source> {
         if file != self.id {
@@ -160,12 +168,12 @@ impl<'a> Assembly<'a> {
         }
         let starts = &self.layout.starts;
         let last = starts.len().checked_sub(2)?;
-        let at = starts.partition_point(|s| s.0 <= line).saturating_sub(1).min(last);
+        let at = starts.partition_point(|s| *s <= line).saturating_sub(1).min(last);
         let chunk = *self.document.chunks(self.db).get(at)?;
         let run = self.document.run(self.db);
         let text = chunk.text(self.db).clone();
         let scan = scanned(self.db, chunk, run);
-        Some(Source { chunk: Chunk { text, scan }, start: starts[at].1, line: line - starts[at].0 })
+        Some(Source { chunk: Chunk { text, scan }, start: self.first_byte(at), line: line - starts[at] })
     }
 
     fn trace(&self, innermost: FrameId, frames: &Arc<[(FrameId, CallFrame)]>) -> Vec<Frame> {
@@ -194,7 +202,7 @@ impl<'a> Assembly<'a> {
             if !shape(self.db, *chunk, run).damaged {
                 continue;
             }
-            let (first_line, start) = self.layout.starts[at];
+            let (first_line, start) = (self.layout.starts[at], self.first_byte(at));
             let scan = scanned(self.db, *chunk, run);
             let mut last = u32::MAX;
             for fault in scan.faults.iter() {

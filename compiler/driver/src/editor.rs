@@ -47,12 +47,12 @@ pub(crate) fn trace(db: &Database, document: Document, lines: &Range<u32>, wante
 fn run(db: &Database, document: Document, lines: &Range<u32>, wanted: &[Parameter], budget: u32) -> Option<Vec<Traced>> {
     let timeline = timeline_to(db, document, lines.end.saturating_sub(1));
     let starts = &layout(db, document).starts;
-    let count = starts.last()?.0;
+    let count = *starts.last()?;
     if lines.start >= count || lines.is_empty() {
         return None;
     }
     let lines = lines.start..lines.end.min(count);
-    let at = starts.partition_point(|s| s.0 <= lines.start).checked_sub(1)?;
+    let at = starts.partition_point(|s| *s <= lines.start).checked_sub(1)?;
     let stretch = nearest(db, document, timeline, at)?;
     let chunks = document.chunks(db);
     let straight = chunks.iter().all(|c| !shape(db, *c, document.run(db)).control);

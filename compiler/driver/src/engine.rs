@@ -417,7 +417,7 @@ pub(crate) fn finish(context: &Finish<'_>) -> Vec<Found> {
     let mut found = Vec::new();
     let Finish { layout, main, options, modal, end } = context;
     let place = |line| Where { file: *main, line, frame: FrameId::MAIN };
-    let last_line = layout.starts.last().map_or(0, |s| s.0).saturating_sub(1);
+    let last_line = layout.starts.last().map_or(0, |lines| lines.saturating_sub(1));
     match end {
         Some(end) if !end.stopped && !end.program => found.extend(left_on(modal, place(end.line), &options.rules)),
         Some(_) => {}

@@ -29,17 +29,17 @@ pub(crate) fn state_at(db: &Database, document: Document, line: u32) -> Option<S
     let options = run.options(db);
     let timeline = timeline_to(db, document, line);
     let starts = &layout(db, document).starts;
-    if line >= starts.last()?.0 {
+    if line >= *starts.last()? {
         return None;
     }
-    let at = starts.partition_point(|s| s.0 <= line).checked_sub(1)?;
+    let at = starts.partition_point(|s| *s <= line).checked_sub(1)?;
     if let Some(known) = timeline.entries.get(at).copied().flatten()
         && !crate::db::shape(db, *document.chunks(db).get(at)?, run).control
     {
         let chunk = *document.chunks(db).get(at)?;
         let chunk = gr_gcode::Chunk { text: chunk.text(db).clone(), scan: scanned(db, chunk, run) };
         let (entry, env) = (known.entry.boundary(db), known.env.environment(db));
-        return engine::around(&chunk, line - starts[at].0, entry, env, options);
+        return engine::around(&chunk, line - starts[at], entry, env, options);
     }
     // Inside of control flow: run from where it begins.
     let stretch = nearest(db, document, timeline, at)?;

@@ -15,7 +15,6 @@ use crate::lints::Found;
 pub(crate) struct Part {
     pub(crate) chunk: ChunkText,
     pub(crate) first_line: u32,
-    pub(crate) first_byte: u32,
     /// Something may send execution elsewhere.
     pub(crate) control: bool,
     /// Reads or writes parameters or the tool table, or may.
@@ -26,8 +25,8 @@ pub(crate) struct Part {
 #[derive(Clone, PartialEq, Debug, Default)]
 pub(crate) struct Layout {
     pub(crate) parts: Box<[Part]>,
-    /// First line and first byte of each chunk, and after the last one the totals.
-    pub(crate) starts: Box<[(u32, u32)]>,
+    /// First line of each chunk, and after the last one their number.
+    pub(crate) starts: Box<[u32]>,
     /// Lines that skipping must look at.
     stops: Box<[u32]>,
     /// Lines with M2 or M30.
@@ -57,11 +56,11 @@ pub(crate) fn layout(db: &dyn Db, document: Document) -> Layout {
     let mut starts = Vec::with_capacity(chunks.len() + 1);
     let mut parts = Vec::with_capacity(chunks.len());
     let (mut stops, mut ends, mut statements) = (Vec::new(), Vec::new(), Vec::new());
-    let (mut first_line, mut first_byte) = (0, 0);
+    let mut first_line = 0;
     let (mut percent, mut first_percent, mut first_control) = (None, None, None);
     for (chunk, s) in chunks.iter().zip(&shapes) {
-        starts.push((first_line, first_byte));
-        parts.push(Part { chunk: *chunk, first_line, first_byte, control: s.control, environment: s.environment });
+        starts.push(first_line);
+        parts.push(Part { chunk: *chunk, first_line, control: s.control, environment: s.environment });
         stops.extend(s.stops.iter().map(|l| l + first_line));
         ends.extend(s.ends.iter().map(|l| l + first_line));
         statements.extend(s.statements.iter().map(|s| s.shifted(first_line)));
@@ -69,9 +68,8 @@ pub(crate) fn layout(db: &dyn Db, document: Document) -> Layout {
         first_percent = first_percent.or(s.first_percent.map(|l| l + first_line));
         first_control = first_control.or(s.first_control.map(|l| l + first_line));
         first_line += s.lines;
-        first_byte += s.bytes;
     }
-    starts.push((first_line, first_byte));
+    starts.push(first_line);
     let mut labels = Vec::new();
     crate::lints::labels(&shapes, &starts, options, &mut labels);
     labels.iter_mut().for_each(|f| f.place.file = main);
@@ -89,11 +87,24 @@ pub(crate) fn layout(db: &dyn Db, document: Document) -> Layout {
     }
 }
 
+/// First byte of each chunk, and after the last one their number. Edits change them all the time, and only places in
+/// the text depend on them.
+pub(crate) fn bytes(db: &dyn Db, document: Document) -> Vec<u32> {
+    let run = document.run(db);
+    let mut starts = vec![0];
+    let mut at = 0;
+    starts.extend(document.chunks(db).iter().map(|c| {
+        at += shape(db, *c, run).bytes;
+        at
+    }));
+    starts
+}
+
 /// The chunk that holds a line.
 #[salsa::tracked(returns(copy))]
 pub(crate) fn chunk_of(db: &dyn Db, document: Document, line: u32) -> Option<(ChunkText, u32)> {
     let layout = layout(db, document);
-    if line >= layout.starts.last()?.0 {
+    if line >= *layout.starts.last()? {
         return None;
     }
     let at = layout.parts.partition_point(|p| p.first_line <= line).checked_sub(1)?;

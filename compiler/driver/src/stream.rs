@@ -140,9 +140,8 @@ fn says_nothing(lints: Lints<'_>, files: &Loaded, setup: &Setup, rules: &Rules) 
     let file = files.main.file();
     let options = Options { setup: setup.clone(), rules: rules.clone(), chunk_lines: None };
     let shapes: Vec<Shape> = file.chunks.iter().map(|c| shape_of(&c.scan, &c.text, &options.setup)).collect();
-    let starts: Vec<(u32, u32)> = file.first_lines.iter().copied().zip(file.starts.iter().copied()).collect();
     let mut found = Vec::new();
-    crate::lints::labels(&shapes.iter().collect::<Vec<_>>(), &starts, &options, &mut found);
+    crate::lints::labels(&shapes.iter().collect::<Vec<_>>(), &file.first_lines, &options, &mut found);
     found.is_empty()
 }
 

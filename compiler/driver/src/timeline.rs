@@ -186,7 +186,7 @@ pub(crate) fn timeline_to<'db>(db: &'db dyn Db, document: Document, line: u32) -
 /// The run that goes on from the nearest known state before a chunk.
 pub(crate) fn nearest<'db>(db: &'db dyn Db, document: Document, timeline: &Timeline<'db>, chunk: usize) -> Option<Stretch<'db>> {
     let (at, known) = timeline.entries.get(..=chunk)?.iter().enumerate().rev().find_map(|(i, k)| Some((i, (*k)?)))?;
-    Some(known.stretch(db, document, layout(db, document).starts.get(at)?.0))
+    Some(known.stretch(db, document, *layout(db, document).starts.get(at)?))
 }
 
 /// What is carried along for lints that compare distant parts.
@@ -228,9 +228,6 @@ const GIVE_UP: usize = 100;
 /// Cuts everything behind the fault at which the interpreter gives up, and says on which line that is. The
 /// interpreter counts within the stretch that it runs; here the whole file counts.
 fn too_many(groups: &mut Vec<Group>) -> Option<u32> {
-    if groups.iter().map(|g| g.found.len()).sum::<usize>() < GIVE_UP {
-        return None;
-    }
     let mut count = 0;
     for g in 0..groups.len() {
         for (at, found) in groups[g].found.iter().enumerate() {
@@ -295,6 +292,8 @@ fn unreached_end(layout: &Layout, groups: &[Group], unclosed: &[Found], main: Fi
 /// A file while it is being put together.
 struct Fold<'db> {
     groups: Vec<Group>,
+    /// Findings in them.
+    spoken: usize,
     late: Late,
     end: Option<End>,
     /// Unclosed statements of the other files that were opened.
@@ -311,6 +310,7 @@ fn fold<'db>(db: &'db dyn Db, document: Document, last_line: u32) -> Timeline<'d
     let parts = &layout.parts;
     let mut fold = Fold {
         groups: Vec::new(),
+        spoken: 0,
         late: Late::default(),
         end: None,
         others: Vec::new(),
@@ -327,11 +327,13 @@ fn fold<'db>(db: &'db dyn Db, document: Document, last_line: u32) -> Timeline<'d
             fold.step(db, document, &parts[at]);
             at += 1;
         }
+        if fold.spoken >= GIVE_UP
+            && let Some(line) = too_many(&mut fold.groups)
+        {
+            fold.end = Some(End { line, stopped: true, program: false });
+        }
     }
-    let Fold { mut groups, mut late, mut end, others, known, entries } = fold;
-    if let Some(line) = too_many(&mut groups) {
-        end = Some(End { line, stopped: true, program: false });
-    }
+    let Fold { mut groups, mut late, mut end, others, known, entries, .. } = fold;
     let complete = at >= parts.len() || end.is_some();
     let after_error = drop_consequences(&mut groups, main, layout.first_control.unwrap_or(0));
     if complete {
@@ -382,6 +384,7 @@ impl<'db> Fold<'db> {
         self.late.take(&step.summary, Some((FileId(document.id(db)), first_line)), &run.options(db).rules);
         let mut labels = labels;
         if !step.found.is_empty() {
+            self.spoken += step.found.len();
             self.groups.push(Group { first_line, found: step.found.clone(), frames: None });
             if step.found.iter().any(|f| f.from == From::Fault) {
                 let mut carry = labels.carry(db).clone();
@@ -399,6 +402,7 @@ impl<'db> Fold<'db> {
         let flow = flow(db, document, line, entry, env, labels);
         self.late.take(&flow.summary, None, &document.run(db).options(db).rules);
         if !flow.found.is_empty() {
+            self.spoken += flow.found.len();
             self.groups.push(Group { first_line: 0, found: flow.found.clone(), frames: Some(flow.frames.clone()) });
         }
         for (file, found) in &flow.unclosed {

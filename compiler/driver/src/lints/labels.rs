@@ -9,11 +9,11 @@ use crate::Options;
 use crate::db::{Label, LabelKind, Outline, Shape};
 
 /// Looks through the labels of all chunks.
-pub(crate) fn labels(shapes: &[&Shape], starts: &[(u32, u32)], options: &Options, found: &mut Vec<Found>) {
+pub(crate) fn labels(shapes: &[&Shape], starts: &[u32], options: &Options, found: &mut Vec<Found>) {
     if shapes.iter().all(|s| s.labels.is_empty()) {
         return;
     }
-    let all = || shapes.iter().zip(starts).flat_map(|(s, start)| s.labels.iter().map(|l| (l, start.0 + l.line)));
+    let all = || shapes.iter().zip(starts).flat_map(|(s, start)| s.labels.iter().map(move |l| (l, start + l.line)));
     let mut report = |code: Code, line: u32, letter: u8, name: &str| {
         if let Some(severity) = options.rules.severity(code) {
             let place = Where { line, ..Where::default() };
