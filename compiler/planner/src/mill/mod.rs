@@ -39,6 +39,7 @@ pub(crate) struct Given {
     pub tells: bool,
 }
 
+#[derive(Clone, Copy)]
 struct Job<'a> {
     step: &'a Workingstep,
     m: &'a Milling,
@@ -50,6 +51,8 @@ struct Job<'a> {
     clean: f64,
     /// Distance between passes.
     by: f64,
+    /// The same where the floor need not be clean.
+    coarse: f64,
     axial: f64,
     depth: f64,
     bottom: f64,
@@ -137,6 +140,7 @@ fn job<'a>(e: &mut Emit<'_>, step: &'a Workingstep, m: &'a Milling, feature: &'a
     o.technology.feed?;
     // What a rounded edge leaves standing between two passes stays within the tolerance.
     let clean = (radius - edge + libm::sqrt(given.tolerance * (2.0 * edge - given.tolerance).max(0.0))).clamp(radius * 5e-3, radius);
+    let coarse = by;
     let by = if m.bottom { by.min(2.0 * clean) } else { by };
     // A rounded edge deeper than the cut is narrower at the top of the wall than the tool: it may come nearer.
     let upright = match &feature.shape {
@@ -150,7 +154,7 @@ fn job<'a>(e: &mut Emit<'_>, step: &'a Workingstep, m: &'a Milling, feature: &'a
         _ => false,
     };
     let radius = if upright && bottom < edge { radius - edge + libm::sqrt(bottom * (2.0 * edge - bottom)) } else { radius };
-    Some(Job { step, m, feature, radius, edge, clean, by, axial, depth, bottom, retract, tolerance: given.tolerance, tells: given.tells })
+    Some(Job { step, m, feature, radius, edge, clean, by, coarse, axial, depth, bottom, retract, tolerance: given.tolerance, tells: given.tells })
 }
 
 /// From the radial depth and the overlap: the smaller of the two.

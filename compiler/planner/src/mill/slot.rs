@@ -52,7 +52,9 @@ impl Job<'_> {
         let ball = self.edge + 1e-9 >= self.radius;
         let mut moves = Vec::new();
         if !(ball && self.before_cut(e)) {
-            self.by_levels(&cut, &line, ends, closed, floor, &mut moves)?;
+            // Where a ball follows the section afterwards, what is before it is roughing.
+            let rough = Job { by: if ball && !cut.steady { self.coarse } else { self.by }, ..*self };
+            rough.by_levels(&cut, &line, ends, closed, floor, &mut moves)?;
         }
         if ball && !cut.steady {
             let cut = Cut::new(&shape, self.depth, self.radius + self.m.allowance_side, self.edge + self.m.allowance_side)?;

@@ -49,7 +49,7 @@ pub fn case(name: &str, part: Part, tool_r: f64, floor: f64, surface: impl Fn(f6
         block: BLOCK,
         low: [-tool_r * 2.0 - 2.0, -tool_r * 2.0 - 2.0],
         high: [BLOCK[0] + tool_r * 2.0 + 2.0, BLOCK[1] + tool_r * 2.0 + 2.0],
-        h: (tool_r / 7.0).clamp(0.2, 0.5),
+        h: (tool_r / 5.5).clamp(0.25, 0.6),
         floor,
         tolerance: 0.011,
         surface: Box::new(surface),
@@ -331,9 +331,9 @@ pub fn slot(strategy: &str, approach: &str, d: f64, width: f64, end: &str) -> Ca
 }
 
 /// A slot along an arc or round a circle.
-pub fn curved_slot(d: f64, width: f64, whole: bool, end: &str) -> Case {
+pub fn curved_slot(strategy: &str, d: f64, width: f64, whole: bool, end: &str) -> Case {
     let mut p = Part::new(BLOCK);
-    let m = op(&mut p, "BOTTOM_AND_SIDE_ROUGH_MILLING", d, "$", "$");
+    let m = op(&mut p, "BOTTOM_AND_SIDE_ROUGH_MILLING", d, strategy, "$");
     let o = p.mill(&m);
     let radius = p.length(12.0);
     let path = p.add(if whole { format!("COMPLETE_CIRCULAR_PATH($,#{radius})") } else { format!("PARTIAL_CIRCULAR_PATH($,#{radius},150.)") });
@@ -403,9 +403,9 @@ pub fn milled_hole(strategy: &str, approach: &str, d: f64, bottom: &str, taper: 
 }
 
 /// Round about a profile: what is outside goes, as far as the raw part.
-pub fn outside(head: &str, keyword: &'static str, d: f64) -> Case {
+pub fn outside(strategy: &str, head: &str, keyword: &'static str, d: f64) -> Case {
     let mut p = Part::new(BLOCK);
-    let m = op(&mut p, keyword, d, "CONTOUR_PARALLEL($,.T.,$,$)", "$");
+    let m = op(&mut p, keyword, d, strategy, "$");
     let o = p.mill(&m);
     let profile = rectangle_profile(&mut p, 36.0, 20.0);
     let profile = p.add(profile);
