@@ -7,7 +7,7 @@ import { Labels } from "./labels";
 import { Listing } from "./listing";
 import { type Hit, pick } from "./pick";
 import { type Picture, Renderer } from "./renderer";
-import { KINDS, nothing, pointAt, pointsOf, type Scene, toolAt } from "./scene";
+import { type Box, KINDS, nothing, pointAt, pointsOf, type Scene, toolAt } from "./scene";
 import style from "./style.css";
 import { css, DARK, LIGHT, type Theme } from "./theme";
 
@@ -106,7 +106,7 @@ export class Preview extends HTMLElement {
     this.pause();
     this.renderer?.load(scene);
     this.plot.forget();
-    if (first) this.camera.fit(scene.bounds);
+    if (first) this.camera.fit(extent(scene));
     this.describe();
     this.findMarked();
     this.seconds = first || whole ? this.end() : Math.min(this.seconds, this.end());
@@ -141,7 +141,7 @@ export class Preview extends HTMLElement {
 
   /** Turns the camera: iso, top, front or right. */
   look(view: string) {
-    this.camera.look(view, this.scene.bounds);
+    this.camera.look(view, extent(this.scene));
     this.draw(false);
   }
 
@@ -271,7 +271,7 @@ export class Preview extends HTMLElement {
       this.draw(true);
     };
     canvas.ondblclick = () => {
-      this.camera.fit(this.scene.bounds);
+      this.camera.fit(extent(this.scene));
       this.draw(false);
     };
     canvas.oncontextmenu = (event) => event.preventDefault();
@@ -386,7 +386,7 @@ export class Preview extends HTMLElement {
     const fresh = this.camera.width === 1;
     this.camera.width = width;
     this.camera.height = height;
-    if (fresh) this.camera.fit(this.scene.bounds);
+    if (fresh) this.camera.fit(extent(this.scene));
     const ratio = devicePixelRatio || 1;
     this.renderer?.resize(Math.round(width * ratio), Math.round(height * ratio));
     this.draw(false);
@@ -524,6 +524,14 @@ export class Preview extends HTMLElement {
     const chosen = curves(this.scene).find((c) => c.name === this.curve.value);
     if (chosen) this.plot.draw(this.scene, chosen, this.theme, this.seconds);
   }
+}
+
+/** The box around path and raw part. */
+function extent(scene: Scene): Box | null {
+  const { bounds, stock } = scene;
+  if (!bounds || !stock) return bounds ?? stock;
+  const join = (of: (...v: number[]) => number, i: 0 | 1) => bounds[i].map((v, a) => of(v, stock[i][a])) as Box[0];
+  return [join(Math.min, 0), join(Math.max, 1)];
 }
 
 /** The twelve edges of a box. */

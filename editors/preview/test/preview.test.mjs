@@ -200,6 +200,57 @@ test("the shipped part, for people to look at", async () => {
   await page.close();
 });
 
+test("stock, joints and their limits are shown when they are known", async () => {
+  await (await open("joints.ngc", SQUARE)).close();
+  const path = join(folder, "joints.html");
+  const page = readFileSync(path, "utf8");
+  const written = page.match(/<script type="application\/json">(.*?)<\/script>/s)[1];
+  const data = JSON.parse(written);
+  const n = data.path.count;
+  const values = new Float32Array(2 * n);
+  for (let i = 0; i < n; i++) values.set([i * 10, i === 1 ? Number.NaN : -i], 2 * i);
+  data.path.machine = {
+    id: "test/two",
+    title: "Two joints",
+    joints: ["A1", "A2"],
+    units: ["deg", "mm"],
+    limits: [
+      [-170, 15],
+      [null, null],
+    ],
+    values: Buffer.from(values.buffer).toString("base64"),
+  };
+  data.path.stock = [
+    [-30, -10, -5],
+    [70, 50, 5],
+  ];
+  writeFileSync(
+    path,
+    page.replace(written, () => JSON.stringify(data)),
+  );
+  const shown = await show(`file://${path}`);
+  await look(shown, "top");
+  assert.ok(has(await colors(shown, [70, 20, 5], 2), [150, 140, 120]), "an edge of the stock");
+  const names = await shown.getByLabel("curve").locator("option").allTextContents();
+  assert.deepEqual(names, ["no curve", "feed, mm/min", "A1, deg", "A1 speed, deg/s", "A2, mm", "A2 speed, mm/s"]);
+  await shown.getByLabel("curve").selectOption("A1");
+  await shown.waitForTimeout(200);
+  const inks = await shown.locator(".curve canvas").evaluate((canvas) => {
+    const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+    let [curve, limit] = [0, 0];
+    for (let i = 0; i < data.length; i += 4) {
+      if (data[i + 3] < 200) continue;
+      if (data[i] === 24 && data[i + 1] === 92 && data[i + 2] === 190) curve++;
+      if (data[i] === 214 && data[i + 1] === 20 && data[i + 2] === 60) limit++;
+    }
+    return { curve, limit };
+  });
+  assert.ok(inks.curve > 200 && inks.limit > 100, JSON.stringify(inks));
+  assert.deepEqual(shown.problems, []);
+  await shown.screenshot({ path: join(shots, "preview-joints.png") });
+  await shown.close();
+});
+
 test("a page loads nothing and needs nothing", async () => {
   const page = await chrome.newPage();
   const asked = [];

@@ -65,6 +65,7 @@ before(async () => {
   for (const name of ["flange.ngc", "mistakes.ngc", "tools.tbl"]) {
     copyFileSync(join(top, "docs/examples", name), join(workspace, name));
   }
+  copyFileSync(join(top, "docs/examples/flange.ngc"), join(workspace, "BIG.NC"));
   copyFileSync(join(top, "tests/golden/unb2013/example-a_conical-hole.p21"), join(workspace, "workplan.stp"));
   writeFileSync(
     join(workspace, "bracket.stp"),
@@ -210,6 +211,8 @@ test("errors are underlined; hover tells what is wrong", async () => {
   assert.match(await language(), /G-code/);
   await page.waitForSelector(".squiggly-error", { timeout: 30000 });
   await retry("at least four errors", async () => (await page.locator(".squiggly-error").count()) >= 4);
+  const problems = page.locator("#status\\.problems");
+  await retry("each problem once", async () => /^\s*5/.test((await problems.textContent()) ?? ""));
   await place(7, 12);
   await command("Show or Focus Hover");
   const hover = page.locator(".monaco-hover:visible .hover-contents, .monaco-hover:visible .hover-row");
@@ -312,7 +315,9 @@ test("the output of a target stands beside the source, line by line", async () =
   await command("View: Close All Editors");
 });
 
-test("a drawing of a product is left alone", async () => {
+test("endings in capitals count; a drawing of a product is left alone", async () => {
+  await open("BIG.NC");
+  assert.match(await language(), /G-code/);
   await open("bracket.stp");
   await page.waitForTimeout(500);
   assert.doesNotMatch(await language(), /STEP-NC/);
