@@ -200,6 +200,7 @@ impl Body for Writer {
                 let value = match value {
                     Value::Digital(on) => if on { "On" } else { "Off" }.to_string(),
                     Value::Analog(v) => num(v, 6),
+                    Value::Group(v) => v.to_string(),
                 };
                 let text = format!("        <SetIOAttributes><IOSetSignal SignalName=\"{}\" SignalValue=\"{value}\"/></SetIOAttributes>\n", escape(name));
                 self.activity("DNBSetSignalActivity", "SetSignal", &text);

@@ -103,7 +103,7 @@ impl Body for Writer {
                 let n = cx.number(name, word);
                 match value {
                     Value::Digital(on) => self.out.line(cx, &format!("{} IO[{n}]", if on { "SET" } else { "RESET" })),
-                    Value::Analog(_) => cx.cannot("an analog output"),
+                    Value::Analog(_) | Value::Group(_) => cx.cannot("a number on outputs"),
                 }
             }
             Op::Call { name, value } => {

@@ -246,6 +246,7 @@ impl Body for Writer {
                 match value {
                     Value::Digital(on) => self.line(&format!("  DO[{n}]={}", if on { "ON" } else { "OFF" })),
                     Value::Analog(v) => self.line(&format!("  AO[{n}]={}", num(v, 3))),
+                    Value::Group(v) => self.line(&format!("  GO[{n}]={v}")),
                 }
             }
             Op::Call { name, value } => {

@@ -226,6 +226,7 @@ impl Body for Writer {
                         let volts = if word == "S" { 10.0 * cx.share(v, word, name) } else { v };
                         self.parts.line(&format!("AOUT AO#({n}) {}", fix(volts, 2)));
                     }
+                    Value::Group(v) => self.parts.line(&format!("DOUT OG#({n}) {v}")),
                 }
             }
             Op::Call { name, value } => {

@@ -119,7 +119,7 @@ impl Body for Writer {
                 let n = cx.number(name, word);
                 match value {
                     Value::Digital(on) => self.out.line(cx, &format!("SIGNAL {}{n}", if on { "" } else { "-" })),
-                    Value::Analog(_) => cx.cannot("an analog output"),
+                    Value::Analog(_) | Value::Group(_) => cx.cannot("a number on outputs"),
                 }
             }
             Op::Call { name, value } => {

@@ -213,6 +213,7 @@ impl Body for Writer {
                         let share = cx.share(v, word, name);
                         self.parts.line(&format!("$ANOUT[{n}]={}", real(share, 6)));
                     }
+                    Value::Group(_) => cx.cannot("a tool number on outputs"),
                 }
             }
             Op::Call { name, value } => {

@@ -136,7 +136,7 @@ impl Body for Writer {
                 let n = cx.number(name, word);
                 match value {
                     Value::Digital(on) => self.out.line(cx, &format!("M_Out({n})={}", u8::from(on))),
-                    Value::Analog(_) => cx.cannot("an analog output"),
+                    Value::Analog(_) | Value::Group(_) => cx.cannot("a number on outputs"),
                 }
             }
             Op::Call { name, value } => {

@@ -104,13 +104,13 @@ impl Body for Writer {
                 let n = cx.number(name, word);
                 match value {
                     Value::Digital(on) => self.out.line(cx, &format!("{}[O{n}]", if on { "SET" } else { "RESET" })),
-                    Value::Analog(_) => cx.cannot("an analog output"),
+                    Value::Analog(_) | Value::Group(_) => cx.cannot("a number on outputs"),
                 }
             }
             Op::Call { name, value } => {
                 let n = cx.number(name, "routine");
-                if value.is_some() {
-                    cx.cannot("a number for a routine");
+                if let Some(v) = value {
+                    self.remark(cx, &format!("with {}", num(v, 6)));
                 }
                 self.out.line(cx, &format!("CALLP[{n}]"));
             }

@@ -109,7 +109,7 @@ mod tests {
         #[test]
         fn as_the_standard_library(v in -1e6f64..1e6, d in 0usize..9) {
             let text = fix(v, d);
-            prop_assert!((text.parse::<f64>().unwrap() - v).abs() <= 0.5000001 * 10f64.powi(-(d as i32)));
+            prop_assert!((text.parse::<f64>().unwrap() - v).abs() <= 0.5000001 * 10f64.powi(-(d as i32)) + v.abs() * 4e-16);
             prop_assert!(!text.starts_with("-0.") || text[1..].parse::<f64>().unwrap() > 0.0);
         }
     }

@@ -127,6 +127,7 @@ impl Body for Writer {
                 match value {
                     Value::Digital(on) => self.out.line(cx, &format!("$DOUT[{n}] := {}", if on { "ON" } else { "OFF" })),
                     Value::Analog(v) => self.out.line(cx, &format!("$AOUT[{n}] := {}", num(v, 3))),
+                    Value::Group(_) => cx.cannot("a tool number on outputs"),
                 }
             }
             Op::Call { name, value } => {

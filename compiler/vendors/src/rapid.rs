@@ -253,6 +253,7 @@ impl Body for Writer {
                 match value {
                     Value::Digital(on) => self.line(&format!("SetDO {name},{};", u8::from(on))),
                     Value::Analog(v) => self.line(&format!("SetAO {name},{};", num(v, 6))),
+                    Value::Group(v) => self.line(&format!("SetGO {name},{v};")),
                 }
             }
             Op::Call { name, value } => {

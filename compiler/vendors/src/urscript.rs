@@ -149,6 +149,7 @@ impl Body for Writer {
                         let share = cx.share(v, word, name);
                         self.line(cx, &format!("set_standard_analog_out({n},{})", num(share, 6)));
                     }
+                    Value::Group(_) => cx.cannot("a tool number on outputs"),
                 }
             }
             Op::Call { name, value } => {

@@ -278,6 +278,7 @@ impl Body for Writer {
                         let i = self.signal(2, name);
                         self.line(cx, &format!("aioSet(aOut[{i}],{})", num(v, 6)));
                     }
+                    Value::Group(_) => cx.cannot("a tool number on outputs"),
                 }
             }
             Op::Call { name, value } => {

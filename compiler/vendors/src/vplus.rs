@@ -114,6 +114,7 @@ impl Body for Writer {
                 match value {
                     Value::Digital(on) => self.out.line(cx, &format!("SIGNAL {}{n}", if on { "" } else { "-" })),
                     Value::Analog(v) => self.out.line(cx, &format!("AIO.OUT {n} = {}", num(v, 6))),
+                    Value::Group(_) => cx.cannot("a tool number on outputs"),
                 }
             }
             Op::Call { name, value } => {

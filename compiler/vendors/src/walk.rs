@@ -52,6 +52,8 @@ pub(crate) enum Op<'p> {
 pub(crate) enum Value {
     Digital(bool),
     Analog(f64),
+    /// A number on a group of outputs.
+    Group(u32),
 }
 
 /// Which machines a language is for.
@@ -199,7 +201,7 @@ impl<'p> Cx<'p> {
                 let motion = matches!(step.action, Action::Joint { .. } | Action::Linear { .. } | Action::Arc { .. });
                 if motion && self.traits.trailing {
                     self.remark = Some(line + 1);
-                } else if !matches!(step.action, Action::End) {
+                } else if !matches!(step.action, Action::End | Action::Comment(_)) {
                     let text = self.sources.line(file, line).unwrap_or("").trim();
                     body.op(self, Op::Line(line + 1, text));
                 }
@@ -426,13 +428,12 @@ impl<'p> Cx<'p> {
         if let Some(name) = &signal.routine {
             body.op(self, Op::Call { name, value: signal.value.or(value) });
         } else if let Some(name) = &signal.signal {
-            // A number of the machine file is a switch when it can be one; one of the program never is.
-            let analog = matches!(word, "S" | "M67" | "M68");
-            let value = match (signal.value, value) {
-                (Some(v), _) if !analog && (v == 0.0 || v == 1.0) => Value::Digital(v != 0.0),
-                (Some(v), _) => Value::Analog(v),
-                (None, Some(v)) if analog || word == "M6" => Value::Analog(v),
-                (None, _) => Value::Digital(true),
+            // What the program says goes before what the machine file says; a tool's number takes several outputs.
+            let value = match (word, value, signal.value) {
+                ("S" | "M67" | "M68", Some(v), _) => Value::Analog(v),
+                ("M6", Some(v), _) => Value::Group(v as u32),
+                (_, _, Some(v)) if v != 0.0 && v != 1.0 => Value::Analog(v),
+                (_, _, v) => Value::Digital(v != Some(0.0)),
             };
             body.op(self, Op::Set { name, value, word });
         }

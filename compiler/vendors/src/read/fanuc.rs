@@ -125,7 +125,7 @@ fn assign(line: &str, s: &mut State, c: &mut Controller) -> Option<()> {
         c.used.1 = right.parse().ok()?;
     } else if left.starts_with("DO[") {
         s.set(signal(left), f64::from(u8::from(right == "ON")));
-    } else if left.starts_with("AO[") {
+    } else if left.starts_with("AO[") || left.starts_with("GO[") {
         s.set(signal(left), right.parse().ok()?);
     } else if left != "$WAITTMOUT" {
         return None;

@@ -53,6 +53,7 @@ fn run(files: &[File], text: &str, events: &mut Vec<Event>, depth: u32) -> Resul
                     return Err(fault());
                 }
             }
+            "DOUT" if line.contains("OG#") => events.push(Event::Set(signal(line), numbers(fields.get(2).ok_or_else(fault)?)[0])),
             "DOUT" => events.push(Event::Set(signal(line), f64::from(u8::from(line.ends_with("ON"))))),
             "AOUT" => events.push(Event::Set(signal(line), numbers(fields.get(2).ok_or_else(fault)?)[0])),
             "WAIT" => events.push(Event::Wait(signal(line), line.contains("=ON"))),

@@ -114,7 +114,7 @@ fn run(all: &Module, routine: &str, events: &mut Vec<Event>, depth: u32) -> Resu
                     _ => Event::Arc(place(first)?, place(second)?, speed, zone),
                 });
             }
-            "SetDO" | "SetAO" => {
+            "SetDO" | "SetAO" | "SetGO" => {
                 let (name, value) = rest.split_once(',').ok_or_else(fault)?;
                 events.push(Event::Set(name.into(), value.parse().map_err(|_| fault())?));
             }

@@ -345,8 +345,7 @@ pub fn sample(target: &str) -> RobotProgram {
             step.action = Action::Comment("S12000".into());
         }
         if target == "nachi" && let Action::ChangeTool { by: Some(by), .. } = &mut step.action {
-            *by = signal("DO[9]");
-            by.value = Some(1.0);
+            *by = Signal { routine: Some("9".into()), ..Signal::default() };
         }
     }
     program
