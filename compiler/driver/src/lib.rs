@@ -16,6 +16,7 @@ mod lazy;
 mod library;
 mod lints;
 mod session;
+mod stats;
 mod store;
 mod stream;
 mod timeline;

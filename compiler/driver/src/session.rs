@@ -6,6 +6,8 @@ use std::sync::Arc;
 
 use gr_gcode::{Parameter, Symbols};
 use gr_interp::Setup;
+use gr_ir::Program;
+use gr_ir::measure::Report;
 use gr_text::{Diagnostic, FileId};
 use salsa::Setter as _;
 
@@ -13,6 +15,7 @@ use crate::check::{self, Check};
 use crate::db::{ChunkText, Database, Db as _, Document, Executed, OpenFiles, RunOptions};
 use crate::hover::{self, StateAt};
 use crate::lints::{Limits, Rules};
+use crate::stats;
 use crate::store::{Store, Texts, chunk_lines};
 
 /// What a file is run with.
@@ -179,6 +182,11 @@ impl Session {
         hover::state_at(&self.db, self.document(file)?, line)
     }
 
+    /// Time, distance and extents of a file and of each tool, as far as it runs.
+    pub fn stats(&self, file: FileId) -> Arc<Report> {
+        self.document(file).map_or_else(Arc::default, |d| stats::stats(&self.db, d))
+    }
+
     /// Labels, parameters and codes of a file, under its own lines and bytes.
     pub fn symbols(&self, file: FileId) -> Symbols {
         self.document(file).map_or_else(Symbols::default, |d| hover::symbols(&self.db, d))
@@ -221,6 +229,14 @@ impl Snapshot {
     /// Modes and position around a line, when execution comes there.
     pub fn state_at(&self, file: FileId, line: u32) -> Result<Option<StateAt>, Cancelled> {
         self.guarded(file, |db, d| hover::state_at(db, d, line))
+    }
+    /// Time, distance and extents of a file and of each tool, as far as it runs.
+    pub fn stats(&self, file: FileId) -> Result<Arc<Report>, Cancelled> {
+        self.guarded(file, |db, d| stats::stats(db, d))
+    }
+    /// Motion of a file, as far as it runs, with sources under the session's file numbers.
+    pub fn motion(&self, file: FileId) -> Result<Arc<Program>, Cancelled> {
+        self.guarded(file, |db, d| stats::motion(db, d))
     }
     /// Labels, parameters and codes of a file, under its own lines and bytes.
     pub fn symbols(&self, file: FileId) -> Result<Symbols, Cancelled> {

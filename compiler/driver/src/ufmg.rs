@@ -5,7 +5,7 @@ use gr_gcode::{Chunk, File};
 use gr_spec::Family;
 use gr_text::{Diagnostic, FileId};
 
-use crate::db::{Database, Document, scanned};
+use crate::db::{Database, Db, Document, scanned};
 
 /// Findings of a file in that language; none for files in other languages.
 pub(crate) fn check(db: &Database, document: Document) -> Option<Vec<Diagnostic>> {
@@ -24,4 +24,17 @@ pub(crate) fn check(db: &Database, document: Document) -> Option<Vec<Diagnostic>
         found = gr_backends::joint::ufmg::lower(id, "", &commands, &machine).1;
     }
     Some(found)
+}
+
+/// Motion of a file in that language; none for files in other languages.
+pub(crate) fn motion(db: &dyn Db, document: Document) -> Option<gr_ir::Program> {
+    let run = document.run(db);
+    if run.options(db).setup.dialect.family != Family::Ufmg2008 {
+        return None;
+    }
+    let id = FileId(document.id(db));
+    let (commands, _) = gr_backends::joint::language::read(id, &crate::library::whole(db, document, run));
+    let machine = gr_machine::builtin("ufmg/plano-3r")?;
+    let name = db.disk().path(id).unwrap_or_default();
+    Some(gr_backends::joint::ufmg::lower(id, &name, &commands, &machine).0)
 }

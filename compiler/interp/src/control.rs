@@ -27,6 +27,7 @@ const LEVELS: usize = 10;
 pub(crate) struct Symbols {
     map: FxHashMap<Box<str>, u32>,
     names: Vec<Box<str>>,
+    numbers: FxHashMap<i32, u32>,
 }
 
 impl Symbols {
@@ -37,6 +38,15 @@ impl Symbols {
         let id = self.names.len() as u32;
         self.names.push(name.into());
         self.map.insert(name.into(), id);
+        id
+    }
+    /// A name that is a number: loops ask for the same ones all the time.
+    pub fn of_number(&mut self, number: i32) -> u32 {
+        if let Some(id) = self.numbers.get(&number) {
+            return *id;
+        }
+        let id = self.of(&number.to_string());
+        self.numbers.insert(number, id);
         id
     }
     pub fn name(&self, id: u32) -> &str {
@@ -363,7 +373,7 @@ impl<S: Sink> Interp<'_, S> {
             OLabel::Number(id) => {
                 let value = self.eval(scan, id)?;
                 let n = whole(value).ok_or_else(|| not_whole(value))?;
-                Ok(self.symbols.of(&n.to_string()))
+                Ok(self.symbols.of_number(n))
             }
             OLabel::None => Ok(self.symbols.of("")),
         }
@@ -888,7 +898,7 @@ impl<S: Sink> Interp<'_, S> {
         if pass > self.setup.budgets.passes {
             return Err(self.endless("this loop has run more passes than the limit allows"));
         }
-        let name = format!("o{}", self.symbols.name(label.name));
+        let name = ["o", self.symbols.name(label.name)].concat();
         self.enter_frame(&name, parent, pass.min(u64::from(u32::MAX)) as u32);
         Ok(())
     }
