@@ -257,3 +257,15 @@ fn pictures() {
         std::fs::write(format!("{IMAGES}/{file}.png"), plot::png(&p.program, &options).expect("a picture")).expect("written");
     }
 }
+
+/// One file per feature, for the fuzz target of the planner.
+#[test]
+#[ignore = "writes tests/fuzz/seeds/planner"]
+fn seeds() {
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/fuzz/seeds/planner");
+    std::fs::create_dir_all(folder).expect("a folder");
+    for (k, (_, _, make)) in features().iter().enumerate() {
+        let c = make(STRATEGIES[k % STRATEGIES.len()], APPROACHES[k % APPROACHES.len()]);
+        std::fs::write(format!("{folder}/cell-{k:02}.p21"), c.part.text()).expect("written");
+    }
+}
