@@ -1,4 +1,4 @@
-use crate::kinematics::{Control, Kinematics, KinematicsError, Pose, Solution, checked};
+use crate::kinematics::{Control, Kinematics, KinematicsError, Solution, checked};
 use crate::math::{Frame, V3, about, add, cross, dot, norm, rotate, scale, sub};
 use crate::opw::turn;
 
@@ -119,12 +119,6 @@ impl Kinematics for FiveAxis {
     }
     fn control(&self) -> Control {
         Control::Axis
-    }
-    fn forward(&self, joints: &[f64]) -> Result<Pose, KinematicsError> {
-        Ok(Pose::from_frame(&self.forward_frame(joints)?))
-    }
-    fn inverse(&self, pose: &Pose) -> Result<Vec<Solution>, KinematicsError> {
-        self.inverse_frame(&pose.frame())
     }
     fn forward_frame(&self, joints: &[f64]) -> Result<Frame, KinematicsError> {
         let q = checked(joints, 5)?;

@@ -273,9 +273,14 @@ static JOINT_OVER: &[Key] = &[
     key("axis", Numbers(3), "Vector."),
 ];
 
-/// Words that may stand in `[io]`.
+/// Words that may stand in `[io]`: `S`, `M3`, and `M62P3` for one output alone.
 fn io_word(word: &str) -> bool {
-    word == "S" || (word.strip_prefix('M').is_some_and(|n| !n.is_empty() && n.len() <= 3 && n.bytes().all(|b| b.is_ascii_digit())))
+    let digits = |n: &str| !n.is_empty() && n.len() <= 3 && n.bytes().all(|b| b.is_ascii_digit());
+    let Some(rest) = word.strip_prefix('M') else { return word == "S" };
+    match rest.split_once('P') {
+        Some((code, index)) => digits(code) && digits(index),
+        None => digits(rest),
+    }
 }
 
 /// Faults of form: place and message.
@@ -336,7 +341,7 @@ fn value(node: &Node, key: &Key, place: &str, out: &mut Vec<(Range<usize>, Strin
         (Map(keys), Value::Table(entries)) => {
             for e in entries {
                 if !io_word(&e.key) {
-                    out.push((e.key_span.clone(), format!("`{}` is no word of `[{name}]`; words are S and M0 … M999", e.key)));
+                    out.push((e.key_span.clone(), format!("`{}` is no word of `[{name}]`; words are S, M0 … M999 and such as M62P3", e.key)));
                 }
                 table(&e.node, keys, &format!("`[{name}.{}]`", e.key), false, out);
             }
@@ -463,7 +468,7 @@ fn property(out: &mut String, k: &Key, depth: usize) {
         Tables(keys) | Map(keys) => {
             let map = matches!(k.kind, Map(_));
             let _ = if map {
-                writeln!(out, "{pad}\"type\": \"object\",\n{pad}\"additionalProperties\": false,\n{pad}\"patternProperties\": {{\n{pad}\"^(S|M[0-9]{{1,3}})$\": {{")
+                writeln!(out, "{pad}\"type\": \"object\",\n{pad}\"additionalProperties\": false,\n{pad}\"patternProperties\": {{\n{pad}\"^(S|M[0-9]{{1,3}}(P[0-9]{{1,3}})?)$\": {{")
             } else {
                 writeln!(out, "{pad}\"type\": \"array\",\n{pad}\"items\": {{")
             };

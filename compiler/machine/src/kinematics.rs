@@ -123,14 +123,19 @@ impl std::fmt::Display for KinematicsError {
 
 impl std::error::Error for KinematicsError {}
 
-/// Relates joint values and tool pose. Implementations never return a value that is not finite.
+/// Relates joint values and tool pose. Implementations never return a value that is not finite. Each gives `forward` or
+/// `forward_frame`, and `inverse` or `inverse_frame`: of each pair the other follows.
 pub trait Kinematics: Send + Sync {
     /// Number of joints.
     fn joint_count(&self) -> usize;
     /// Where the tool is.
-    fn forward(&self, joints: &[f64]) -> Result<Pose, KinematicsError>;
+    fn forward(&self, joints: &[f64]) -> Result<Pose, KinematicsError> {
+        Ok(Pose::from_frame(&self.forward_frame(joints)?))
+    }
     /// All joint values that put the tool there, ordered by branch; at least one.
-    fn inverse(&self, pose: &Pose) -> Result<Vec<Solution>, KinematicsError>;
+    fn inverse(&self, pose: &Pose) -> Result<Vec<Solution>, KinematicsError> {
+        self.inverse_frame(&pose.frame())
+    }
     /// Where the tool is, as a frame.
     fn forward_frame(&self, joints: &[f64]) -> Result<Frame, KinematicsError> {
         Ok(self.forward(joints)?.frame())

@@ -1,4 +1,4 @@
-use crate::kinematics::{Kinematics, KinematicsError, Pose, Solution, checked};
+use crate::kinematics::{Kinematics, KinematicsError, Solution, checked};
 use crate::math::Frame;
 
 /// Six-joint arm with a spherical wrist and an ortho-parallel base, in closed form with all eight solutions.
@@ -195,12 +195,6 @@ pub(crate) fn turn(angle: f64) -> f64 {
 impl Kinematics for Opw {
     fn joint_count(&self) -> usize {
         6
-    }
-    fn forward(&self, joints: &[f64]) -> Result<Pose, KinematicsError> {
-        Ok(Pose::from_frame(&self.forward_frame(joints)?))
-    }
-    fn inverse(&self, pose: &Pose) -> Result<Vec<Solution>, KinematicsError> {
-        self.inverse_frame(&pose.frame())
     }
     fn forward_frame(&self, joints: &[f64]) -> Result<Frame, KinematicsError> {
         let q: &[f64; 6] = checked(joints, 6)?.try_into().map_err(|_| KinematicsError::NotFinite)?;

@@ -1,5 +1,5 @@
 use crate::kinematics::{Control, Kinematics, KinematicsError, Pose, Solution, Violation, checked};
-use crate::math::{Frame, V3, dot, norm, rot_z, solve};
+use crate::math::{V3, dot, norm, rot_z, solve};
 
 mod errors;
 
@@ -312,9 +312,6 @@ impl Kinematics for TwoLegs {
         }
         let singular = self.singularity(at).abs() < 1e-4;
         Ok(vec![Solution { joints: h.to_vec(), branch: 0, singular }])
-    }
-    fn forward_frame(&self, joints: &[f64]) -> Result<Frame, KinematicsError> {
-        Ok(self.forward(joints)?.frame())
     }
     fn violations(&self, joints: &[f64]) -> Vec<Violation> {
         let Ok(&[h1, h2, h3]) = checked(joints, 3) else { return Vec::new() };

@@ -1,4 +1,4 @@
-use crate::kinematics::{Kinematics, KinematicsError, Pose, Solution, checked};
+use crate::kinematics::{Kinematics, KinematicsError, Solution, checked};
 use crate::math::{Frame, product, rot_x, rot_z};
 use crate::opw::turn;
 
@@ -27,12 +27,6 @@ const LEAN: f64 = 1e-9;
 impl Kinematics for Scara {
     fn joint_count(&self) -> usize {
         4
-    }
-    fn forward(&self, joints: &[f64]) -> Result<Pose, KinematicsError> {
-        Ok(Pose::from_frame(&self.forward_frame(joints)?))
-    }
-    fn inverse(&self, pose: &Pose) -> Result<Vec<Solution>, KinematicsError> {
-        self.inverse_frame(&pose.frame())
     }
     fn forward_frame(&self, joints: &[f64]) -> Result<Frame, KinematicsError> {
         let q = checked(joints, 4)?;

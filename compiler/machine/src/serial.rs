@@ -1,5 +1,5 @@
 use crate::JointKind;
-use crate::kinematics::{Control, Kinematics, KinematicsError, Pose, Solution, checked};
+use crate::kinematics::{Control, Kinematics, KinematicsError, Solution, checked};
 use crate::math::{Frame, V3, about, cross, norm, rot_x, rot_z, rotate, scale, solve, sub};
 
 /// Chain of joints one after the other, given by the frame of each joint in the one before (as URDF has it) or by
@@ -224,12 +224,6 @@ impl Kinematics for Serial {
     }
     fn control(&self) -> Control {
         if self.links.len() < 6 { Control::Axis } else { Control::Full }
-    }
-    fn forward(&self, joints: &[f64]) -> Result<Pose, KinematicsError> {
-        Ok(Pose::from_frame(&self.forward_frame(joints)?))
-    }
-    fn inverse(&self, pose: &Pose) -> Result<Vec<Solution>, KinematicsError> {
-        self.inverse_frame(&pose.frame())
     }
     fn forward_frame(&self, joints: &[f64]) -> Result<Frame, KinematicsError> {
         Ok(self.walk(checked(joints, self.links.len())?).0)

@@ -1,4 +1,4 @@
-use crate::kinematics::{Kinematics, KinematicsError, Pose, Solution, checked};
+use crate::kinematics::{Kinematics, KinematicsError, Solution, checked};
 use crate::math::{Frame, V3, add, cross, dot, norm, product, rot_x, rot_y, rot_z, scale, solve, sub};
 use crate::opw::turn;
 
@@ -121,12 +121,6 @@ const QUARTER: f64 = std::f64::consts::FRAC_PI_2;
 impl Kinematics for Tricept {
     fn joint_count(&self) -> usize {
         6
-    }
-    fn forward(&self, joints: &[f64]) -> Result<Pose, KinematicsError> {
-        Ok(Pose::from_frame(&self.forward_frame(joints)?))
-    }
-    fn inverse(&self, pose: &Pose) -> Result<Vec<Solution>, KinematicsError> {
-        self.inverse_frame(&pose.frame())
     }
     fn forward_frame(&self, joints: &[f64]) -> Result<Frame, KinematicsError> {
         let q = checked(joints, 6)?;

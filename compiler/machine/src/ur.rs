@@ -1,4 +1,4 @@
-use crate::kinematics::{Kinematics, KinematicsError, Pose, Solution, checked};
+use crate::kinematics::{Kinematics, KinematicsError, Solution, checked};
 use crate::math::{Frame, add, cross, dot, norm, scale, sub};
 use crate::opw::turn;
 
@@ -80,12 +80,6 @@ impl ParallelWrist {
 impl Kinematics for ParallelWrist {
     fn joint_count(&self) -> usize {
         6
-    }
-    fn forward(&self, joints: &[f64]) -> Result<Pose, KinematicsError> {
-        Ok(Pose::from_frame(&self.forward_frame(joints)?))
-    }
-    fn inverse(&self, pose: &Pose) -> Result<Vec<Solution>, KinematicsError> {
-        self.inverse_frame(&pose.frame())
     }
     fn forward_frame(&self, joints: &[f64]) -> Result<Frame, KinematicsError> {
         let q = checked(joints, 6)?;

@@ -21,18 +21,20 @@ pub(crate) struct Cells {
     io: std::collections::BTreeMap<String, Signal>,
     limits: (Option<f64>, Option<f64>),
     by_hand: bool,
+    own_words: bool,
     turning: Turn,
     coolant: bool,
     speed: f64,
 }
 
 impl Cells {
-    pub fn new(machine: &Machine) -> Cells {
+    pub fn new(machine: &Machine, own_words: bool) -> Cells {
         let spindle = machine.cell.spindle.as_ref();
         Cells {
             io: machine.cell.io.clone(),
             limits: spindle.map_or((None, None), |s| s.speed),
             by_hand: spindle.is_some_and(|s| !s.controlled),
+            own_words,
             turning: Turn::Stop,
             coolant: false,
             speed: 0.0,
@@ -57,6 +59,12 @@ impl Cells {
     pub fn word(&self, word: &str, value: Option<f64>, more: &str) -> Made {
         match self.io.get(word) {
             Some(signal) => Made { actions: steps(word, value, signal.clone()), by_hand: None },
+            None if self.own_words => {
+                // An output's number belongs to its word, a speed doesn't.
+                let number = more.split(" Q").next().filter(|m| m.starts_with(" P")).unwrap_or("");
+                let signal = Signal::default();
+                Made { actions: vec![Action::Signal { word: format!("{word}{number}"), value, signal }], by_hand: None }
+            }
             None => {
                 let text = format!("{word}{more}");
                 let actions = vec![Action::Message(text), Action::Pause { optional: false }];

@@ -126,6 +126,8 @@ pub(crate) struct Gather<'a> {
     path_said: bool,
     ended: bool,
     source: Source,
+    clamped: Option<usize>,
+    workingstep: Option<String>,
 }
 
 impl<'a> Gather<'a> {
@@ -149,7 +151,7 @@ impl<'a> Gather<'a> {
             options,
             findings: Findings::new(sources),
             out,
-            cells: Cells::new(machine),
+            cells: Cells::new(machine, options.own_words),
             source_machine,
             control,
             planar: matches!(machine.chain, Chain::Planar3r(_)),
@@ -161,6 +163,8 @@ impl<'a> Gather<'a> {
             path_said: false,
             ended: false,
             source: Source::default(),
+            clamped: None,
+            workingstep: None,
         }
     }
 
@@ -232,7 +236,12 @@ impl<'a> Gather<'a> {
             Op::Note(Note::Message, text) => self.act(Action::Message(text.to_string())),
             Op::Note(_, text) if text.starts_with("interpreter:") => {}
             Op::Note(_, text) => self.act(Action::Comment(text.to_string())),
-            Op::Begin { text, .. } if !text.is_empty() => self.act(Action::Comment(text.to_string())),
+            Op::Begin { marker, text, .. } if !text.is_empty() => {
+                if marker == gr_ir::Marker::Workingstep {
+                    self.workingstep = Some(text.to_string());
+                }
+                self.act(Action::Comment(text.to_string()));
+            }
             // The shuttle that M30 and M60 move; M60 stops the program besides.
             Op::Stop(Stop::Pallet) => {}
             Op::Stop(stop) => self.act(Action::Pause { optional: stop == Stop::Optional }),
@@ -305,10 +314,33 @@ impl<'a> Gather<'a> {
         self.act(Action::ChangeTool { number, by });
     }
 
+    /// Which setup of the job holds here.
+    fn setup(&self) -> Option<usize> {
+        let setups = &self.options.setups;
+        let named = self.workingstep.as_ref().and_then(|w| setups.iter().position(|s| s.workingsteps.contains(w)));
+        named.or_else(|| setups.iter().rposition(|s| s.from_line.is_some_and(|l| l <= self.source.line)))
+    }
+    /// The operator turns the part over.
+    fn clamp(&mut self, setup: Option<usize>) {
+        let first = self.clamped.is_none() && !self.out.items.iter().any(|i| matches!(i, Item::Move(_)));
+        self.clamped = setup;
+        if let Some(s) = setup.map(|i| &self.options.setups[i]).filter(|_| !first) {
+            let name = s.name.clone();
+            self.retract();
+            self.act(Action::Message(format!("setup {name}")));
+            self.act(Action::Pause { optional: false });
+            self.at = None;
+        }
+    }
+
     /// The work frame in force; none when it isn't known.
     fn work(&mut self, state: &State) -> Option<u16> {
         let name = work_name(state.work);
-        let placement = self.options.placements.iter().rfind(|p| p.line <= self.source.line);
+        let setup = self.setup();
+        if setup != self.clamped {
+            self.clamp(setup);
+        }
+        let placement = setup.map(|i| &self.options.setups[i]);
         let places = |n: &str| self.machine.cell.frames.get(n);
         let any = (1..=9).find(|n| places(work_name(*n)).is_some());
         let placed = match (places(name), any, placement) {
@@ -732,6 +764,13 @@ impl<'a> Gather<'a> {
             // Rapids alone that left a coordinate where it was.
             self.go_to(pose, state);
         }
+        self.retract();
+        let made = self.cells.off();
+        self.made(made);
+    }
+
+    /// Straight up from where the tool is.
+    fn retract(&mut self) {
         let last = self.out.items.iter().rev().find_map(|i| if let Item::Move(m) = i { Some(*m) } else { None });
         if let Some(m) = last.filter(|_| self.comes_from_above()) {
             let above = self.above(m.position, m.turn);
@@ -739,8 +778,6 @@ impl<'a> Gather<'a> {
             let length = self.options.approach;
             self.push(Move { way: Way::Line, position: above, speed, length, rapid: true, ours: true, zone: Zone::Stop, source: None, ..m });
         }
-        let made = self.cells.off();
-        self.made(made);
     }
 
     /// Zones: at most half of both neighbours, none before actions and where a cut and a rapid meet.

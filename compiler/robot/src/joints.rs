@@ -394,3 +394,45 @@ fn significant(v: f64) -> String {
     let decimals = usize::try_from((13 - digits).clamp(0, 20)).unwrap_or(0);
     number(v, decimals)
 }
+
+/// How tables are written.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct TableOptions {
+    /// Decimals.
+    pub decimals: usize,
+    /// Decimal comma; columns are then parted by semicolons.
+    pub comma: bool,
+}
+
+/// The tool point by time: s, X Y Z in mm, A B C in degrees, in the base.
+pub fn cartesian_csv(path: &JointPath, options: TableOptions) -> String {
+    let row = |p: &JointPoint| {
+        let pose = gr_machine::Pose::from_frame(&p.tool);
+        pose.position.into_iter().chain(pose.rotation.map(f64::to_degrees)).collect()
+    };
+    table(path, ["t", "X", "Y", "Z", "A", "B", "C"].map(String::from).to_vec(), options, row)
+}
+
+/// Joint values by time: s, degrees or mm.
+pub fn joint_csv(program: &RobotProgram, path: &JointPath, options: TableOptions) -> String {
+    let joints = &program.machine.joints;
+    let head = std::iter::once("t".to_string()).chain(joints.iter().map(|j| j.name.replace([',', ';', '"', '\n'], " "))).collect();
+    let shown = |(j, v): (&gr_machine::Joint, &f64)| if j.kind == JointKind::Revolute { v.to_degrees() } else { *v };
+    table(path, head, options, |p| joints.iter().zip(&p.joints).map(shown).collect())
+}
+
+fn table(path: &JointPath, head: Vec<String>, options: TableOptions, row: impl Fn(&JointPoint) -> Vec<f64>) -> String {
+    let between = if options.comma { ";" } else { "," };
+    let cell = |text: String| if options.comma { text.replace('.', ",") } else { text };
+    let mut out = head.join(between) + "\n";
+    let mut time = 0.0;
+    for event in &path.events {
+        let Event::Point(p) = event else { continue };
+        time += p.seconds;
+        let cells = row(p).into_iter().map(|v| cell(number(v, options.decimals)));
+        let all: Vec<String> = std::iter::once(cell(number(time, 9))).chain(cells).collect();
+        out += &all.join(between);
+        out.push('\n');
+    }
+    out
+}

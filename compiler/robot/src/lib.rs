@@ -37,6 +37,6 @@ pub mod setpoints;
 mod solver;
 pub mod verify;
 
-pub use options::{Options, Placement, Planned, Singularity, Summary};
+pub use options::{Options, Planned, Setup, Singularity, Summary};
 pub use plan::plan;
 pub use program::{Action, MAX_JOINTS, RobotProgram, Step, Target, Tool, WorkFrame, Zone};

@@ -17,24 +17,28 @@ pub struct Options {
     pub approach: f64,
     /// Where no configuration fits a whole cut, lift the tool by this much, change, and go on, mm.
     pub reconfigure: Option<f64>,
-    /// Placements of the part in the base that hold from a line of the program on (a job's setups), by line.
-    pub placements: Vec<Placement>,
+    /// The controller knows M3, S, M8 … itself: words the machine file says nothing about stay words.
+    pub own_words: bool,
+    /// Setups of a job: each with its own placement of the part. None = the cell's.
+    pub setups: Vec<Setup>,
 }
 
-/// Where the part is, from a line of the main program on.
+/// A clamping of the part: where it is, and for which piece of the program.
 #[derive(Clone, PartialEq, Debug)]
-pub struct Placement {
-    /// Name of the setup.
+pub struct Setup {
+    /// Its name.
     pub name: String,
-    /// First line, from 0.
-    pub line: u32,
+    /// From this line of the main program on, from 0.
+    pub from_line: Option<u32>,
+    /// For these workingsteps, wherever they stand.
+    pub workingsteps: Vec<String>,
     /// The part's frame in the base.
     pub part: Frame,
 }
 
 impl Default for Options {
     fn default() -> Options {
-        Options { name: "program".into(), tolerance: 0.01, approach: 50.0, reconfigure: None, placements: Vec::new() }
+        Options { name: "program".into(), tolerance: 0.01, approach: 50.0, reconfigure: None, own_words: false, setups: Vec::new() }
     }
 }
 

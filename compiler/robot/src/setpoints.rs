@@ -5,7 +5,8 @@
 //!
 //! The path is parted into moves, each with the time it takes at the programmed feed; the law says how fast that time
 //! runs, from 0 (rest) to 1 (feed). Averaging the law over the smoothing time turns its ramps of speed into S-curves
-//! and leaves the path as it is.
+//! and leaves the path as it is. Where the path itself goes over from a line into an arc, the acceleration across it
+//! still begins at once.
 
 use std::fmt::Write as _;
 
@@ -297,7 +298,9 @@ impl<'a> Maker<'a> {
         if a.stop {
             return 0.0;
         }
-        let step = self.options.interval.max(self.options.smoothing);
+        // A corner of the path is as sharp as it is, however smooth the law: what the joints jump by must be small
+        // against what they may change between two set-points.
+        let step = self.options.interval * (self.options.interval / self.options.smoothing.max(self.options.interval));
         let mut rate = a.rate.min(b.rate);
         for i in 0..self.solver.count {
             let jump = (a.ends[1][i] - b.ends[0][i]).abs();

@@ -136,3 +136,31 @@ fn other_machines() {
     out += &format!("five axes:\n{}", faults("G0 X10 Y10 Z50\nG1 X20 A10 C20 F500\nM30\n", &builtin("generic/mill5-ac-table").unwrap()));
     insta::assert_snapshot!("other_machines", out);
 }
+
+/// Round the base by 340°: the sixth joint turns as far. From the turn nearest to home it would run into its limit on
+/// the way; the start must be a whole turn away from there.
+#[test]
+fn the_nearest_start_can_be_the_wrong_one() {
+    let text = "format = 1\nid = \"shop/round\"\nextends = \"abb/irb2400\"\n[home]\njoints = [0, 0, 0, 0, 30, 0]\n[[joint]]\nname = \"J6\"\nmin = -380\nmax = 300\n";
+    let machine = gr_machine::parse(FileId(0), text).unwrap();
+    let (s, c) = 170f64.to_radians().sin_cos();
+    let mut starts = Vec::new();
+    for way in ["G3", "G2"] {
+        let (from, to) = if way == "G3" { (-1.0, 1.0) } else { (1.0, -1.0) };
+        let program = format!("G0 X{:.6} Y{:.6} Z700\n{way} X{:.6} Y{:.6} I{:.6} J{:.6} F3000\nM30\n", 900.0 * c, from * 900.0 * s, 900.0 * c, to * 900.0 * s, -900.0 * c, -from * 900.0 * s);
+        let p = planned(&program, &machine).unwrap_or_else(|e| panic!("{}", messages(&e, &program)));
+        let arc = p.program.steps.iter().position(|s| matches!(s.action, Action::Arc { .. })).unwrap();
+        let first = p.program.steps[..arc].iter().rev().find_map(|s| match s.action {
+            Action::Joint { to, .. } | Action::Linear { to, .. } => Some(p.program.targets[to as usize].joints[5]),
+            _ => None,
+        });
+        let last = p.program.steps.iter().rev().find_map(|s| if let Action::Arc { to, .. } = s.action { Some(p.program.targets[to as usize].joints[5]) } else { None });
+        let (first, last) = (first.unwrap().to_degrees(), last.unwrap().to_degrees());
+        assert!(((last - first).abs() - 340.0).abs() < 1.0, "{first} {last}");
+        assert!(first.min(last) >= -380.0 && first.max(last) <= 300.0);
+        starts.push((first, last));
+    }
+    // One of the two senses begins where going on from the nearest turn would end beyond 300°.
+    let nearest = |v: f64| v - 360.0 * (v / 360.0).round();
+    assert!(starts.iter().any(|(a, b)| (nearest(*a) - a).abs() > 1.0 && nearest(*a) + (b - a) > 300.0), "{starts:?}");
+}
