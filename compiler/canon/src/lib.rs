@@ -7,7 +7,7 @@ mod number;
 mod print;
 
 pub use gr_text::FileId;
-pub use number::{push_fixed, push_int};
+pub use number::{fixed_units, push_fixed, push_int};
 pub use print::{Printer, Version};
 
 /// X Y Z A B C U V W, in this order, everywhere.

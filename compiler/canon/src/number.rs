@@ -78,6 +78,29 @@ fn scaled<const DECIMALS: usize>(value: f64) -> Option<u64> {
     Some(whole + u64::from(up))
 }
 
+/// |value|·10^`decimals`, correctly rounded (half to even); none beyond nine decimals or from a thousand million on.
+#[inline]
+pub fn fixed_units(value: f64, decimals: usize) -> Option<u64> {
+    let size = value.abs();
+    // Not a number is not below anything.
+    if decimals > 9 || !matches!(size.partial_cmp(&1e9), Some(std::cmp::Ordering::Less)) {
+        return None;
+    }
+    let bits = size.to_bits();
+    let exponent = (bits >> 52) as u32;
+    let mantissa = bits & ((1 << 52) - 1) | (1 << 52);
+    // Places after the binary point: at least 23 below 2^30. The product is below 2^83.
+    let places = 1075 - exponent;
+    if places > 100 {
+        return Some(0);
+    }
+    let product = u128::from(mantissa) * u128::from(10_u64.pow(decimals as u32));
+    let whole = (product >> places) as u64;
+    let rest = product & ((1_u128 << places) - 1);
+    let half = 1_u128 << (places - 1);
+    Some(whole + u64::from(rest > half || (rest == half && whole & 1 == 1)))
+}
+
 #[inline]
 fn push_scaled<const DECIMALS: usize>(out: &mut Vec<u8>, negative: bool, units: u64) {
     if negative {
@@ -121,6 +144,22 @@ mod tests {
         let mut out = Vec::new();
         push_fixed::<D>(&mut out, v);
         String::from_utf8(out).unwrap()
+    }
+
+    proptest! {
+        #[test]
+        fn units_are_those_of_the_exact_text(v in -1.0e9..1.0e9, ties in -4096i32..4096, d in 0usize..10) {
+            for v in [v, v / 1e6, v / 1e13, f64::from(ties) / 64.0] {
+                let text = format!("{:.d$}", v.abs()).replace('.', "");
+                prop_assert_eq!(fixed_units(v, d), text.parse().ok(), "{} with {} decimals", v, d);
+            }
+        }
+    }
+
+    #[test]
+    fn numbers_without_units() {
+        assert_eq!([f64::NAN, f64::INFINITY, 1e9, -1e300].map(|v| fixed_units(v, 3)), [None; 4]);
+        assert_eq!((fixed_units(1.0, 10), fixed_units(5e-324, 9), fixed_units(-0.0, 9)), (None, Some(0), Some(0)));
     }
 
     #[test]

@@ -67,7 +67,14 @@ impl Writer {
 
     /// A number with at most so many decimals.
     pub fn number(&self, value: f64, places: usize) -> String {
-        let mut text = format!("{value:.places$}");
+        self.spelled(match gr_canon::fixed_units(value, places) {
+            Some(units) => decimal(units, places, value.is_sign_negative()),
+            None => format!("{value:.places$}"),
+        })
+    }
+
+    /// A decimal without zeros at its end, as the language wants it.
+    fn spelled(&self, mut text: String) -> String {
         if text.contains('.') {
             text.truncate(text.trim_end_matches('0').len());
         }
@@ -97,8 +104,20 @@ impl Writer {
 
     pub fn axis_fine(&self, axis: usize, value: f64, places: usize) -> (String, f64) {
         let rotary = (3..6).contains(&axis);
-        let text = self.number(if rotary { value.to_degrees() } else { value / self.unit }, places);
-        let said = text.parse::<f64>().unwrap_or(0.0);
+        let wanted = if rotary { value.to_degrees() } else { value / self.unit };
+        let (text, said) = match gr_canon::fixed_units(wanted, places) {
+            // Both are exact, so that the quotient is what the text reads back as.
+            Some(units) if units < 1 << 53 => {
+                let negative = wanted.is_sign_negative() && units != 0;
+                let size = units as f64 / 10_u64.pow(places as u32) as f64;
+                (self.spelled(decimal(units, places, negative)), if negative { -size } else { size })
+            }
+            _ => {
+                let text = self.number(wanted, places);
+                let said = text.parse::<f64>().unwrap_or(0.0);
+                (text, said)
+            }
+        };
         (text, if rotary { said * (std::f64::consts::PI / 180.0) } else { said * self.unit })
     }
 
@@ -141,3 +160,31 @@ impl Writer {
 
 /// Word letters of the axes.
 pub(super) const AXES: [char; 9] = ['X', 'Y', 'Z', 'A', 'B', 'C', 'U', 'V', 'W'];
+
+/// A number given in units of its last decimal.
+fn decimal(mut units: u64, places: usize, negative: bool) -> String {
+    let mut text = [b'0'; 24];
+    let mut at = text.len();
+    let mut left = places;
+    loop {
+        at -= 1;
+        text[at] = b'0' + (units % 10) as u8;
+        units /= 10;
+        if left > 0 {
+            left -= 1;
+            if left == 0 {
+                at -= 1;
+                text[at] = b'.';
+            }
+            continue;
+        }
+        if units == 0 {
+            break;
+        }
+    }
+    if negative {
+        at -= 1;
+        text[at] = b'-';
+    }
+    std::str::from_utf8(&text[at..]).unwrap_or_default().to_string()
+}
