@@ -140,11 +140,11 @@ fn predict(
         None => None,
     };
     let texts = gr_ir::Texts::new(motion.sources.iter().map(|(id, f)| (id, &*f.text)));
-    let mut options = gr_robot::Options { name: unit.name(), ..gr_robot::Options::default() };
-    if let Some(part) = part {
-        options.placements.push(gr_robot::Placement { name: "part".into(), line: 0, part });
-    }
+    let options = gr_robot::Options { name: unit.name(), ..gr_robot::Options::default() };
     let mut planned_on = machine.clone();
+    if let Some(part) = part {
+        (planned_on.cell.table, planned_on.cell.part) = (Frame::IDENTITY, part);
+    }
     tool_points(&mut found, &mut planned_on, &operations, &say);
     let planned = gr_robot::plan(&motion.program, &planned_on, &texts, &options)?;
     // What switches the spindle has no part in errors.
