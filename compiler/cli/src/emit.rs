@@ -294,7 +294,10 @@ fn of_motion(mut motion: Motion, unit: &Unit, goal: &Goal<'_>) -> Result<Built, 
         "rs274ngc" => normalised(&motion, unit, goal.options, &name)?,
         "joint-gcode" => joints(&motion, goal)?,
         "json" => dumped(|out| gr_backends::dump::json(&motion.program, out)),
-        "csv" => dumped(|out| gr_backends::dump::csv(&motion.program, &gr_backends::dump::CsvOptions::default(), out)),
+        "csv" => {
+            let options = gr_backends::dump::CsvOptions { tolerance: goal.options.arc_tolerance, ..Default::default() };
+            dumped(|out| gr_backends::dump::csv(&motion.program, &options, out))
+        }
         "svg" | "png" | "html" => one_picture(&motion.program, goal.target, &name)?,
         "sheet" | "sheet-json" | "sheet-html" => Ok((one(sheet(&motion, unit, goal.target, &name)), Vec::new())),
         other => return Err(format!("the target {other} can't be made by this version")),

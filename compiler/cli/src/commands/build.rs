@@ -6,7 +6,7 @@ use std::time::{Duration, SystemTime};
 
 use clap::Parser as _;
 use gr_spec::TargetDef;
-use gr_text::{Severity, code};
+use gr_text::{Diagnostic, Severity, code};
 
 use super::check::{Checked, show};
 use super::complain;
@@ -70,6 +70,8 @@ struct Round<'a> {
     exit: Exit,
     files: Vec<PathBuf>,
     results: Vec<(PathBuf, Vec<u8>)>,
+    /// Findings that were shown: several targets of one program find the same.
+    told: Vec<(PathBuf, Diagnostic)>,
     /// Results that are written beside their goals already.
     written: Vec<(PathBuf, Pending)>,
     rules: String,
@@ -86,6 +88,7 @@ impl<'a> Round<'a> {
             exit: Exit::Ok,
             files: args.files.clone(),
             results: Vec::new(),
+            told: Vec::new(),
             written: Vec::new(),
             rules: String::new(),
         }
@@ -192,7 +195,7 @@ impl<'a> Round<'a> {
         drop(progress);
         match made {
             Ok(Ok((built, checked))) => {
-                show(&mut self.renderer, &checked);
+                self.show_new(job, checked);
                 self.keep(job, station, built);
             }
             Ok(Err(text)) => {
@@ -200,10 +203,18 @@ impl<'a> Round<'a> {
                 self.fail(Exit::Usage);
             }
             Err(checked) => {
-                show(&mut self.renderer, &checked);
                 self.fail(if checked.unreadable { Exit::Io } else { Exit::Findings });
+                self.show_new(job, checked);
             }
         }
+    }
+
+    /// Shows findings that no other target of the program had.
+    fn show_new(&mut self, job: &Job, mut checked: Checked) {
+        let told = &self.told;
+        checked.found.retain(|d| !told.iter().any(|(path, t)| *path == job.source && t == d));
+        show(&mut self.renderer, &checked);
+        self.told.extend(checked.found.into_iter().map(|d| (job.source.clone(), d)));
     }
 
     /// Keeps a result for writing.
@@ -211,7 +222,7 @@ impl<'a> Round<'a> {
         built.found.iter_mut().for_each(|d| station.lints.harden(d));
         let bad = built.found.iter().any(|d| d.severity == Severity::Error);
         let checked = Checked { sources: built.sources, found: built.found, more: 0, unreadable: false };
-        show(&mut self.renderer, &checked);
+        self.show_new(job, checked);
         if bad {
             return self.fail(Exit::Findings);
         }
