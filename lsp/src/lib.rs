@@ -9,10 +9,12 @@
 //! | `features` | from requests to features and back |
 //! | `protocol` | shapes of the protocol, and of our own requests |
 //! | `text` | text, positions, edits |
+//! | `frames` | takes messages that are none out of the stream |
 
 mod analysis;
 mod documents;
 mod features;
+mod frames;
 pub mod host;
 mod machine;
 pub mod protocol;

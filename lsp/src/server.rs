@@ -32,6 +32,7 @@ struct Abilities {
     pulls: bool,
 }
 
+#[derive(Clone)]
 struct Backend {
     queue: Sender<Message>,
     client: Client,
@@ -307,8 +308,12 @@ impl LanguageServer for Backend {
     }
 
     async fn initialized(&self, _: lsp::InitializedParams) {
-        self.pull_settings().await;
-        self.watch().await;
+        // Not waited for: a client that leaves at once never answers.
+        let own = self.clone();
+        tokio::spawn(async move {
+            own.pull_settings().await;
+            own.watch().await;
+        });
     }
 
     async fn shutdown(&self) -> Result<()> {
@@ -333,7 +338,8 @@ impl LanguageServer for Backend {
     }
     async fn did_change_configuration(&self, p: lsp::DidChangeConfigurationParams) {
         if self.abilities().configuration {
-            self.pull_settings().await;
+            let own = self.clone();
+            tokio::spawn(async move { own.pull_settings().await });
         } else {
             self.settings(&p.settings).await;
         }
@@ -495,7 +501,10 @@ impl Backend {
 }
 
 /// Serves one client on any pair of streams.
-pub async fn serve(input: impl AsyncRead + Unpin, output: impl AsyncWrite, host: Arc<dyn Host>) {
+pub async fn serve(input: impl AsyncRead + Unpin + Send + 'static, output: impl AsyncWrite, host: Arc<dyn Host>) {
+    let (clean, input_of_server) = tokio::io::duplex(1 << 20);
+    tokio::spawn(crate::frames::filter(input, clean));
+    let input = input_of_server;
     let (service, socket) = LspService::build(move |client| Backend::new(client, host))
         .custom_method("gccRobot/preview", Backend::preview)
         .custom_method("gccRobot/output", Backend::output)

@@ -104,6 +104,11 @@ fn gcode_actions(view: &mut View, at: Span) -> Answer<Vec<Action>> {
     let doc = doc(&tables);
     let line = doc.line_at(at.start).map_or(0, |l| l.line);
     let traced = super::look::trace_line(view, line, &[])?;
+    let contour = gcode::actions::compensated_lines(doc, line);
+    let contour = match contour {
+        Some(lines) => Some((lines.clone(), session.trace(file, lines, &[], super::MOST_BLOCKS)?)),
+        None => None,
+    };
     let count = doc.count();
     let last = session.state_at(file, count.saturating_sub(1))?;
     // Before M2 the state is what it leaves on; behind the last block, what it left.
@@ -112,6 +117,10 @@ fn gcode_actions(view: &mut View, at: Span) -> Answer<Vec<Action>> {
     view.release();
     let run = traced.as_ref().map(|t| (&t.before, &t.after, &t.program));
     let mut found = gcode::actions::actions(doc, at, Context { run, end: end.as_ref() });
+    if let Some((lines, traced)) = &contour {
+        let ran: Vec<(u32, &gr_interp::Modal, &Program)> = traced.iter().map(|t| (t.line, &t.before, &t.program)).collect();
+        found.extend(gcode::actions::write_out_compensation(doc, lines.clone(), &ran));
+    }
     if let Some(t) = &traced {
         found.extend(expand_call(view, doc, line, &t.before));
     }

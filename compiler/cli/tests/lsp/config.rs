@@ -31,7 +31,7 @@ fn machine_files() {
     assert!(found.is_empty(), "{found:?}");
     c.edit(&uri, "min = -400", "minn = -400");
     let found = c.diagnostics(&uri);
-    assert_eq!(found[0]["code"], "E0501", "{found:?}");
+    assert_eq!(found[0]["code"], "E0500", "{found:?}");
     assert_eq!(c.place(&uri, &found[0]["range"]), "mill.toml:14 minn");
     c.edit(&uri, "minn = -400", "min = -400");
     let h = c.hover(&uri, "ma|x = 400");

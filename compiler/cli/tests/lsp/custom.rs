@@ -47,8 +47,8 @@ fn preview_has_the_path_with_its_lines() {
     assert_eq!((kinds[end], lines[end], end), (2, 4, count - 1));
     assert!(kinds.iter().filter(|k| **k == 2).count() > 5 && kinds[0] == 255, "{kinds:?}");
     let times = floats(&p["times"]);
-    // 6 + 10 mm and a quarter turn of radius 10 at 10 mm/s.
-    assert!((times[end] - (6.0 + 10.0 + 15.708) / 10.0).abs() < 0.01, "{times:?}");
+    // 5 mm rapid at 100 mm/s; 6 + 10 mm and three quarters of a turn of radius 10 at 10 mm/s.
+    assert!((times[end] - (0.05 + (6.0 + 10.0 + 47.124) / 10.0)).abs() < 0.01, "{times:?}");
     assert_eq!(floats(&p["feeds"])[end], 600.0);
     assert_eq!(p["bounds"][1], json!([20.0, 10.0, 5.0]));
     let again = c.request("gccRobot/preview", json!({ "textDocument": { "uri": uri }, "have": p["key"] }));

@@ -24,10 +24,11 @@ DATA;
 #17=DRILLING_TYPE_STRATEGY($,$,$,$,$,$);
 #26=THROUGH_BOTTOM_CONDITION();
 #41=MILLING_MACHINE_FUNCTIONS(.T.,$,$,.F.,$,(),.T.,$,$,());
-#44=MILLING_CUTTING_TOOL('SPIRAL_DRILL_8',#46,(),80.,$,$);
+#44=MILLING_CUTTING_TOOL('SPIRAL_DRILL_8',#46,(#48),80.,$,$);
 #45=MILLING_TECHNOLOGY(0.001,.TCP.,$,-20.,$,.F.,.F.,.F.,$);
 #46=TWIST_DRILL(#47,2,.RIGHT.,.F.,$);
-#47=MILLING_TOOL_DIMENSION(8.,118.,30.,$,$,$,$);
+#47=MILLING_TOOL_DIMENSION(8.,59.,$,30.,0.,$,$);
+#48=CUTTING_COMPONENT(80.,$,$,$,$);
 #62=PLANE('SECURITY',#63);
 #63=AXIS2_PLACEMENT_3D('P',#64,$,$);
 #64=CARTESIAN_POINT('',(0.,0.,30.));
@@ -133,7 +134,7 @@ fn outline_folding_selection_lenses() {
     insta::assert_snapshot!("outline", tree(&symbols, 0));
     let folds = c.request("textDocument/foldingRange", document.clone());
     let lines: Vec<_> = folds.as_array().expect("a list").iter().map(|f| (f["startLine"].as_u64(), f["endLine"].as_u64())).collect();
-    assert!(lines.contains(&(Some(1), Some(5))) && lines.contains(&(Some(6), Some(40))), "{lines:?}");
+    assert!(lines.contains(&(Some(1), Some(5))) && lines.contains(&(Some(6), Some(41))), "{lines:?}");
     let positions = json!({ "textDocument": { "uri": uri }, "positions": [c.position(&uri, "(0.,0.,3|0.)")] });
     let mut chain = c.request("textDocument/selectionRange", positions)[0].clone();
     let mut texts = Vec::new();
@@ -141,7 +142,7 @@ fn outline_folding_selection_lenses() {
         texts.push(c.place(&uri, &chain["range"]));
         chain = chain["parent"].clone();
     }
-    assert_eq!(texts[..2], ["plate.p21:26 30.", "plate.p21:26 0.,0.,30."]);
+    assert_eq!(texts[..2], ["plate.p21:27 30.", "plate.p21:27 0.,0.,30."]);
     let lenses = c.request("textDocument/codeLens", document);
     let all: Vec<String> = lenses.as_array().expect("a list").iter().map(|l| format!("{}: {}", l["range"]["start"]["line"], l["command"]["title"].as_str().unwrap_or(""))).collect();
     insta::assert_snapshot!("lenses", all.join("\n"));

@@ -78,25 +78,50 @@ fn other_arc_form(line: &LineOf<'_>, before: &Modal, program: &Program) -> Optio
     Some(Action { title: title.into(), kind: ActionKind::Rewrite, edits })
 }
 
-/// Writes the moves that a cycle, or a block under compensation, makes.
+/// Writes the moves that a cycle makes.
 fn expand(line: &LineOf<'_>, before: &Modal, after: &Modal, program: &Program) -> Option<Action> {
     let cycle = (730..=899).contains(&after.motion) && after.motion != 800;
-    let comp = before.side() != Side::Off || after.side() != Side::Off;
     let moves = program.steps().filter(|s| s.op.moves()).count();
-    if moves == 0 || moves > MOST_MOVES || !(cycle || comp) {
+    if moves == 0 || moves > MOST_MOVES || !cycle {
         return None;
     }
-    let title = if cycle { format!("Write out this {}", code_name(b'g', f64::from(after.motion) / 10.0)) } else { "Write out this compensated move".into() };
-    let mut text = write_moves(program, before);
-    if cycle {
-        // The next block of plain axis words would go on with the last motion, not with the cycle.
-        text.push_str("\n(the cycle ends here: write G80 or the next motion code)");
-    }
+    let title = format!("Write out this {}", code_name(b'g', f64::from(after.motion) / 10.0));
+    // The next block of plain axis words would go on with the last motion, not with the cycle.
+    let text = format!("{}\n(the cycle ends here: write G80 or the next motion code)", write_moves(program, before));
     let words = line.words();
     let first = words.iter().find(|w| w.form != Form::Comment && !(w.letter == b'n'))?;
     let last = words.iter().rfind(|w| w.form != Form::Comment)?;
     let span = Span::new(line.tight(first).start, line.tight(last).end);
     Some(Action { title, kind: ActionKind::Inline, edits: vec![Edit { span, text }] })
+}
+
+/// Lines from the G41 or G42 before a line to the G40 behind it; none when the line is not between such.
+pub fn compensated_lines(doc: Doc<'_>, line: u32) -> Option<std::ops::Range<u32>> {
+    const MOST_LINES: u32 = 2_000;
+    let on = |l: &LineOf<'_>| [410, 411, 420, 421].iter().any(|c| l.has_code(b'g', *c));
+    let off = |l: &LineOf<'_>| l.has_code(b'g', 400);
+    let first = (line.saturating_sub(MOST_LINES)..line + 1).rev().filter_map(|n| doc.line(n)).find(|l| on(l) || (off(l) && l.line != line))?;
+    let last = doc.lines(line..line + MOST_LINES).find(|l| off(l) || (on(l) && l.line != line && l.line != first.line))?;
+    (on(&first) && off(&last)).then(|| first.line..last.line + 1)
+}
+
+/// Writes the tool's own path in place of a contour under cutter compensation: the blocks of
+/// [`compensated_lines`] as they are run. Only where they hold nothing but motion.
+pub fn write_out_compensation(doc: Doc<'_>, lines: std::ops::Range<u32>, ran: &[(u32, &Modal, &Program)]) -> Option<Action> {
+    let plain = |w: &&gr_gcode::Word| matches!(w.letter, b'm' | b's' | b't') || matches!(w.form, Form::Setting | Form::Control | Form::Bad);
+    if doc.lines(lines.clone()).any(|l| l.words().iter().find(plain).is_some()) {
+        return None;
+    }
+    let mut edits = Vec::new();
+    for line in doc.lines(lines) {
+        let words = line.words();
+        let Some(first) = words.iter().find(|w| w.form != Form::Comment && w.letter != b'n') else { continue };
+        let last = words.iter().rfind(|w| w.form != Form::Comment)?;
+        let (_, before, program) = ran.iter().find(|r| r.0 == line.line)?;
+        let text = write_moves(program, before);
+        edits.push(Edit { span: Span::new(line.tight(first).start, line.tight(last).end), text });
+    }
+    Some(Action { title: "Write out this contour without compensation".into(), kind: ActionKind::Inline, edits })
 }
 
 /// Moves as plain G0 G1 G2 G3 in absolute distance, the mode before put back.

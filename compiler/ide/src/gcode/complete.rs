@@ -36,7 +36,7 @@ pub fn complete(doc: Doc<'_>, offset: u32, around: Around<'_>) -> Vec<Completion
     if let Some(hash) = open_parameter(before) {
         return parameters(doc, &before[hash..], Span::new(start + hash as u32, offset), &around, &line);
     }
-    if let Some(found) = label(doc, before, start, offset, &around) {
+    if let Some(found) = label(doc, &line, before, offset, &around) {
         return found;
     }
     let outside = |(_, c): &(usize, char)| !c.is_ascii_alphanumeric() && *c != '.';
@@ -151,7 +151,8 @@ fn names_of(doc: Doc<'_>) -> Vec<(Parameter, bool)> {
 }
 
 /// O-words: labels and keywords.
-fn label(doc: Doc<'_>, before: &str, start: u32, offset: u32, around: &Around<'_>) -> Option<Vec<Completion>> {
+fn label(doc: Doc<'_>, line: &LineOf<'_>, before: &str, offset: u32, around: &Around<'_>) -> Option<Vec<Completion>> {
+    let start = line.span().start;
     let text = before.trim_start().trim_start_matches(|c: char| c == '/' || c.is_whitespace());
     let rest = text.strip_prefix(['o', 'O'])?;
     let from = before.len() - rest.len();
@@ -163,7 +164,11 @@ fn label(doc: Doc<'_>, before: &str, start: u32, offset: u32, around: &Around<'_
     };
     let Some(end) = complete_label else {
         let replace = Span::new(start + from as u32 - 1, offset);
-        let local: Vec<(String, String)> = names::subs(doc).iter().map(|s| (label_text(&s.label), "subroutine of this file".into())).collect();
+        let local: Vec<(String, String)> = names::subs(doc)
+            .iter()
+            .filter(|s| s.first != line.line)
+            .map(|s| (label_text(&s.label), "subroutine of this file".into()))
+            .collect();
         let typed = format!("o{}", rest.to_lowercase());
         let fits = local.iter().chain(around.subs).filter(|(name, _)| name.starts_with(&typed));
         let items = fits.map(|(name, place)| Completion {
@@ -282,7 +287,7 @@ fn snippet(def: &CodeDef, dialect: &Dialect, replace: Span) -> Completion {
     let mut n = 0;
     let mut label = def.code.to_string();
     for a in def.args.iter().filter(|a| a.required || a.letters.contains(['X', 'Y'])) {
-        for letter in a.letters.chars().take(if a.required { 9 } else { 2 }) {
+        for letter in a.letters.chars().take(if a.required { 9 } else { 3 }) {
             n += 1;
             insert.push_str(&format!(" {letter}${{{n}:0}}"));
             label.push_str(&format!(" {letter}"));

@@ -55,13 +55,12 @@ impl<'a> LineOf<'a> {
         let at = |v: u32| v.saturating_sub(self.base) as usize;
         self.chunk.text.get(at(span.start)..at(span.end)).unwrap_or("")
     }
-    /// The word around a byte of the file.
+    /// The word around a byte of the file, or the one that ends there.
     pub fn word_at(&self, offset: u32) -> Option<&'a Word> {
-        let holds = |w: &&Word| {
-            let s = self.tight(w);
-            s.start <= offset && offset < s.end
-        };
-        self.words().iter().find(holds)
+        let span = |w: &Word| self.tight(w);
+        let holds = |w: &&Word| span(w).start <= offset && offset < span(w).end;
+        let ends = |w: &&Word| span(w).end == offset;
+        self.words().iter().find(holds).or_else(|| self.words().iter().find(ends))
     }
     /// A literal word.
     pub fn literal(&self, letter: u8) -> Option<&'a Word> {

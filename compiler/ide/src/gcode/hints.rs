@@ -190,5 +190,5 @@ fn changed(line: &LineOf<'_>, run: &Ran<'_>) -> String {
     let quiet = ["G80", "G43", "G49", "G40", "G41", "G42"];
     let own = |c: &&str| quiet.contains(c) && written.iter().any(|w| w.starts_with(&c[..2]) || w == "G80");
     let new: Vec<&str> = new.into_iter().filter(|c| !own(c)).collect();
-    if new.is_empty() || ends && new.len() > 6 { String::new() } else { format!("now {}", new.join(" ")) }
+    if new.is_empty() || ends { String::new() } else { format!("now {}", new.join(" ")) }
 }

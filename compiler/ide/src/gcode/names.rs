@@ -210,7 +210,9 @@ fn last_number(doc: Doc<'_>, line: u32, statement: Span) -> Option<Span> {
 /// The name or number of `#<name>`, `#12` or `#12=…`.
 fn parameter_span(line: &LineOf<'_>, span: Span) -> Span {
     let text = line.slice(span);
-    if let Some(open) = text.find('<') {
+    // The name follows the sign at once; a value may hold others.
+    let open = text.find(|c: char| c != '#' && c != ' ' && c != '\t').filter(|at| text[*at..].starts_with('<'));
+    if let Some(open) = open {
         let close = text[open..].find('>').map_or(text.len(), |c| open + c);
         return Span::new(span.start + open as u32 + 1, span.start + close as u32);
     }

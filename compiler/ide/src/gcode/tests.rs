@@ -57,7 +57,8 @@ fn words_parameters_functions() {
     assert!(at("G1 F|100").is_some_and(|h| h.1.starts_with("**F**")));
     assert!(at("G1 X[SI|N[30]]").is_some_and(|h| h.1.to_uppercase().contains("SIN")));
     assert!(at("G0 X#52|20").is_some_and(|h| h.0 == "5220" && h.1.starts_with("**#5220**")));
-    assert_eq!(at("G1 X1 | "), None);
+    assert_eq!(at("G1 X1  | "), None);
+    assert!(at("#1|01 = [#<a>]").is_some_and(|h| h.0 == "101"));
     assert_eq!(at("|"), None);
 }
 

@@ -26,7 +26,8 @@ pub fn hover(doc: Doc<'_>, offset: u32) -> Option<Hover> {
     if offset > end {
         return None;
     }
-    let mut text = attribute(node, place).map_or(String::new(), |a| about(node, place, a));
+    let real = doc.file.real(doc.text, value);
+    let mut text = attribute(node, place).map_or(String::new(), |a| about(node, a, real));
     if let Some(target) = doc.file.reference(doc.text, value) {
         let found = model.get(target).map_or(format!("**#{target}**: the file has no such instance."), |t| entity(doc, t));
         if !text.is_empty() {
@@ -42,12 +43,10 @@ fn contains(span: Span, at: u32) -> bool {
 }
 
 /// An attribute with its value here.
-fn about(node: Node<'_>, place: usize, a: &'static gr_step::Attribute) -> String {
+fn about(node: Node<'_>, a: &'static gr_step::Attribute, value: Option<f64>) -> String {
     let optional = if a.optional { ", optional" } else { "" };
     let mut text = format!("**{}** of {}: {}{optional}", a.name, words(node.keyword()), a.written);
-    if let Some(v) = node.parameters().nth(place)
-        && let Some(value) = v.real()
-    {
+    if let Some(value) = value {
         text.push_str(&format!("\n\n{}", in_units(node, a, value)));
     }
     if let Type::Enumeration(names) = &a.ty {
@@ -64,7 +63,7 @@ fn in_units(node: Node<'_>, a: &gr_step::Attribute, value: f64) -> String {
             let turn = if !node.is_a("milling_technology") {
                 ""
             } else if value < 0.0 {
-                ", clockwise seen from the part (negative: the usual direction of cutting)"
+                ", clockwise as M3: negative is the usual direction of cutting"
             } else {
                 ""
             };
