@@ -14,6 +14,8 @@ pub(crate) struct Emit<'a> {
     pub lines: &'a LineIndex,
     pub file: FileId,
     pub out: Vec<Diagnostic>,
+    /// Places and words of what was told, so that it is told once.
+    said: std::collections::BTreeSet<(u32, String)>,
     /// Write tool axes: some feature is not upright.
     pub axes: bool,
     pub source: Source,
@@ -38,6 +40,7 @@ impl<'a> Emit<'a> {
             lines,
             file,
             out: Vec::new(),
+            said: std::collections::BTreeSet::new(),
             axes,
             source,
             at: None,
@@ -58,7 +61,7 @@ impl<'a> Emit<'a> {
     pub fn say(&mut self, code: Code, origin: Origin, args: &[&str]) {
         let args: Vec<String> = args.iter().map(|a| (*a).to_string()).collect();
         let d = Diagnostic::new(code, self.file, origin.span, &args);
-        if !self.out.contains(&d) {
+        if self.said.insert((origin.span.start, d.message.clone())) {
             self.out.push(d);
         }
     }

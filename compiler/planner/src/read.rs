@@ -35,6 +35,10 @@ pub(crate) struct Reader<'m> {
     count: usize,
     reached: BTreeSet<u64>,
     units_said: bool,
+    /// Raw blocks of the workpieces.
+    blocks: Vec<(u64, Frame, [f64; 3])>,
+    /// Places and words of what was told, so that it is told once.
+    said: BTreeSet<(u32, String)>,
 }
 
 pub(crate) fn origin(node: Node<'_>) -> Origin {
@@ -70,6 +74,8 @@ pub(crate) fn read<'m>(model: &'m Model<'m>, file: FileId, units: Option<Units>)
         count: 0,
         reached: BTreeSet::new(),
         units_said: units.is_some(),
+        blocks: Vec::new(),
+        said: BTreeSet::new(),
     };
     let process = r.project();
     (process, r.tools, r.out)
@@ -96,12 +102,14 @@ impl<'m> Reader<'m> {
             count: 0,
             reached: BTreeSet::new(),
             units_said: true,
+            blocks: Vec::new(),
+            said: BTreeSet::new(),
         }
     }
     pub fn say(&mut self, code: Code, node: Node<'_>, args: &[&str]) {
         let args: Vec<String> = args.iter().map(|a| (*a).to_string()).collect();
         let d = Diagnostic::new(code, self.file, node.keyword_span(), &args);
-        if !self.out.contains(&d) {
+        if self.said.insert((d.labels.first().map_or(0, |l| l.span.start), d.message.clone())) {
             self.out.push(d);
         }
     }
@@ -109,7 +117,7 @@ impl<'m> Reader<'m> {
         let span = node.written(attribute).map_or(node.keyword_span(), |v| v.span());
         let args: Vec<String> = args.iter().map(|a| (*a).to_string()).collect();
         let d = Diagnostic::new(code, self.file, span, &args);
-        if !self.out.contains(&d) {
+        if self.said.insert((d.labels.first().map_or(0, |l| l.span.start), d.message.clone())) {
             self.out.push(d);
         }
     }
@@ -175,7 +183,8 @@ impl<'m> Reader<'m> {
             self.missing(project, "main_workplan", "it says what is executed");
             return None;
         };
-        let workpieces = self.model.all("workpiece").map(|w| self.workpiece(w)).collect();
+        let workpieces: Vec<Workpiece> = self.model.all("workpiece").map(|w| self.workpiece(w)).collect();
+        self.blocks = workpieces.iter().filter_map(|w| w.block.map(|(frame, size)| (w.origin.id, frame, size))).collect();
         let mut elements = Vec::new();
         self.element(main, None, &mut elements);
         let orphans: Vec<Origin> =
@@ -339,13 +348,11 @@ impl<'m> Reader<'m> {
     }
 
     /// The box around all raw parts of the setup.
-    fn stock(&mut self, setup: Option<&Setup>) -> Option<[[f64; 3]; 2]> {
+    fn stock(&self, setup: Option<&Setup>) -> Option<[[f64; 3]; 2]> {
         let mut bounds: Option<[[f64; 3]; 2]> = None;
-        for w in self.model.all("workpiece") {
-            let piece = self.workpiece(w);
-            let Some((frame, size)) = piece.block else { continue };
-            let place = setup.and_then(|s| s.workpieces.iter().find(|p| p.0 == w.id())).map_or(Frame::default(), |p| p.1);
-            let frame = place.place(&frame);
+        for (id, frame, size) in &self.blocks {
+            let place = setup.and_then(|s| s.workpieces.iter().find(|p| p.0 == *id)).map_or(Frame::default(), |p| p.1);
+            let frame = place.place(frame);
             for corner in 0..8 {
                 let at = |i: usize| if corner >> i & 1 == 1 { size[i] } else { 0.0 };
                 let p = frame.point([at(0), at(1), at(2)]);

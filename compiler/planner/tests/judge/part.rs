@@ -169,6 +169,7 @@ impl Part {
         }
         f
     }
+    #[allow(dead_code)]
     pub fn top(&self) -> f64 {
         self.block[2]
     }
