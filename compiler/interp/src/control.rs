@@ -729,7 +729,9 @@ impl<S: Sink> Interp<'_, S> {
             self.shift = at.shift;
             return Ok(());
         }
-        let from = self.place;
+        // Where the call stands, not inside it.
+        let caller = self.level().checked_sub(1).and_then(|l| self.levels[l].ret.as_ref());
+        let from = caller.map_or(self.place, |ret| ret.place);
         let mut start = self.sequence();
         if let Some(file) = self.files.find_sub(name) {
             self.note_file(file);

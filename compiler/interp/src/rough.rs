@@ -1146,7 +1146,7 @@ mod tests {
             step: 2.0,
             retract: 0.5,
             facing: false,
-            limit: 10_000,
+            limit: 10_000, leaves: false,
         }
     }
 
