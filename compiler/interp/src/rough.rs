@@ -1146,7 +1146,8 @@ mod tests {
             step: 2.0,
             retract: 0.5,
             facing: false,
-            limit: 10_000, leaves: false,
+            limit: 10_000,
+            leaves: false,
         }
     }
 
