@@ -75,6 +75,8 @@ pub struct TargetOptions {
     /// unb2013: its settings file arqConf.txt [default: the greatest values it allows]
     #[arg(long, value_name = "FILE")]
     pub reference_config: Option<PathBuf>,
+    #[command(flatten)]
+    pub robot: crate::robot::RobotOptions,
 }
 
 /// Where tools are changed.
@@ -125,12 +127,14 @@ pub enum Reference {
     Unb2013,
     /// The STEP-NC trajectory generator for robots, UFSC 2016
     Ufsc2016,
+    /// The parallel machine 2UPS+PRP, EPUSP 2009: machines as their publication has them
+    Usp2009,
 }
 
 impl Reference {
     /// Whether it starts from STEP-NC.
     fn reads_exchange(self) -> bool {
-        self != Reference::Ufmg2008
+        matches!(self, Reference::Unb2013 | Reference::Ufsc2016)
     }
 }
 
@@ -140,6 +144,17 @@ pub struct Artifact {
     pub suffix: &'static str,
     /// Contents.
     pub bytes: Vec<u8>,
+    /// Line of the program that each line comes from, from 0; `u32::MAX` = none. Empty: not known.
+    pub lines: Vec<u32>,
+    /// A name of its own beside the main file.
+    pub name: Option<String>,
+}
+
+impl Artifact {
+    /// A file, or one beside it.
+    pub fn new(suffix: &'static str, bytes: Vec<u8>) -> Artifact {
+        Artifact { suffix, bytes, lines: Vec::new(), name: None }
+    }
 }
 
 /// A result with everything that was found on the way.
@@ -159,6 +174,8 @@ pub struct Built {
     pub tools: Vec<Tool>,
     /// See `tools`.
     pub table: Option<String>,
+    /// Figures for people.
+    pub summary: Option<String>,
 }
 
 /// What a build needs besides the program.
@@ -201,7 +218,7 @@ fn mismatch(unit: &Unit, goal: &Goal<'_>) -> Option<String> {
         return Some(format!("--target {} lists the workingsteps of a STEP-NC file; {name} is G-code", goal.target));
     }
     let reference = goal.options.reference?;
-    if reference.reads_exchange() != unit.exchange {
+    if reference != Reference::Usp2009 && reference.reads_exchange() != unit.exchange {
         let what = if unit.exchange { "a STEP-NC file" } else { "G-code" };
         return Some(format!("--reference {} does not read {what} ({name})", id_of(reference)));
     }
@@ -253,8 +270,8 @@ fn of_converted(unit: &Unit, converted: crate::exchange::Converted, goal: &Goal<
     let base = Built { table: Some(table.clone()), subs: files, ..Built::default() };
     if goal.target == "rs274ngc" {
         let artifacts = vec![
-            Artifact { suffix: "", bytes: program.into_bytes() },
-            Artifact { suffix: ".tbl", bytes: table.into_bytes() },
+            Artifact::new("", program.into_bytes()),
+            Artifact::new(".tbl", table.into_bytes()),
         ];
         return Ok(Built { artifacts, ..base });
     }
@@ -288,6 +305,18 @@ fn of_motion(mut motion: Motion, unit: &Unit, goal: &Goal<'_>) -> Result<Built, 
         return Ok(built(motion, Vec::new(), Vec::new()));
     }
     let name = stem(&unit.path);
+    let planned = match goal.target {
+        "joint-gcode" if crate::robot::plans_joints(goal) => Some(crate::robot::joint_gcode(&motion, goal, &texts(&motion), &name)?),
+        "setpoints" => Some(crate::robot::setpoints(&motion, goal, &texts(&motion), &name)?),
+        other if crate::robot::is_language(other) => Some(crate::robot::build(&motion, goal, &texts(&motion), &name)?),
+        _ => None,
+    };
+    if let Some(made) = planned {
+        return Ok(match made {
+            Ok(m) => Built { summary: Some(m.summary), ..built(motion, m.artifacts, m.notes) },
+            Err(found) => built(motion, Vec::new(), found),
+        });
+    }
     let made: Result<(Vec<Artifact>, Vec<Diagnostic>), Vec<Diagnostic>> = match goal.target {
         "stepnc" => stepnc(&motion, unit, goal.options, &name),
         "motion" => Ok((one(gr_ir::text::print(&motion.program, true).into_bytes()), Vec::new())),
@@ -313,7 +342,7 @@ fn built(motion: Motion, artifacts: Vec<Artifact>, more: Vec<Diagnostic>) -> Bui
     found.extend(more);
     let table = motion.plan.as_ref().filter(|p| p.own_table).map(|p| gr_planner::tool_table(&p.tools));
     let tools = motion.plan.map(|p| p.tools).unwrap_or_default();
-    Built { artifacts, written: None, found, sources: motion.sources, subs: motion.subs, tools, table }
+    Built { artifacts, written: None, found, sources: motion.sources, subs: motion.subs, tools, table, summary: None }
 }
 
 /// Lets the program begin later.
@@ -382,7 +411,7 @@ fn sheet(motion: &Motion, unit: &Unit, kind: &str, name: &str) -> Vec<u8> {
 }
 
 fn one(bytes: Vec<u8>) -> Vec<Artifact> {
-    vec![Artifact { suffix: "", bytes }]
+    vec![Artifact::new("", bytes)]
 }
 
 fn dumped(write: impl FnOnce(&mut dyn std::io::Write) -> std::io::Result<()>) -> Result<(Vec<Artifact>, Vec<Diagnostic>), Vec<Diagnostic>> {
@@ -454,8 +483,8 @@ fn normalised(motion: &Motion, unit: &Unit, options: &TargetOptions, name: &str)
     }
     let texts = texts(motion);
     Ok(rs274ngc::emit(&motion.program, &o, &texts).map(|e| {
-        let mut artifacts = one(e.text.into_bytes());
-        artifacts.extend(table.map(|t| Artifact { suffix: ".tbl", bytes: t.into_bytes() }));
+        let mut artifacts = vec![Artifact { lines: e.lines, ..Artifact::new("", e.text.into_bytes()) }];
+        artifacts.extend(table.map(|t| Artifact::new(".tbl", t.into_bytes())));
         (artifacts, e.notes)
     }))
 }
@@ -519,8 +548,10 @@ fn line_numbers(text: &str) -> Result<(u32, u32), String> {
 }
 
 /// Lines that motion comes from. Those of a STEP-NC file are places, not words of G-code.
-enum Lines<'a> {
+pub enum Lines<'a> {
+    /// Of G-code.
     Code(Texts<'a>),
+    /// Of STEP-NC.
     Instances(Texts<'a>),
 }
 
@@ -537,7 +568,8 @@ impl gr_backends::Sources for Lines<'_> {
     }
 }
 
-fn texts(motion: &Motion) -> Lines<'_> {
+/// The lines of a program.
+pub fn texts(motion: &Motion) -> Lines<'_> {
     let texts = Texts::new(motion.sources.iter().map(|(id, f)| (id, &*f.text)));
     if motion.plan.is_some() { Lines::Instances(texts) } else { Lines::Code(texts) }
 }
@@ -571,9 +603,9 @@ fn joints(motion: &Motion, goal: &Goal<'_>) -> Result<Made, String> {
 fn plan(program: &Program, machine: &Machine, options: &joint::Options, place: &dyn Fn(Source) -> (FileId, Span)) -> Made {
     let made = joint::compile(program, machine, options, place)?;
     let artifacts = vec![
-        Artifact { suffix: "", bytes: made.gcode().into_bytes() },
-        Artifact { suffix: "-cartesian.csv", bytes: made.cartesian_csv().into_bytes() },
-        Artifact { suffix: "-joint.csv", bytes: made.joint_csv().into_bytes() },
+        Artifact::new("", made.gcode().into_bytes()),
+        Artifact::new("-cartesian.csv", made.cartesian_csv().into_bytes()),
+        Artifact::new("-joint.csv", made.joint_csv().into_bytes()),
     ];
     Ok((artifacts, Vec::new()))
 }

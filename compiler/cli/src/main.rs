@@ -11,6 +11,7 @@ mod pipeline;
 mod progress;
 mod project;
 mod render;
+mod robot;
 mod setup;
 mod sources;
 mod tools;

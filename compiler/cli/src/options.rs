@@ -362,6 +362,9 @@ pub struct DiffArgs {
 pub struct VerifyArgs {
     /// Program
     pub file: PathBuf,
+    /// For a robot (--machine): folder for the table of points and the pictures of errors, joints and speeds
+    #[arg(short, long, value_name = "FOLDER")]
+    pub output: Option<PathBuf>,
     #[command(flatten)]
     pub setup: SetupArgs,
     #[command(flatten)]
@@ -418,6 +421,17 @@ pub enum MachineAction {
         /// Machine files
         #[arg(required = true)]
         files: Vec<PathBuf>,
+    },
+    /// Make a machine file of a URDF
+    Import {
+        /// URDF file
+        file: PathBuf,
+        /// Id of the new machine: maker/model
+        #[arg(long, default_value = "my/robot", value_name = "ID")]
+        id: String,
+        /// Where the machine file goes [default: standard output]
+        #[arg(short, long, value_name = "PATH")]
+        output: Option<PathBuf>,
     },
 }
 

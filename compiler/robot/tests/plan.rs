@@ -164,3 +164,49 @@ fn the_nearest_start_can_be_the_wrong_one() {
     let nearest = |v: f64| v - 360.0 * (v / 360.0).round();
     assert!(starts.iter().any(|(a, b)| (nearest(*a) - a).abs() > 1.0 && nearest(*a) + (b - a) > 300.0), "{starts:?}");
 }
+
+/// A line across the hollow of the parallel machine's work space: both ends are good, the middle is too near the column.
+#[test]
+fn a_line_leaves_the_work_space() {
+    let machine = builtin("usp/2ups-prp").unwrap();
+    let k = machine.kinematics();
+    let good = |x: f64, y: f64, z: f64| {
+        let pose = gr_machine::Pose { position: [x, y, z], rotation: [0.0; 3] };
+        k.inverse(&pose).is_ok_and(|all| all.iter().any(|s| machine.outside(&s.joints).is_empty() && k.violations(&s.joints).is_empty()))
+    };
+    let mut found = None;
+    for z in (0..=640).step_by(20).map(f64::from) {
+        for yaw in (10..34).map(|d| f64::from(d).to_radians()) {
+            for arm in (606..760).step_by(4).map(f64::from) {
+                let (x, y) = (arm * yaw.cos(), arm * yaw.sin());
+                if found.is_none() && good(x, y, z) && good(x, -y, z) && !good(x, 0.0, z) {
+                    found = Some((x, y, z));
+                }
+            }
+        }
+    }
+    let (x, y, z) = found.expect("there is such a line");
+    let text = format!("G0 X{x:.3} Y{y:.3} Z{z}\nG1 Y{:.3} F600\nM30\n", -y);
+    let told = faults(&text, &machine);
+    assert!(told.starts_with("E0530 line 2: both ends of this move can be reached, but at "), "{told}");
+    insta::assert_snapshot!("leaves_the_work_space", told);
+}
+
+/// Each condition of the parallel machine by its name.
+#[test]
+fn conditions_by_name() {
+    let machine = gr_machine::reference("usp/2ups-prp").unwrap();
+    let mut names = std::collections::BTreeSet::new();
+    for x in (200..1500).step_by(25) {
+        for y in (-900..=900).step_by(50) {
+            for z in [-700, -400, 0, 400, 700] {
+                let pose = gr_machine::Pose { position: [x, y, z].map(f64::from), rotation: [0.0; 3] };
+                let k = machine.kinematics();
+                for s in k.inverse(&pose).unwrap_or_default() {
+                    names.extend(k.violations(&s.joints).into_iter().map(|v| v.name));
+                }
+            }
+        }
+    }
+    insta::assert_snapshot!("conditions", names.into_iter().collect::<Vec<_>>().join("\n"));
+}

@@ -226,6 +226,9 @@ impl<'a> Round<'a> {
         if bad {
             return self.fail(Exit::Findings);
         }
+        if let Some(summary) = built.summary.filter(|_| !self.global.quiet) {
+            eprint!("{summary}");
+        }
         self.files.extend(built.subs.iter().cloned());
         let Some(goal) = &job.goal else {
             if let Some(main) = built.artifacts.into_iter().next() {
@@ -237,7 +240,11 @@ impl<'a> Round<'a> {
         let mut read = vec![job.source.clone()];
         read.extend(station.files.iter().chain(&built.subs).cloned());
         let beside = |a: &Artifact| goal.with_file_name(format!("{}{}", stem(goal), a.suffix));
-        let path_of = |a: &Artifact| if a.suffix.is_empty() { goal.clone() } else { beside(a) };
+        let path_of = |a: &Artifact| match &a.name {
+            Some(name) => goal.with_file_name(name),
+            None if a.suffix.is_empty() => goal.clone(),
+            None => beside(a),
+        };
         let mut goals: Vec<PathBuf> = built.artifacts.iter().map(path_of).collect();
         if built.written.is_some() {
             goals.insert(0, goal.clone());

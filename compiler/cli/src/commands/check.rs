@@ -225,7 +225,11 @@ fn checked(name: &str, path: &Path, text: &str, station: &Station) -> Checked {
     let check = session.check(file);
     let mut found = check.diagnostics;
     found.iter_mut().for_each(|d| station.lints.harden(d));
-    Checked { sources: session_sources(&session, &found), found, more: check.more, unreadable: false }
+    let mut checked = Checked { sources: session_sources(&session, &found), found, more: check.more, unreadable: false };
+    if let Some(machine) = &station.machine {
+        crate::robot::ask(name, text, machine, &station.setup_for(path, text), &mut checked);
+    }
+    checked
 }
 
 /// The files that findings point into, under the numbers that the session gave them.

@@ -126,6 +126,9 @@ fn as_json(result: &Diff, a: &Sources, b: &Sources) -> String {
 pub fn verify(global: &Global, args: &VerifyArgs) -> Exit {
     let mut renderer = global.renderer(true);
     let Some(station) = prepare(&args.setup, &mut renderer) else { return Exit::Findings };
+    if let Some(machine) = station.machine.as_ref().filter(|m| crate::robot::is_checked(m)) {
+        return on_robot(global, args, &station, machine, &mut renderer);
+    }
     let goal = Goal { target: "rs274ngc", options: &args.options, machine: None, from_line: None, file: None };
     let made = load(&args.file, &station).and_then(|unit| {
         let a = motion(&unit, None)?.0;
@@ -166,6 +169,32 @@ pub fn verify(global: &Global, args: &VerifyArgs) -> Exit {
         result.count -= before - result.differences.len();
     }
     tell(global, &result, &a.sources, &b.sources)
+}
+
+/// Joint values of a robot against the points they are for.
+fn on_robot(global: &Global, args: &VerifyArgs, station: &Station, machine: &gr_machine::Machine, renderer: &mut Renderer) -> Exit {
+    let made = load(&args.file, station).and_then(|unit| crate::robot::verify(&unit, machine, args));
+    let report = match made {
+        Ok(Ok(report)) => report,
+        Ok(Err(text)) => {
+            eprintln!("{text}");
+            return Exit::Findings;
+        }
+        Err(checked) => {
+            show(renderer, &checked);
+            renderer.finish(!global.quiet);
+            return if checked.unreadable { Exit::Io } else { Exit::Findings };
+        }
+    };
+    if let Some(folder) = &args.output {
+        let files = crate::robot::report_files(&report, folder, &crate::emit::stem(&args.file));
+        let written = std::fs::create_dir_all(folder).map_err(|e| (folder.clone(), e));
+        if let Err((path, e)) = written.and_then(|()| crate::output::write_with(&files, Vec::new())) {
+            eprintln!("{}: {e}", path.display());
+            return Exit::Io;
+        }
+    }
+    super::print(&report.table())
 }
 
 /// One unit of the last decimal that is written; with straight pieces for arcs, their tolerance too.

@@ -13,6 +13,7 @@ pub fn run(global: &Global, args: &MachineArgs) -> Exit {
     match &args.action {
         MachineAction::List => super::print(&catalogue()),
         MachineAction::Show { machine, toml } => show(global, machine, *toml),
+        MachineAction::Import { file, id, output } => import(global, file, id, output.as_deref()),
         MachineAction::Check { files } => {
             files.iter().map(|f| check(global, f, false, false)).max().unwrap_or(Exit::Ok)
         }
@@ -52,6 +53,30 @@ fn check(global: &Global, path: &Path, print: bool, toml: bool) -> Exit {
             found.iter().for_each(|d| renderer.show(&sources, d));
             renderer.finish(!global.quiet);
             Exit::Findings
+        }
+    }
+}
+
+/// Makes a machine file of a URDF.
+fn import(global: &Global, path: &Path, id: &str, output: Option<&Path>) -> Exit {
+    let text = match read(path) {
+        Ok(d) => d.text,
+        Err((code, args)) => return super::refuse(global, path, code, &args),
+    };
+    let made = match gr_machine::import_urdf(id, &text) {
+        Ok(made) => made,
+        Err(why) => {
+            eprintln!("{}: {why}", path.display());
+            return Exit::Findings;
+        }
+    };
+    made.notes.iter().for_each(|n| eprintln!("{n}"));
+    let Some(output) = output else { return super::print(&made.toml) };
+    match crate::output::write_with(&[(output.to_path_buf(), made.toml.into_bytes())], Vec::new()) {
+        Ok(()) => Exit::Ok,
+        Err((path, e)) => {
+            eprintln!("{}: {e}", path.display());
+            Exit::Io
         }
     }
 }

@@ -1,0 +1,392 @@
+//! Programs for robots: planned for a machine, written in its maker's language, checked, verified.
+
+use clap::Args;
+use gr_ir::Sources;
+use gr_machine::{Kind, Machine};
+use gr_robot::{Options, Planned, plan};
+use gr_text::Diagnostic;
+
+use crate::emit::{Artifact, Goal};
+use crate::pipeline::Motion;
+
+/// Options of robot programs.
+#[derive(Args, Debug, Clone, Default)]
+pub struct RobotOptions {
+    /// Robots: height above the first and last point at which the tool comes and leaves; 0 = none [default: 50]
+    #[arg(long, value_name = "MM")]
+    pub approach: Option<f64>,
+    /// Robots: where a cut can't be done in one configuration, lift the tool by this much and change it there
+    #[arg(long, value_name = "MM", num_args = 0..=1, default_missing_value = "50", require_equals = true)]
+    pub reconfigure: Option<f64>,
+    /// Robots: write forms whose meaning on the controller is not confirmed, too
+    #[arg(long)]
+    pub allow_unverified: bool,
+    /// Robots: job file, which gives parts of the program to setups with their own placement of the part
+    #[arg(long, value_name = "FILE")]
+    pub job: Option<std::path::PathBuf>,
+    /// Robots: correct every point for the deviations in `[as_built]` of the machine file
+    #[arg(long)]
+    pub compensate: bool,
+    /// setpoints: time in which acceleration builds up, s; 0 = at once [default: 0]
+    #[arg(long, value_name = "S")]
+    pub smoothing: Option<f64>,
+}
+
+/// What came of a build for a robot.
+pub struct Made {
+    pub artifacts: Vec<Artifact>,
+    pub notes: Vec<Diagnostic>,
+    pub summary: String,
+}
+
+/// Whether a target is a robot's language.
+pub fn is_language(target: &str) -> bool {
+    gr_vendors::language(target).is_some()
+}
+
+/// The options of a plan.
+pub fn options(goal: &Goal<'_>, name: &str) -> Result<Options, String> {
+    let (o, default) = (&goal.options.robot, Options::default());
+    let good = |v: f64| v.is_finite() && v >= 0.0;
+    if !o.approach.is_none_or(good) || !o.reconfigure.is_none_or(good) {
+        return Err("--approach and --reconfigure are lengths in mm, 0 or more".into());
+    }
+    let tolerance = goal.options.arc_tolerance.unwrap_or(default.tolerance);
+    if !(tolerance > 0.0) {
+        return Err("--arc-tolerance must be above zero".into());
+    }
+    let setups = match (&o.job, goal.machine) {
+        (Some(path), Some(machine)) => job(path, machine)?,
+        _ => Vec::new(),
+    };
+    let approach = o.approach.unwrap_or(default.approach);
+    Ok(Options { name: name.to_string(), tolerance, approach, reconfigure: o.reconfigure, setups, ..default })
+}
+
+/// A job file.
+#[derive(serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Job {
+    setup: Vec<Clamping>,
+}
+
+#[derive(serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Clamping {
+    name: String,
+    from_line: Option<u32>,
+    #[serde(default)]
+    workingsteps: Vec<String>,
+    #[serde(default)]
+    position: [f64; 3],
+    #[serde(default)]
+    rotation: [f64; 3],
+}
+
+/// The setups of a job file: each places the part on the table.
+fn job(path: &std::path::Path, machine: &Machine) -> Result<Vec<gr_robot::Setup>, String> {
+    let at = |what: String| format!("{}: {what}", path.display());
+    let text = crate::sources::read(path).map_err(|(c, args)| at(args.last().cloned().unwrap_or_else(|| c.def().message.into())))?.text;
+    let job: Job = toml::from_str(&text).map_err(|e| at(e.to_string()))?;
+    let setup = |c: Clamping| {
+        if c.from_line.is_none() && c.workingsteps.is_empty() {
+            return Err(at(format!("setup `{}` needs `from_line` or `workingsteps`", c.name)));
+        }
+        if c.position.iter().chain(&c.rotation).any(|v| !v.is_finite()) {
+            return Err(at(format!("setup `{}`: position and rotation must be finite", c.name)));
+        }
+        let placed = gr_machine::math::Frame::new(c.position, c.rotation.map(f64::to_radians));
+        let from_line = c.from_line.map(|l| l.saturating_sub(1));
+        Ok(gr_robot::Setup { name: c.name, from_line, workingsteps: c.workingsteps, part: machine.cell.table.then(&placed) })
+    };
+    job.setup.into_iter().map(setup).collect()
+}
+
+/// Makes a robot program.
+pub fn build(motion: &Motion, goal: &Goal<'_>, texts: &dyn Sources, name: &str) -> Result<Result<Made, Vec<Diagnostic>>, String> {
+    let Some(language) = gr_vendors::language(goal.target) else {
+        return Err(format!("the target {} can't be made by this version", goal.target));
+    };
+    let machine = robot(goal)?;
+    // The files take their name from where they go.
+    let name = goal.file.filter(|f| f.extension().is_some()).map_or_else(|| name.to_string(), crate::emit::stem);
+    let options = options(goal, &name)?;
+    let planned = plan(&motion.program, &machine, texts, &options).and_then(|p| compensated(p, goal, texts, options.tolerance));
+    let (planned, corrections) = match planned {
+        Ok(planned) => planned,
+        Err(found) => return Ok(Err(found)),
+    };
+    let choice = gr_vendors::Options { decimals: goal.options.decimals, allow_unverified: goal.options.robot.allow_unverified };
+    let output = language.emit(&planned.program, texts, &choice);
+    let summary = summary(&planned);
+    let mut notes = planned.warnings;
+    notes.extend(output.findings);
+    if notes.iter().any(|d| d.severity == gr_text::Severity::Error) {
+        return Ok(Err(notes));
+    }
+    let several = output.files.len() > 1;
+    let artifact = |f: gr_vendors::OutputFile| Artifact { name: several.then_some(f.name), ..Artifact::new("", f.bytes) };
+    let mut artifacts: Vec<Artifact> = output.files.into_iter().map(artifact).collect();
+    artifacts.extend(corrections.map(|c| Artifact { name: several.then(|| format!("{name}-corrections.csv")), ..c }));
+    Ok(Ok(Made { artifacts, notes, summary }))
+}
+
+/// The program corrected for the machine's known geometry, where that is asked for, and a table of what was corrected.
+fn compensated(
+    planned: Planned,
+    goal: &Goal<'_>,
+    texts: &dyn Sources,
+    tolerance: f64,
+) -> Result<(Planned, Option<Artifact>), Vec<Diagnostic>> {
+    use gr_accuracy::compensate;
+    if !goal.options.robot.compensate {
+        return Ok((planned, None));
+    }
+    let top = texts.place(gr_ir::Source::default());
+    let machine = &planned.program.machine;
+    let Some(deviations) = compensate::deviations(machine) else {
+        return Err(vec![Diagnostic::new(gr_text::code::ACCURACY_ONLY_TOLERANCES, top.0, top.1, &[machine.id.clone()])]);
+    };
+    let made = compensate::program(&planned.program, &deviations, tolerance).map_err(|(step, e)| {
+        let (file, span) = texts.place(step.source.unwrap_or_default());
+        let args = ["--compensate".to_string(), format!("the corrected point can't be reached: {e}")];
+        vec![Diagnostic::new(gr_text::code::ACCURACY_BAD_OPTION, file, span, &args)]
+    })?;
+    let mut table = String::from("line,x mm,y mm,z mm,dx um,dy um,dz um\n");
+    for c in &made.corrections {
+        let line = c.line.map_or(String::new(), |l| (l + 1).to_string());
+        let ([x, y, z], [dx, dy, dz]) = (c.aim, c.by.map(|v| v * 1e3 + 0.0));
+        table += &format!("{line},{x:.4},{y:.4},{z:.4},{dx:.3},{dy:.3},{dz:.3}\n");
+    }
+    let planned = Planned { program: made.program, ..planned };
+    Ok((planned, Some(Artifact::new("-corrections.csv", table.into_bytes()))))
+}
+
+/// The machine of a goal, in a reference mode as its publication has it.
+fn machine(goal: &Goal<'_>) -> Result<Machine, String> {
+    let machine = goal.machine.ok_or_else(|| format!("the target {} needs --machine; `gcc-robot machine list` shows the ids", goal.target))?;
+    Ok(if goal.options.reference.is_some() { as_published(machine) } else { machine.clone() })
+}
+
+fn robot(goal: &Goal<'_>) -> Result<Machine, String> {
+    let machine = machine(goal)?;
+    if machine.kind == Kind::Robot {
+        return Ok(machine);
+    }
+    Err(format!("the target {} is for robots; {} is none", goal.target, machine.id))
+}
+
+/// A machine with the model of its publication and the cell as it is.
+fn as_published(machine: &Machine) -> Machine {
+    gr_machine::reference(&machine.id).map_or_else(|| machine.clone(), |m| Machine { cell: machine.cell.clone(), ..m })
+}
+
+/// Whether `check --machine` asks the machine too.
+pub fn is_checked(machine: &Machine) -> bool {
+    machine.kind == Kind::Robot && !matches!(machine.chain, gr_machine::Chain::Planar3r(_) | gr_machine::Chain::Incomplete { .. })
+}
+
+/// What the machine has to say about a program.
+pub fn check(motion: &Motion, machine: &Machine, texts: &dyn Sources) -> Vec<Diagnostic> {
+    match plan(&motion.program, machine, texts, &Options::default()) {
+        Ok(planned) => planned.warnings,
+        Err(found) => found,
+    }
+}
+
+/// Figures of a planned program, for people.
+pub fn summary(planned: &Planned) -> String {
+    let s = &planned.summary;
+    let line = |source: Option<gr_ir::Source>| source.map_or(String::new(), |s| format!(" (line {})", s.line + 1));
+    let joint = |i: usize| planned.program.machine.joints.get(i).map_or(String::new(), |j| j.name.clone());
+    let mut out = format!(
+        "{}: {} cuts ({} arcs), {} rapids; {} s at feed, {} s rapid, {} s waiting, without acceleration\n",
+        planned.program.machine.id,
+        s.cuts,
+        s.arcs,
+        s.rapids,
+        short(s.cut_seconds),
+        short(s.rapid_seconds),
+        short(s.wait_seconds)
+    );
+    let mut more = Vec::new();
+    if let Some((mm, at)) = s.reach_margin {
+        more.push(format!("reach margin {} mm{}", short(mm), line(at)));
+    }
+    if let Some((share, i, at)) = s.limit_margin {
+        more.push(format!("{} comes within {} % of its range to a limit{}", joint(i), short(share * 100.0), line(at)));
+    }
+    if let Some((angle, which, at)) = s.singularity {
+        more.push(format!("closest singular position: {} but for {}°{}", which.words(), short(angle.to_degrees()), line(at)));
+    }
+    if let Some((share, i, at)) = s.joint_speed {
+        more.push(format!("fastest joint at feed: {} at {} % of its speed{}", joint(i), short(share * 100.0), line(at)));
+    }
+    more.iter().for_each(|m| out += &format!("  {m}\n"));
+    out
+}
+
+fn short(v: f64) -> String {
+    let text = format!("{v:.1}");
+    text.strip_suffix(".0").unwrap_or(&text).to_string()
+}
+
+/// Adds to the findings of a program what the robot has to say, when the program itself is good.
+pub fn ask(name: &str, text: &str, machine: &Machine, setup: &gr_interp::Setup, checked: &mut crate::commands::check::Checked) {
+    let bad = checked.found.iter().any(|d| d.severity == gr_text::Severity::Error);
+    if bad || !is_checked(machine) {
+        return;
+    }
+    let motion = crate::pipeline::motion_of(name, text.to_string(), setup);
+    let found = check(&motion, machine, &crate::emit::texts(&motion));
+    if checked.sources.get(gr_text::FileId(0)).is_none() {
+        checked.sources.add(name.to_string(), text.to_string());
+    }
+    let mut known = std::collections::BTreeMap::from([(gr_text::FileId(0), gr_text::FileId(0))]);
+    for mut d in found {
+        for label in &mut d.labels {
+            label.file = *known.entry(label.file).or_insert_with(|| match motion.sources.get(label.file) {
+                Some(f) => checked.sources.add(f.name.clone(), f.text.clone()),
+                None => gr_text::FileId(0),
+            });
+        }
+        checked.found.push(d);
+    }
+}
+
+type Files = Result<Result<Made, Vec<Diagnostic>>, String>;
+
+/// Plans for a controller that knows the words of the program itself.
+fn own_plan(motion: &Motion, goal: &Goal<'_>, texts: &dyn Sources, name: &str) -> Result<Result<Planned, Vec<Diagnostic>>, String> {
+    let machine = machine(goal)?;
+    let options = Options { own_words: true, ..options(goal, name)? };
+    let tolerance = options.tolerance;
+    Ok(plan(&motion.program, &machine, texts, &options)
+        .and_then(|p| compensated(p, goal, texts, tolerance))
+        .map(|(planned, _)| planned))
+}
+
+fn too_many(found: &gr_robot::joints::TooMany, texts: &dyn Sources) -> Diagnostic {
+    let (file, span) = texts.place(found.source.unwrap_or_default());
+    Diagnostic::new(gr_text::code::ROBOT_TOO_MANY_POINTS, file, span, &[found.most.to_string()])
+}
+
+/// Whether joint-gcode goes through the planner: every robot but the planar arm, which has its own way.
+pub fn plans_joints(goal: &Goal<'_>) -> bool {
+    matches!(goal.options.reference, None | Some(crate::emit::Reference::Usp2009)) && goal.machine.is_some_and(is_checked)
+}
+
+/// Joint positions as LinuxCNC words with inverse time, and both tables.
+pub fn joint_gcode(motion: &Motion, goal: &Goal<'_>, texts: &dyn Sources, name: &str) -> Files {
+    use gr_robot::joints::{JointOptions, TableOptions, cartesian_csv, gcode, joint_csv, joint_path};
+    let o = goal.options;
+    if o.interval.is_some_and(|t| !(t > 0.0)) {
+        return Err("--interval must be above zero".into());
+    }
+    let planned = match own_plan(motion, goal, texts, name)? {
+        Ok(planned) => planned,
+        Err(found) => return Ok(Err(found)),
+    };
+    let default = JointOptions::default();
+    let choice = JointOptions {
+        tolerance: o.arc_tolerance.unwrap_or(default.tolerance),
+        interval: o.interval,
+        joint_speed: o.joint_speed.map(f64::to_radians),
+        ..default
+    };
+    let path = match joint_path(&planned.program, &choice) {
+        Ok(path) => path,
+        Err(e) => return Ok(Err(vec![too_many(&e, texts)])),
+    };
+    let table = TableOptions { decimals: o.decimals.unwrap_or(6), comma: o.decimal_comma };
+    let artifacts = vec![
+        Artifact::new("", gcode(&planned.program, &path, table.decimals).into_bytes()),
+        Artifact::new("-cartesian.csv", cartesian_csv(&path, table).into_bytes()),
+        Artifact::new("-joint.csv", joint_csv(&planned.program, &path, table).into_bytes()),
+    ];
+    Ok(Ok(Made { artifacts, summary: summary(&planned), notes: planned.warnings }))
+}
+
+/// Set-points for a joint controller: a table, and the same as bytes beside it.
+pub fn setpoints(motion: &Motion, goal: &Goal<'_>, texts: &dyn Sources, name: &str) -> Files {
+    use gr_robot::setpoints::{SetpointOptions, setpoints};
+    let default = SetpointOptions::default();
+    let interval = goal.options.interval.unwrap_or(default.interval);
+    let smoothing = goal.options.robot.smoothing.unwrap_or(default.smoothing);
+    if !(interval > 0.0 && smoothing >= 0.0 && smoothing.is_finite()) {
+        return Err("--interval must be above zero, --smoothing zero or more".into());
+    }
+    let planned = match own_plan(motion, goal, texts, name)? {
+        Ok(planned) => planned,
+        Err(found) => return Ok(Err(found)),
+    };
+    let made = match setpoints(&planned.program, &SetpointOptions { interval, smoothing, ..default }) {
+        Ok(made) => made,
+        Err(e) => return Ok(Err(vec![too_many(&e, texts)])),
+    };
+    let artifacts = vec![Artifact::new("", made.csv().into_bytes()), Artifact::new(".bin", made.bytes())];
+    let seconds = made.rows.len().saturating_sub(1) as f64 * interval;
+    let summary = format!("{}  {} set-points, {} s with acceleration\n", summary(&planned), made.rows.len(), short(seconds));
+    Ok(Ok(Made { artifacts, summary, notes: planned.warnings }))
+}
+
+/// How exactly the joint values of a program put the tool where it should be.
+pub fn verify(unit: &crate::pipeline::Unit, machine: &Machine, args: &crate::options::VerifyArgs) -> Result<Result<gr_robot::verify::Report, String>, crate::commands::check::Checked> {
+    use crate::emit::Reference;
+    let name = crate::emit::stem(&unit.path);
+    if args.options.reference == Some(Reference::Ufsc2016) {
+        let motion = if unit.exchange { crate::exchange::ufsc2016(unit)?.0 } else { crate::pipeline::motion(unit, None)?.0 };
+        return Ok(published(&motion, machine));
+    }
+    let (motion, _) = crate::pipeline::motion(unit, None)?;
+    let goal = Goal { target: "verify", options: &args.options, machine: Some(machine), from_line: None, file: None };
+    let texts = crate::emit::texts(&motion);
+    match own_plan(&motion, &goal, &texts, &name) {
+        Err(text) => Ok(Err(text)),
+        Ok(Ok(planned)) => Ok(Ok(gr_robot::verify::Report::of(&planned))),
+        Ok(Err(found)) => {
+            drop(texts);
+            Err(crate::commands::check::Checked { sources: motion.sources, found, more: 0, unreadable: false })
+        }
+    }
+}
+
+/// The run of UFSC 2016: its solver, point after point.
+fn published(motion: &Motion, machine: &Machine) -> Result<gr_robot::verify::Report, String> {
+    use gr_robot::reference::{Damped, follow, frames};
+    use gr_robot::verify::{Point, Report};
+    let machine = as_published(machine);
+    let mut points = Vec::new();
+    let mut sources = Vec::new();
+    let mut cursor = motion.program.cursor();
+    while let Some(view) = cursor.next() {
+        if view.op.moves() {
+            let axis = view.end.tool_axis.unwrap_or([0.0, 0.0, 1.0]);
+            points.push((view.end.xyz(), axis.map(|v| -v)));
+            sources.push(view.source);
+        }
+    }
+    let place = [(1..=points.len(), machine.cell.part_in_base())];
+    let aims = frames(&machine, &place, &points);
+    let start = (machine.joints.len() == 6).then(|| [0.0, 0.0, 0.0, 180.0, -45.0, 0.0].map(f64::to_radians).to_vec());
+    let found = follow(&machine, &aims, &Damped { start, ..Damped::default() }).map_err(|lost| format!("point {}: {}", lost.point + 1, lost.why))?;
+    let point = |((aim, f), source): ((&gr_machine::math::Frame, gr_robot::reference::Found), gr_ir::Source)| Point {
+        target: aim.position,
+        reached: [0, 1, 2].map(|i| aim.position[i] - f.error[i]),
+        joints: f.joints,
+        seconds: None,
+        source: Some(source),
+    };
+    Ok(Report::new(&machine, aims.iter().zip(found).zip(sources).map(point).collect()))
+}
+
+/// The files of a report, in a folder.
+pub fn report_files(report: &gr_robot::verify::Report, folder: &std::path::Path, name: &str) -> Vec<(std::path::PathBuf, Vec<u8>)> {
+    let file = |end: &str, text: String| (folder.join(format!("{name}-{end}")), text.into_bytes());
+    vec![
+        file("errors.csv", report.csv()),
+        file("errors.svg", report.error_svg()),
+        file("joints.svg", report.joints_svg()),
+        file("speeds.svg", report.speeds_svg()),
+    ]
+}

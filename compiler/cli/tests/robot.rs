@@ -1,0 +1,92 @@
+//! Robots from the command line: build, check, verify, import.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
+}
+
+fn run(args: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_gcc-robot")).args(args).current_dir(root()).output().expect("the command runs")
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+const PART: &str = "docs/examples/bracket.ngc";
+const CELL: &str = "docs/examples/irb2400-cell.toml";
+
+#[test]
+fn rapid_of_the_example() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = format!("{}/", folder.path().display());
+    let made = run(&["build", PART, "--machine", CELL, "--target", "rapid", "-o", &out]);
+    assert!(made.status.success(), "{}", text(&made.stderr));
+    insta::assert_snapshot!("rapid_summary", text(&made.stderr));
+    let mut names: Vec<String> = std::fs::read_dir(folder.path()).unwrap().map(|f| f.unwrap().file_name().to_string_lossy().into_owned()).collect();
+    names.sort();
+    let main = names.iter().find(|n| n.ends_with(".mod")).unwrap_or_else(|| panic!("{names:?}"));
+    let program = std::fs::read_to_string(folder.path().join(main)).unwrap();
+    assert_eq!(program.matches("MoveC ").count(), 10, "arcs stay arcs");
+    assert!(names.iter().any(|n| n.ends_with(".pgf")), "{names:?}");
+}
+
+#[test]
+fn nothing_is_written_with_errors() {
+    let folder = tempfile::tempdir().unwrap();
+    let source = folder.path().join("far.ngc");
+    std::fs::write(&source, "T1 M6\nG0 X0 Y0 Z20\nG1 X5000 F500\nM30\n").unwrap();
+    let out = folder.path().join("out.mod");
+    let made = run(&["build", source.to_str().unwrap(), "--machine", CELL, "--target", "rapid", "-o", out.to_str().unwrap()]);
+    assert_eq!(made.status.code(), Some(1));
+    assert!(!out.exists());
+    let checked = run(&["check", source.to_str().unwrap(), "--machine", CELL, "--message-format", "short"]);
+    assert_eq!(checked.status.code(), Some(1));
+    assert!(text(&checked.stdout).contains("far.ngc:3:") || text(&checked.stderr).contains("far.ngc:3:"), "{}{}", text(&checked.stdout), text(&checked.stderr));
+}
+
+#[test]
+fn joint_targets() {
+    for (target, beside) in [("joint-gcode", ["-cartesian.csv", "-joint.csv"]), ("setpoints", [".bin", ".bin"])] {
+        let folder = tempfile::tempdir().unwrap();
+        let out = folder.path().join("part.txt");
+        let made = run(&["build", PART, "--machine", CELL, "--target", target, "-o", out.to_str().unwrap()]);
+        assert!(made.status.success(), "{}", text(&made.stderr));
+        assert!(std::fs::metadata(&out).unwrap().len() > 1000);
+        for end in beside {
+            assert!(folder.path().join(format!("part{end}")).is_file(), "{end}");
+        }
+    }
+}
+
+#[test]
+fn verify_reports() {
+    let folder = tempfile::tempdir().unwrap();
+    let made = run(&["verify", PART, "--machine", CELL, "-o", folder.path().to_str().unwrap()]);
+    assert!(made.status.success(), "{}", text(&made.stderr));
+    let table = text(&made.stdout);
+    assert!(table.contains("points on example/irb2400-cell; error = target − reached, µm"), "{table}");
+    for end in ["errors.csv", "errors.svg", "joints.svg", "speeds.svg"] {
+        assert!(folder.path().join(format!("bracket-{end}")).is_file(), "{end}");
+    }
+}
+
+/// A job gives the second half of a program to another clamping.
+#[test]
+fn setups_of_a_job() {
+    let folder = tempfile::tempdir().unwrap();
+    let source = folder.path().join("two.ngc");
+    std::fs::write(&source, "T1 M6\nG0 X0 Y0 Z20\nG1 X50 F500\nG0 Z30\nG0 X0 Y0 Z20\nG1 X50 F500\nM30\n").unwrap();
+    let job = folder.path().join("job.toml");
+    std::fs::write(&job, "[[setup]]\nname = \"top\"\nfrom_line = 1\n[[setup]]\nname = \"turned\"\nfrom_line = 5\nposition = [0, 100, 0]\nrotation = [0, 0, 90]\n").unwrap();
+    let args = |job: &str| run(&["build", source.to_str().unwrap(), "--machine", CELL, "--target", "rapid", "--job", job]);
+    let made = args(job.to_str().unwrap());
+    assert!(made.status.success(), "{}", text(&made.stderr));
+    assert!(text(&made.stdout).contains("setup turned"), "{}", text(&made.stdout));
+    std::fs::write(&job, "[[setup]]\nname = \"top\"\n").unwrap();
+    let bad = args(job.to_str().unwrap());
+    assert_eq!(bad.status.code(), Some(2));
+    assert!(text(&bad.stderr).contains("needs `from_line` or `workingsteps`"), "{}", text(&bad.stderr));
+}
