@@ -206,8 +206,12 @@ fn nurbs_begin_and_end_at_their_outer_points() {
         assert!((r.totals.feed_nm as f64 / 1e6 - FRAC_PI_2).abs() < 1e-4);
     }
     let program = lower(&[Call::SetFeedRate(60.0), Call::NurbsFeed(Box::new(halved))]);
-    let last = program.iter().last().map(|v| v.end.axes);
-    assert_eq!(last.map(|a| [a[0], a[1]]), Some([0.0, 1.0]));
+    let mut end = [0.0; 2];
+    let mut cursor = program.cursor();
+    while let Some(view) = cursor.next() {
+        end = [view.end.axes[0], view.end.axes[1]];
+    }
+    assert_eq!(end, [0.0, 1.0]);
 }
 
 #[test]
