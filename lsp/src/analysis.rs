@@ -4,6 +4,7 @@
 use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicI32, Ordering};
 use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
 
 use gr_driver::Session;
@@ -233,6 +234,7 @@ impl Analysis {
             stale: true,
             found: Arc::default(),
             derived: Arc::default(),
+            latest: Arc::new(AtomicI32::new(version)),
             sent_tokens: Arc::default(),
         };
         self.documents.insert(uri, document);
@@ -254,6 +256,7 @@ impl Analysis {
             }
         }
         document.version = version;
+        document.latest.store(version, Ordering::Relaxed);
         document.derived = Arc::default();
         document.stale = true;
         self.look_again(uri);

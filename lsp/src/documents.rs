@@ -1,6 +1,7 @@
 //! Open documents, and the views of them that requests work on.
 
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicI32, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use gr_driver::{Cancelled, Snapshot};
@@ -16,6 +17,11 @@ use crate::host::{Host, Station};
 use crate::settings::Settings;
 use crate::text::{Columns, Text};
 use crate::workspace::Workspace;
+
+/// Blocks and calls that are run for a tool path while a program is edited.
+const MOST_BLOCKS: u64 = 6_000_000;
+/// Larger open documents are not searched for names from other documents, bytes.
+const MOST_SEARCHED: u32 = 2_000_000;
 
 /// What a document is.
 #[derive(Clone, Copy, Debug)]
@@ -85,6 +91,8 @@ pub struct View {
     pub found: Arc<Vec<Diagnostic>>,
     /// Worked out once per version.
     pub derived: Arc<Derived>,
+    /// Version of the document now.
+    pub latest: Arc<AtomicI32>,
     /// Last tokens that were sent, over versions.
     pub sent_tokens: Arc<Derived>,
     /// The command.
@@ -132,6 +140,7 @@ impl View {
             settings,
             found: document.found.clone(),
             derived: document.derived.clone(),
+            latest: document.latest.clone(),
             sent_tokens: document.sent_tokens.clone(),
             host,
             workspace,
@@ -145,6 +154,10 @@ impl View {
             Kind::Gcode(file, dialect) => Some((self.session.as_ref()?, file, dialect)),
             _ => None,
         }
+    }
+    /// The document was edited since: work on this view is of no use to anybody.
+    pub fn is_overtaken(&self) -> bool {
+        self.latest.load(Ordering::Relaxed) != self.version
     }
     /// Lets edits through.
     pub fn release(&mut self) {
@@ -186,7 +199,11 @@ impl View {
         match self.kind {
             Kind::Gcode(_, dialect) if dialect.family != Family::Ufmg2008 => {
                 let text: Arc<str> = self.text.to_string().into();
-                let made = gr_driver::lower(&self.path.to_string_lossy(), text, &self.station.setup_for(dialect), None);
+                let mut setup = self.station.setup_for(dialect);
+                // A loop that does not end must not keep a worker for long: the path ends where the budget does.
+                setup.budgets.blocks = setup.budgets.blocks.min(MOST_BLOCKS);
+                setup.budgets.calls = setup.budgets.calls.min(MOST_BLOCKS);
+                let made = gr_driver::lower(&self.path.to_string_lossy(), text, &setup, None);
                 let report = report(&made.program, &rates);
                 let files = made.texts.into_iter().map(|(name, _)| name).collect();
                 Some(Motion { program: made.program, files, report, stock: None })
@@ -210,6 +227,9 @@ impl View {
     pub fn file_at(&self, path: &Path) -> Option<(lsp::Uri, Arc<File>)> {
         let dialect = if let Kind::Gcode(_, d) = self.kind { d } else { Dialect::linuxcnc() };
         if let Some(open) = self.others.iter().find(|o| o.path == path) {
+            if open.text.len() > MOST_SEARCHED {
+                return None;
+            }
             let file = gr_driver::scan_file(&path.to_string_lossy(), &open.text.to_string(), dialect);
             return Some((open.uri.clone(), Arc::new(file)));
         }
@@ -248,6 +268,8 @@ pub struct Document {
     pub found: Arc<Vec<Diagnostic>>,
     /// Worked out once per version.
     pub derived: Arc<Derived>,
+    /// `version`, for the views.
+    pub latest: Arc<AtomicI32>,
     /// See [`View::sent_tokens`].
     pub sent_tokens: Arc<Derived>,
 }

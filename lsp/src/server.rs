@@ -484,7 +484,7 @@ impl LanguageServer for Backend {
 
 impl Backend {
     async fn preview(&self, p: custom::PreviewParams) -> Result<Option<custom::Preview>> {
-        self.ask(p.text_document.uri.clone(), move |v| features::preview(v, &p)).await
+        self.ask_again(p.text_document.uri.clone(), move |v| features::preview(v, &p)).await
     }
     async fn output(&self, p: custom::OutputParams) -> Result<Option<custom::Output>> {
         self.ask(p.text_document.uri.clone(), move |v| features::output(v, &p)).await

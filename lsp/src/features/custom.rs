@@ -22,6 +22,9 @@ const MOST_POINTS: u32 = 4_000_000;
 /// The tool path.
 pub fn preview(mut view: View, p: &PreviewParams) -> Answer<Preview> {
     view.release();
+    if view.is_overtaken() {
+        return Err(super::Failure::Overtaken);
+    }
     let mut out = Preview { uri: view.uri.as_str().into(), version: view.version, ..Preview::default() };
     let Some(motion) = view.motion() else { return Ok(out) };
     let tolerance = p.tolerance.filter(|t| *t > 0.0).unwrap_or_else(|| size(&motion) / 4_000.0);

@@ -299,6 +299,9 @@ pub fn delta(old: &[lsp::SemanticToken], new: &[lsp::SemanticToken]) -> Vec<lsp:
 
 /// Remarks above lines.
 pub fn lenses(mut view: View) -> Answer<Vec<lsp::CodeLens>> {
+    if view.is_overtaken() {
+        return Err(super::Failure::Overtaken);
+    }
     let found: Vec<Lens> = match view.kind {
         Kind::Gcode(..) => {
             let Some(tables) = view.program()? else { return Ok(Vec::new()) };
