@@ -2,7 +2,7 @@
 //! corner, the other must have a corner or pass within tolerance.
 
 use super::{
-    Aspect, Axes, Conditions, Diff, Event, Op, Program, Spot, Tolerance, compare_conditions, distance, place, turned,
+    Aspect, Axes, Class, Conditions, Diff, Event, Op, Program, Spot, Tolerance, compare_conditions, distance, place, turned,
 };
 use crate::Cursor;
 use crate::geometry::flatten;
@@ -88,6 +88,7 @@ pub(super) fn by_shape<'p>(a: &'p Program, b: &'p Program, tolerance: &Tolerance
                     return out;
                 }
             }
+            _ if pass_over(&mut p, &mut q, tolerance) => {}
             (x, y) => {
                 let aspect = match (x, y) {
                     (Piece::Event(e), _) | (_, Piece::Event(e)) => e.aspect(),
@@ -101,6 +102,30 @@ pub(super) fn by_shape<'p>(a: &'p Program, b: &'p Program, tolerance: &Tolerance
             }
         }
     }
+}
+
+/// A rapid or feed move no longer than the tolerance that only one side has: rounding makes one of what is none, where
+/// a program goes to where it is. Its end is compared with what follows.
+fn pass_over<'p>(p: &mut Chain<'p>, q: &mut Chain<'p>, tolerance: &Tolerance) -> bool {
+    let tiny = |c: &Chain<'_>| match c.head {
+        Piece::Chord(Conditions { class: Class::Rapid | Class::Feed, .. }, to)
+            if distance(&c.here, &to) <= tolerance.length && turned(&c.here, &to) <= tolerance.angle =>
+        {
+            Some(to)
+        }
+        _ => None,
+    };
+    let chain = match (tiny(p), tiny(q)) {
+        (Some(to), None) => Some((p, to)),
+        (None, Some(to)) => Some((q, to)),
+        (Some(a), Some(b)) if distance(&p.here, &a) <= distance(&q.here, &b) => Some((p, a)),
+        (Some(_), Some(b)) => Some((q, b)),
+        (None, None) => None,
+    };
+    let Some((chain, to)) = chain else { return false };
+    chain.here = to;
+    chain.pull(tolerance);
+    true
 }
 
 /// An event only one side has is passed over, so that the rest can still be compared.
