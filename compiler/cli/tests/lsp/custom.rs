@@ -50,7 +50,7 @@ fn preview_has_the_path_with_its_lines() {
     // 5 mm rapid at 100 mm/s; 6 + 10 mm and three quarters of a turn of radius 10 at 10 mm/s.
     assert!((times[end] - (0.05 + (6.0 + 10.0 + 47.124) / 10.0)).abs() < 0.01, "{times:?}");
     assert_eq!(floats(&p["feeds"])[end], 600.0);
-    assert_eq!(p["bounds"][1], json!([20.0, 10.0, 5.0]));
+    assert_eq!(p["bounds"][1], json!([20.0, 20.0, 5.0]));
     let again = c.request("gccRobot/preview", json!({ "textDocument": { "uri": uri }, "have": p["key"] }));
     assert_eq!((again["unchanged"].as_bool(), again["positions"].as_str()), (Some(true), Some("")));
     c.edit(&uri, "X10", "X11");
@@ -66,7 +66,7 @@ fn preview_knows_tools_subs_and_machine() {
     let tools: Vec<_> = p["tools"].as_array().expect("a list").iter().map(|t| (t["number"].as_i64(), t["diameter"].as_f64(), t["line"].as_u64())).collect();
     assert_eq!(tools, [(Some(1), Some(10.0), Some(4)), (Some(2), Some(5.0), Some(21))]);
     c.shut_down();
-    let text = "G21 G90 F600\nG1 X300 Y0\nG1 X250 Y100\nM2\n";
+    let text = "G21 G90 F600\nG1 X10 Y0\nG1 X9 Y5\nM2\n";
     let mut c = Client::new(&[("a.ngc", text)], json!({ "machine": "ufmg/plano-3r" }));
     let uri = c.open("a.ngc", None);
     let p = c.request("gccRobot/preview", json!({ "textDocument": { "uri": uri } }));
@@ -74,7 +74,7 @@ fn preview_knows_tools_subs_and_machine() {
     let joints = floats(&p["machine"]["values"]);
     assert_eq!(joints.len(), 3 * p["count"].as_u64().expect("a number") as usize);
     assert!(joints.iter().any(|v| v.is_finite()));
-    assert!(c.hover(&uri, "G1 X2|50").contains("joints at the end: "));
+    assert!(c.hover(&uri, "G1 X|9").contains("joints at the end: "));
     c.shut_down();
 }
 

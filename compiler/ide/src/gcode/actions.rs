@@ -218,8 +218,6 @@ fn renumber(doc: Doc<'_>) -> Option<Action> {
     let options = FormatOptions {
         case: gr_gcode::Case::Keep,
         o_word_case: gr_gcode::Case::Keep,
-        spaces: false,
-        indent: 0,
         renumber: Some(Renumber { start: 10, step: 10, all: !numbered }),
         ..FormatOptions::default()
     };
