@@ -20,23 +20,29 @@ pub struct Table<'a> {
     pub unit: f64,
 }
 
-/// Tools of the table for all tools of a file.
-///
-/// # Errors
-/// Tools that the table does not have.
+/// Tools of the table for all tools of a file, each row for one of them; with what there is to say. The tools that fit a
+/// row best choose first: a row without a remark is left for those that nothing else fits.
 pub fn assign(tools: &[Tool], table: &Table<'_>, file: FileId) -> (Vec<Loaded>, Vec<Diagnostic>) {
-    let mut loaded = Vec::new();
-    let mut found = Vec::new();
+    let fits = |r: &&gr_interp::Tool| r.number > 0 && &*r.comment != gr_interp::ASSUMED;
+    let rows: Vec<&gr_interp::Tool> = table.rows.rows.iter().skip(1).filter(fits).collect();
+    let mut wishes: Vec<(&Tool, Vec<(u32, &gr_interp::Tool)>)> = Vec::new();
     for tool in tools {
-        let fits = |r: &&gr_interp::Tool| r.number > 0 && &*r.comment != gr_interp::ASSUMED;
-        let mut scored: Vec<(u32, &gr_interp::Tool)> =
-            table.rows.rows.iter().skip(1).filter(fits).filter_map(|r| Some((fit(tool, r, table.unit)?, r))).collect();
+        let mut scored: Vec<_> = rows.iter().filter_map(|r| Some((fit(tool, r, table.unit)?, *r))).collect();
         scored.sort_by_key(|(score, row)| (std::cmp::Reverse(*score), row.number));
-        let Some((best, row)) = scored.first().copied() else {
-            found.push(missing(tool, table, file));
+        wishes.push((tool, scored));
+    }
+    wishes.sort_by_key(|(tool, scored)| (std::cmp::Reverse(scored.first().map_or(0, |s| s.0)), tool.number));
+    let mut loaded: Vec<Loaded> = Vec::new();
+    let mut found = Vec::new();
+    for (tool, scored) in wishes {
+        let taken = |row: &gr_interp::Tool| loaded.iter().find(|l| i64::from(l.number) == i64::from(row.number));
+        let free: Vec<_> = scored.iter().filter(|(_, row)| taken(row).is_none()).collect();
+        let Some((best, row)) = free.first().copied() else {
+            let other = scored.first().and_then(|(_, row)| taken(row)).and_then(|l| tools.iter().find(|t| t.number == l.tool));
+            found.push(missing(tool, other, table, file));
             continue;
         };
-        let equal = scored.iter().filter(|(score, r)| *score == best && r.number != row.number).count();
+        let equal = free.iter().filter(|(score, r)| score == best && r.number != row.number).count();
         if equal > 0 {
             let args = [(equal + 1).to_string(), title(tool), row.number.to_string()];
             found.push(Diagnostic::new(code::TOOL_TABLE_SEVERAL_TOOLS, file, tool.origin.span, &args));
@@ -47,9 +53,13 @@ pub fn assign(tools: &[Tool], table: &Table<'_>, file: FileId) -> (Vec<Loaded>, 
     (loaded, found)
 }
 
-fn missing(tool: &Tool, table: &Table<'_>, file: FileId) -> Diagnostic {
+/// `other`: the tool of the file that has the only row already.
+fn missing(tool: &Tool, other: Option<&Tool>, table: &Table<'_>, file: FileId) -> Diagnostic {
     let args = [table.name.clone(), title(tool)];
     let d = Diagnostic::new(code::TOOL_TABLE_NO_SUCH_TOOL, file, tool.origin.span, &args);
+    if let Some(other) = other {
+        return d.note(format!("the row that fits is {} ({}) already", title(other), other.name));
+    }
     let same = |r: &&gr_interp::Tool| (r.diameter * table.unit - tool.diameter).abs() < DIAMETER;
     match table.rows.rows.iter().skip(1).find(same) {
         Some(r) => d.note(format!("T{} has this diameter, but its remark says `{}`", r.number, r.comment.trim())),
@@ -161,6 +171,20 @@ mod tests {
         let (rows, _) = gr_interp::read_tools(text, FileId(1));
         let table = Table { name: "t.tbl".into(), rows: &rows, unit };
         assign(&[t], &table, FileId(0)).0.first().map(|l| l.number)
+    }
+
+    #[test]
+    fn a_row_is_one_tool() {
+        let (rows, _) = gr_interp::read_tools("T1 P1 D6\nT2 P2 D6\nT3 P3 D6 ;drill\n", FileId(1));
+        let table = Table { name: "t.tbl".into(), rows: &rows, unit: 1.0 };
+        let kinds = ["ENDMILL", "CENTER_DRILL", "TWIST_DRILL", "REAMER"];
+        let tools: Vec<Tool> = kinds.iter().zip(1..).map(|(k, number)| Tool { number, ..tool(k, 6.0, 0.0) }).collect();
+        let (loaded, found) = assign(&tools, &table, FileId(0));
+        let mut numbers: Vec<(u32, u32)> = loaded.iter().map(|l| (l.tool, l.number)).collect();
+        numbers.sort_unstable();
+        assert_eq!(numbers, [(1, 1), (2, 2), (3, 3)]);
+        let errors: Vec<_> = found.iter().filter(|d| d.code == code::TOOL_TABLE_NO_SUCH_TOOL).collect();
+        assert!(errors.len() == 1 && errors[0].message.contains("reamer") && errors[0].notes[0].contains("already"), "{found:?}");
     }
 
     #[test]
