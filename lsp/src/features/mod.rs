@@ -47,7 +47,10 @@ pub fn diagnostics(mut view: View) -> Answer<Vec<Diagnostic>> {
                 let tables = session.file(file)?;
                 syntax_only(&tables, file, dialect)
             } else {
-                session.check(file)?.diagnostics
+                let mut found = session.check(file)?.diagnostics;
+                view.release();
+                found.extend(of_machine(&view, &found, file, dialect));
+                found
             }
         }
         Kind::Exchange => {
@@ -71,6 +74,27 @@ pub fn diagnostics(mut view: View) -> Answer<Vec<Diagnostic>> {
         Kind::Other => Vec::new(),
     };
     Ok(found.into_iter().filter_map(|d| view.station.harden(d)).collect())
+}
+
+/// Programs above this are not planned for a robot while they are edited, bytes.
+const MOST_FOR_A_ROBOT: u32 = 1_000_000;
+
+/// What the chosen machine can't do, when the program itself is good.
+fn of_machine(view: &View, found: &[Diagnostic], file: FileId, dialect: &'static gr_spec::Dialect) -> Vec<Diagnostic> {
+    let bad = found.iter().any(|d| d.severity == Severity::Error);
+    if bad || view.station.machine.is_none() || view.text.len() > MOST_FOR_A_ROBOT || view.is_overtaken() {
+        return Vec::new();
+    }
+    let more = view.host.check_machine(&view.path, &view.text.to_string(), dialect, &view.station);
+    let own = more.into_iter().filter(|d| d.primary().0 == FileId(0));
+    own.map(|mut d| {
+        d.labels.retain(|l| l.file == FileId(0));
+        d.labels.iter_mut().for_each(|l| l.file = file);
+        d.trace.clear();
+        d.fixes.clear();
+        d
+    })
+    .collect()
 }
 
 /// A `.gcode` file of which nobody says what control it is for: mostly a printer's. Its spelling alone is looked at.

@@ -11,6 +11,7 @@ use gr_lsp::Settings;
 use gr_lsp::host::{Host, Made, MadeFile, OutputJob, Plan, Station};
 use gr_text::{Diagnostic, Encoding, FileId};
 
+use crate::commands::check::Checked;
 use crate::emit::{Artifact, Built, Goal, TargetOptions, build, stem};
 use crate::options::{LintArgs, SetupArgs, UnitArg};
 use crate::pipeline::{Unit, motion, run};
@@ -113,6 +114,13 @@ impl Host for Editor {
             Some(own) => crate::exchange::check(&path.display().to_string(), text, path, own).found,
             None => gr_step::diagnostics(text, FileId(0)),
         }
+    }
+
+    fn check_machine(&self, path: &Path, text: &str, dialect: &'static gr_spec::Dialect, station: &Station) -> Vec<Diagnostic> {
+        let Some(machine) = own(station).and_then(|s| s.machine.as_ref()) else { return Vec::new() };
+        let mut checked = Checked::nothing();
+        crate::robot::ask(&path.display().to_string(), text, machine, &station.setup_for(dialect), &mut checked);
+        checked.found
     }
 
     fn plan(&self, path: &Path, text: &str, station: &Station) -> Option<Plan> {

@@ -389,3 +389,18 @@ fn fixes_of_diagnostics() {
     }
     c.shut_down();
 }
+
+#[test]
+fn the_chosen_robot_is_asked() {
+    let text = "G21 G90 F600\nG1 X400 Y0 Z400\nG1 X5000\nM2\n";
+    let mut c = Client::new(&[("a.ngc", text)], json!({ "machine": "abb/irb140" }));
+    let uri = c.open("a.ngc", None);
+    let found = c.diagnostics(&uri);
+    let far = found.iter().find(|d| d["code"].as_str().is_some_and(|c| c.starts_with("E05")) && d["severity"] == 1);
+    let far = far.unwrap_or_else(|| panic!("{found:?}"));
+    assert!(c.place(&uri, &far["range"]).starts_with("a.ngc:3 "), "{far}");
+    c.edit(&uri, "X5000", "X410");
+    let found = c.diagnostics(&uri);
+    assert!(found.iter().all(|d| d["severity"] != 1 || !c.place(&uri, &d["range"]).starts_with("a.ngc:3 ")), "{found:?}");
+    c.shut_down();
+}
