@@ -159,10 +159,13 @@ mod tests {
             tip_angle: None,
             cutting_length: None,
             edge_radius,
+            taper: 0.0,
             length: None,
             teeth: None,
             right_handed: None,
             pitch: None,
+            orientation: None,
+            bar: None,
             number: 1,
         }
     }
