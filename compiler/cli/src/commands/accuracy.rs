@@ -148,7 +148,10 @@ fn predict(
     tool_points(&mut found, &mut planned_on, &operations, &say);
     let planned = gr_robot::plan(&motion.program, &planned_on, &texts, &options)?;
     // What switches the spindle has no part in errors.
-    found.extend(planned.warnings.into_iter().filter(|d| d.code != code::ROBOT_BY_HAND));
+    // Nor has the length of a tool that the machine file does not have.
+    let own_tools = !machine.cell.tools.is_empty();
+    let kept = |d: &Diagnostic| d.code != code::ROBOT_BY_HAND && (own_tools || d.code != code::ROBOT_TOOL_LENGTH);
+    found.extend(planned.warnings.into_iter().filter(kept));
     let budget = Budget::new(machine, BudgetOptions { grade: args.grade, usp2009: args.reference.is_some() });
     missing(&mut found, machine, &budget, &operations, material, &say);
     let tell = |done: usize, of: usize| progress.tell(|| format!("errors at step {done} of {of}"));
@@ -219,6 +222,11 @@ fn missing(
         let list: Vec<&str> = unknown.into_iter().collect();
         none("the deflection of some operations", format!("not known: {}", list.join(", ")));
     }
+}
+
+/// Whether anything at all is known of an error.
+fn known(e: &gr_accuracy::Errors) -> bool {
+    e.kinematic.is_some() || e.geometric.is_some() || e.elastic.is_some()
 }
 
 fn um(mm: f64) -> String {
@@ -314,8 +322,8 @@ fn text(report: &Report, motion: &Motion, machine: &Machine, material: Option<&M
             show(r.most[0]),
             show(r.most[1]),
             show(r.most[2]),
-            um(w.errors.sum()),
-            um(w.errors.root_of_squares()),
+            show(known(&w.errors).then(|| w.errors.sum())),
+            show(known(&w.errors).then(|| w.errors.root_of_squares())),
             show(r.operation.tolerance),
             if over { "over".into() } else { String::new() },
         ]);
@@ -333,7 +341,7 @@ fn text(report: &Report, motion: &Motion, machine: &Machine, material: Option<&M
         let _ = writeln!(out, "{}", cells.join("  ").trim_end());
     }
     let worst = report.rows.iter().filter_map(|r| r.worst.map(|w| (w, r))).max_by(|a, b| a.0.errors.sum().total_cmp(&b.0.errors.sum()));
-    if let Some((w, r)) = worst {
+    if let Some((w, r)) = worst.filter(|(w, _)| known(&w.errors)) {
         let axis = |i: usize| {
             let sum = w.errors.kinematic.map_or(0.0, |s| s.worst[i])
                 + w.errors.geometric.map_or(0.0, |s| s.worst[i])
@@ -376,8 +384,8 @@ fn as_json(report: &Report, motion: &Motion, machine: &Machine, material: Option
                     "kinematic": w.errors.kinematic.map(spread),
                     "geometric": w.errors.geometric.map(spread),
                     "elastic": w.errors.elastic,
-                    "sum": w.errors.sum(),
-                    "rss": w.errors.root_of_squares(),
+                    "sum": known(&w.errors).then(|| w.errors.sum()),
+                    "rss": known(&w.errors).then(|| w.errors.root_of_squares()),
                 })
             });
             json!({
@@ -402,14 +410,14 @@ fn csv(report: &Report, motion: &Motion) -> String {
         let name = r.operation.name.replace('"', "\"\"");
         let _ = writeln!(
             out,
-            "\"{name}\",{},{},{},{},{},{:.9},{:.9},{}",
+            "\"{name}\",{},{},{},{},{},{},{},{}",
             r.operation.tool,
             line_of(motion, w.source),
             show(w.errors.kinematic.map(|s| s.longest)),
             show(w.errors.geometric.map(|s| s.longest)),
             show(w.errors.elastic.map(norm)),
-            w.errors.sum(),
-            w.errors.root_of_squares(),
+            show(known(&w.errors).then(|| w.errors.sum())),
+            show(known(&w.errors).then(|| w.errors.root_of_squares())),
             show(r.operation.tolerance)
         );
     }
