@@ -212,7 +212,9 @@ impl Planner<'_> {
     fn divided(&mut self, chain: Chain, fault: &Fault) -> bool {
         let Some(height) = self.options.reconfigure else { return false };
         let before = (chain.first..fault.item).rev().find(|i| matches!(self.g.items[*i], Item::Move(_)));
-        let Some(at) = before.filter(|at| *at > chain.first) else { return false };
+        // Without a cut since the last change another one would be the same again.
+        let cuts = (chain.first..fault.item).any(|i| matches!(&self.g.items[i], Item::Move(m) if !m.rapid));
+        let Some(at) = before.filter(|at| cuts && *at > chain.first) else { return false };
         let Item::Move(m) = &self.g.items[at] else { return false };
         let m = *m;
         let axis: M3 = self.g.turns[m.turn as usize];
@@ -239,10 +241,8 @@ impl Planner<'_> {
         if !self.told.insert(source.map(|s| (s.file.0, s.line))) {
             return;
         }
-        let first = match &self.g.items[chain.first] {
-            Item::Move(f) => f.source.map_or(0, |s| s.line + 1),
-            Item::Do(_) => 0,
-        };
+        let sourced = |i: &Item| if let Item::Move(m) = i { m.source } else { None };
+        let first = self.g.items[chain.first..=fault.item].iter().find_map(sourced).map_or(0, |s| s.line + 1);
         match &fault.why {
             Why::Reach(KinematicsError::Direction) | Why::Reach(KinematicsError::OutOfPlane { .. }) if self.solver.count < 6 && self.solver.control == gr_machine::Control::Full => {
                 self.findings.say(code::ROBOT_SEVERAL_SETUPS, source, &[]);

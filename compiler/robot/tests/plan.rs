@@ -210,3 +210,18 @@ fn conditions_by_name() {
     }
     insta::assert_snapshot!("conditions", names.into_iter().collect::<Vec<_>>().join("\n"));
 }
+
+/// The sixth joint has no 340° in one go where the cut needs them: an error, or a lift half way where the arm changes.
+#[test]
+fn a_change_on_request() {
+    let text = "format = 1\nid = \"shop/round\"\nextends = \"abb/irb2400\"\n[home]\njoints = [0, 0, 0, 0, 30, 0]\n[[joint]]\nname = \"J6\"\nmin = -185\nmax = 165\n";
+    let machine = gr_machine::parse(FileId(0), text).unwrap();
+    let (s, c) = 170f64.to_radians().sin_cos();
+    let program = format!("G0 X{0:.6} Y{1:.6} Z700\nG3 X{0:.6} Y{2:.6} I{3:.6} J{4:.6} F3000\nM30\n", 900.0 * c, -900.0 * s, 900.0 * s, -900.0 * c, 900.0 * s);
+    let told = faults(&program, &machine);
+    assert!(told.contains("E0520 line 2: the arm can't do the moves from line 1 to here in one configuration: joint J6"), "{told}");
+    let texts = Texts::new([(FileId(0), program.as_str())]);
+    let options = Options { reconfigure: Some(40.0), ..Options::default() };
+    let p = plan(&motion(&program), &machine, &texts, &options).unwrap_or_else(|e| panic!("{}", messages(&e, &program)));
+    insta::assert_snapshot!("a_change_on_request", self::told(&p));
+}
