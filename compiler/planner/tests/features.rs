@@ -237,3 +237,13 @@ fn tilted_features_have_the_same_path() {
     }
     assert!(p.program.steps().filter(|s| s.op.feeds()).all(|s| s.end.tool_axis == Some([0.0, -1.0, 0.0])));
 }
+
+#[test]
+fn a_face_inside_the_raw_part_is_told() {
+    let c = judge::cases::face("BIDIRECTIONAL($,$,$,.LEFT.,$)", 16.0, 0.0);
+    assert!(!planned(&c.part).1.iter().any(|d| d.code == code::PLAN_OVERRUNS_PART));
+    let small = c.part.text().replace("NUMERIC_PARAMETER('length',40.0,'mm')", "NUMERIC_PARAMETER('length',30.0,'mm')");
+    let (_, out) = plan(small.as_bytes(), FileId(0), &Options::default());
+    let told = out.iter().find(|d| d.code == code::PLAN_OVERRUNS_PART).expect("told");
+    assert!(told.message.contains("10.0000 mm"), "{}", told.message);
+}

@@ -389,6 +389,7 @@ impl Job<'_> {
             }
         };
         let overrun = self.step.operation.overcut.filter(|v| *v >= 0.0).unwrap_or(RUN_OUT);
+        self.inside_part(e, &outline);
         let lines = self.m.strategy.as_ref().is_none_or(|s| matches!(s.keyword.as_str(), "UNIDIRECTIONAL" | "BIDIRECTIONAL"));
         if !lines || bosses.iter().any(|b| b.top > 1e-9 || b.slope != 0.0) {
             return self.face_as_area(e, &outline, bosses, overrun);
@@ -404,6 +405,15 @@ impl Job<'_> {
         }
         let passes = self.connected(tp::face(&outline, &solid?, &what).map_err(words)?);
         tp::motion(&passes, &self.heights(0.0, self.bottom), &self.entry(true)?, None, self.radius).map_err(words)
+    }
+
+    /// A face that ends inside the raw part has its neighbourhood cut by the overrun: that is said.
+    fn inside_part(&self, e: &mut Emit<'_>, outline: &Path2) {
+        let (Ok((a, b)), f) = (self.stock(), outline.bounds()) else { return };
+        let beyond = [f.min.x - a.x, f.min.y - a.y, b.x - f.max.x, b.y - f.max.y].into_iter().fold(0.0, f64::max);
+        if beyond > 1e-3 {
+            e.say(gr_text::code::PLAN_OVERRUNS_PART, self.step.origin, &[&self.name(), &format!("{beyond:.4}")]);
+        }
     }
 
     /// A plane by a strategy that follows its edge: the tool's centre goes over all of it, and past it by the overrun.
