@@ -150,6 +150,11 @@ test("diagnostics: codes, lines, words", function()
   contains(by_line[7].message, "radius 4.0000 at the start, 6.0000 at the end")
   equal(by_line[8].code, "E0212")
   equal(by_line[9].code, "E0205")
+  vim.wait(1000)
+  local seventh = vim.tbl_filter(function(d)
+    return d.line == 7
+  end, diagnostics(buffer))
+  equal(#seventh, 1, "number of findings in line 7")
 end)
 
 test("diagnostics follow an edit", function()

@@ -57,7 +57,8 @@ export class Server implements vscode.Disposable {
           { scheme: "file", language: "toml", pattern: "**/*machine*.toml" },
           { scheme: "file", pattern: "**/*.tbl" },
         ],
-        initializationOptions: settings(),
+        // VS Code asks for diagnostics itself; sent ones too would be shown twice.
+        initializationOptions: { gccRobot: settings(), pullDiagnostics: true },
         synchronize: {
           configurationSection: SECTION,
           fileEvents: vscode.workspace.createFileSystemWatcher("**/*.{ngc,nc,tbl,var,ini,toml,NGC,NC,TBL,VAR,INI}"),

@@ -46,6 +46,11 @@ function M.root(path)
   return folder
 end
 
+-- Neovim 0.10 and later asks for diagnostics itself; sent ones too would be shown twice.
+local function init_options()
+  return { gccRobot = M.options.settings, pullDiagnostics = vim.fn.has("nvim-0.10") == 1 }
+end
+
 --- What Neovim is told of the server, in the form of `vim.lsp.start_client`.
 function M.config(root)
   local found = M.program()
@@ -57,7 +62,7 @@ function M.config(root)
     cmd = { found, "lsp" },
     root_dir = root,
     settings = { gccRobot = M.options.settings },
-    init_options = M.options.settings,
+    init_options = init_options(),
     on_attach = M.options.on_attach,
   }
 end
@@ -103,7 +108,7 @@ local function enable_by_name()
   vim.lsp.config("gcc_robot", {
     cmd = { found, "lsp" },
     settings = { gccRobot = M.options.settings },
-    init_options = M.options.settings,
+    init_options = init_options(),
     on_attach = M.options.on_attach,
   })
   vim.lsp.enable("gcc_robot")
