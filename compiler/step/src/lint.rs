@@ -405,7 +405,7 @@ impl<'m> Lints<'m, '_> {
         if let (Some(f), Some(v)) = (f, feed)
             && f > 1.0
         {
-            let args = vec![show(f), show(f * 60_000.0), show(f / 60.0), show(f / 60_000.0)];
+            let args = vec![show(f), show(f * 60_000.0), fine(f / 60.0), fine(f / 60_000.0)];
             self.once(code::STEP_FEED_UNIT, t, v.span(), args);
         }
         if let (Some(n), Some(v)) = (n, spindle) {
@@ -609,4 +609,11 @@ fn readings(n: f64, vc: f64, feed: Option<f64>, d: Option<f64>) -> Vec<String> {
         }
     }
     notes
+}
+
+/// With three digits that count, however small.
+fn fine(v: f64) -> String {
+    let places = (2.0 - libm::floor(libm::log10(v.abs().max(1e-12)))).clamp(0.0, 12.0) as usize;
+    let text = format!("{v:.places$}");
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_string() } else { text }
 }

@@ -240,7 +240,10 @@ fn judge(found: &mut Vec<Diagnostic>, row: &Row, material: Option<&Material>, mo
     if let Some(limit) = row.operation.tolerance
         && sum > limit
     {
-        let args = [um(sum), row.operation.name.clone(), um(limit)];
+        // As many digits as show that it is more.
+        let close = um(sum) == um(limit);
+        let show = |v: f64| if close { format!("{:.3}", v * 1e3) } else { um(v) };
+        let args = [show(sum), row.operation.name.clone(), show(limit)];
         let mut d = Diagnostic::new(code::ACCURACY_OVER_TOLERANCE, file, span, &args);
         d.notes.push(format!("typical (root of squares): {} µm", um(worst.errors.root_of_squares())));
         found.push(d);

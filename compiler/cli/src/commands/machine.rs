@@ -21,7 +21,7 @@ pub fn run(global: &Global, args: &MachineArgs) -> Exit {
 }
 
 fn catalogue() -> String {
-    list().map(|id| format!("{id:<18}{}\n", builtin(id).map_or(String::new(), |m| m.title.to_string()))).collect()
+    list().map(|id| format!("{id:<34}{}\n", builtin(id).map_or(String::new(), |m| m.title.to_string()))).collect()
 }
 
 fn show(global: &Global, name: &str, toml: bool) -> Exit {

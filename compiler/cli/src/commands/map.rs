@@ -63,7 +63,8 @@ fn plane(text: &str) -> Option<Plane> {
 }
 
 fn area(global: &Global, args: &MapArgs, machine: &Machine, plane: Plane, budget: &Budget) -> Result<Made, Refused> {
-    let Some((_, quantity)) = Quantity::NAMES.into_iter().find(|(n, _)| *n == args.quantity) else {
+    let wanted = if args.quantity == "reach" { "workspace" } else { &args.quantity };
+    let Some((_, quantity)) = Quantity::NAMES.into_iter().find(|(n, _)| *n == wanted) else {
         let all: Vec<&str> = Quantity::NAMES.iter().map(|(n, _)| *n).collect();
         return Err(("--quantity".into(), format!("known are {} and sensitivity", all.join(", "))));
     };

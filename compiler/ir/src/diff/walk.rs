@@ -83,7 +83,10 @@ pub(super) fn by_shape<'p>(a: &'p Program, b: &'p Program, tolerance: &Tolerance
             (Piece::Chord(c, to), Piece::Chord(d, other)) if c.class == d.class => {
                 compare_conditions(&mut out, &c, &d, p.spot, q.spot, &mut last, tolerance);
                 if !side_by_side(&mut out, &mut p, &mut q, &to, &other, tolerance) {
-                    let message = format!("goes to {}, the other to {}", point(&to), point(&other));
+                    let mut message = format!("goes to {}, the other to {}", point(&to), point(&other));
+                    if point(&to) == point(&other) {
+                        message += &format!(", {:.2e} mm apart", distance(&to, &other));
+                    }
                     out.note(tolerance.limit, Aspect::Path, p.spot, q.spot, message);
                     return out;
                 }
