@@ -45,6 +45,8 @@ pub fn format(text: &[u8]) -> Vec<u8> {
             out.extend_from_slice(text[at..end].trim_ascii_end());
         } else {
             statement(&text[at..end], &mut out);
+            // A comment that never ends keeps the blanks behind it.
+            out.truncate(out.trim_ascii_end().len());
         }
         at = end;
     }

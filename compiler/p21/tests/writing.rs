@@ -138,3 +138,11 @@ proptest! {
         prop_assert_eq!(ids, expected);
     }
 }
+
+/// Found by the fuzzer: a comment without an end grew by an empty line each time.
+#[test]
+fn a_comment_without_an_end_does_not_grow() {
+    let text = b"IS\0\0\0\0O-10303-21:\nHEIDEREND-ISO/*--ISO-02621-.1;\n";
+    let once = gr_p21::format(text);
+    assert_eq!(gr_p21::format(&once), once);
+}
