@@ -5,7 +5,7 @@ import { JUMP, type Scene } from "./scene";
 /** Most segments that are drawn while the camera moves. */
 export const BUDGET = 100_000;
 /** Coarser ones, for hardware that can't keep up with the budget. */
-const LEVELS = 4;
+const LEVELS = 6;
 
 /** The points to choose from: all of a scene, or those of a finer level. */
 interface Source {

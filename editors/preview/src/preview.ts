@@ -62,7 +62,8 @@ export class Preview extends HTMLElement {
     this.chose(line);
   });
   private shown = 0xff;
-  private marked = new Uint32Array();
+  /** Pairs of places. */
+  private marked = new Float32Array();
   private markedLine = -1;
   private seconds = Number.POSITIVE_INFINITY;
   private player = 0;
@@ -445,9 +446,13 @@ export class Preview extends HTMLElement {
   // ── drawing ─────────────────────────────────────────────────────────────────────────────────────
 
   private findMarked() {
-    this.marked = this.markedLine < 0 ? new Uint32Array() : Uint32Array.from(pointsOf(this.scene, this.markedLine));
+    const points = this.markedLine < 0 ? [] : pointsOf(this.scene, this.markedLine);
+    this.marked = new Float32Array(6 * points.length);
+    points.forEach((i, n) => {
+      this.marked.set(this.scene.positions.subarray(3 * i - 3, 3 * i + 3), 6 * n);
+    });
     this.note.textContent = "";
-    const point = this.marked.at(-1);
+    const point = points.at(-1);
     if (point !== undefined) this.tell({ point, share: 1, place: [0, 0, 0] });
   }
 

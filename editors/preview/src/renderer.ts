@@ -1,6 +1,6 @@
 // Lines with WebGL 2. The path is one strip; a segment has the kind of its end point (`flat`, so the last
-// vertex counts). Everything is drawn off screen and copied when a picture is complete: a large path is drawn
-// over several frames while the page stays alive.
+// vertex counts). A large path is drawn off screen, over several frames while the page stays alive, and copied when
+// it is complete.
 
 import { BUDGET, levels } from "./lod";
 import type { Scene } from "./scene";
@@ -43,8 +43,8 @@ export interface Picture {
   /** Points before this one are drawn in full colour, the rest is faint. */
   until: number;
   faint: Color;
-  /** Points whose segments are marked. */
-  marked: Uint32Array;
+  /** Marked segments: pairs of places. */
+  marked: Float32Array;
   mark: Color;
   /** Further lines: pairs of places and their colour. */
   extras: { places: Float32Array; color: Color }[];
@@ -77,8 +77,9 @@ export class Renderer {
   private readonly extra: WebGLVertexArrayObject;
   private readonly places: WebGLBuffer;
   private readonly kinds: WebGLBuffer;
-  private readonly reduced: WebGLBuffer;
-  private readonly marks: WebGLBuffer;
+  private readonly reduced: WebGLVertexArrayObject;
+  private readonly reducedPlaces: WebGLBuffer;
+  private readonly reducedKinds: WebGLBuffer;
   private readonly extraPlaces: WebGLBuffer;
   private readonly target: WebGLFramebuffer;
   private readonly paint: WebGLRenderbuffer;
@@ -86,15 +87,20 @@ export class Renderer {
   private readonly samples: number;
   private size = [0, 0];
   private count = 0;
-  /** Points that are drawn while the camera moves, finest first, one after the other in `reduced`. */
+  /**
+   * Points that are drawn while the camera moves, finest first. Their places stand one after the other in buffers of
+   * their own: an index buffer over the whole path costs a software renderer many times as much.
+   */
   private levels: Uint32Array[] = [];
   private level = 0;
   private lastQuick = 0;
   private waiting = 0;
+  /** The picture is drawn off screen and copied when it is complete. */
+  private aside = true;
   private step = BUDGET;
 
   constructor(readonly canvas: HTMLCanvasElement) {
-    const gl = canvas.getContext("webgl2", { antialias: false, depth: false, powerPreference: "high-performance" });
+    const gl = canvas.getContext("webgl2", { antialias: false, powerPreference: "high-performance" });
     if (!gl) throw new Error("this browser has no WebGL 2");
     this.gl = gl;
     const info = gl.getExtension("WEBGL_debug_renderer_info");
@@ -114,13 +120,15 @@ export class Renderer {
     this.extra = gl.createVertexArray();
     this.places = gl.createBuffer();
     this.kinds = gl.createBuffer();
-    this.reduced = gl.createBuffer();
-    this.marks = gl.createBuffer();
+    this.reduced = gl.createVertexArray();
+    this.reducedPlaces = gl.createBuffer();
+    this.reducedKinds = gl.createBuffer();
     this.extraPlaces = gl.createBuffer();
     this.target = gl.createFramebuffer();
     this.paint = gl.createRenderbuffer();
     this.depth = gl.createRenderbuffer();
     this.attributes(this.path, this.places, this.kinds);
+    this.attributes(this.reduced, this.reducedPlaces, this.reducedKinds);
     this.attributes(this.extra, this.extraPlaces, null);
   }
 
@@ -147,15 +155,20 @@ export class Renderer {
     gl.bufferData(gl.ARRAY_BUFFER, scene.positions, gl.STATIC_DRAW);
     gl.bindBuffer(gl.ARRAY_BUFFER, this.kinds);
     gl.bufferData(gl.ARRAY_BUFFER, scene.kinds, gl.STATIC_DRAW);
-    gl.bindVertexArray(this.path);
-    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this.reduced);
-    const all = new Uint32Array(this.levels.reduce((sum, l) => sum + l.length, 0));
+    const total = this.levels.reduce((sum, level) => sum + level.length, 0);
+    const places = new Float32Array(3 * total);
+    const kinds = new Uint8Array(total);
     let n = 0;
     for (const level of this.levels) {
-      all.set(level, n);
-      n += level.length;
+      for (const i of level) {
+        places.set(scene.positions.subarray(3 * i, 3 * i + 3), 3 * n);
+        kinds[n++] = scene.kinds[i];
+      }
     }
-    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, all, gl.STATIC_DRAW);
+    gl.bindBuffer(gl.ARRAY_BUFFER, this.reducedPlaces);
+    gl.bufferData(gl.ARRAY_BUFFER, places, gl.STATIC_DRAW);
+    gl.bindBuffer(gl.ARRAY_BUFFER, this.reducedKinds);
+    gl.bufferData(gl.ARRAY_BUFFER, kinds, gl.STATIC_DRAW);
   }
 
   /** Makes the drawing surface as large as the canvas is shown. */
@@ -182,7 +195,8 @@ export class Renderer {
   /** A quick picture: at most `BUDGET` segments. Returns whether it shows the whole path. */
   quick(picture: Picture, now: number): boolean {
     this.stop();
-    this.begin(picture);
+    // Without smoothing there is no need to draw elsewhere first.
+    this.begin(picture, this.samples === 0 ? null : this.target);
     const whole = this.levels.length === 0;
     if (whole) {
       this.strip(picture, 0, this.count);
@@ -205,7 +219,7 @@ export class Renderer {
   /** The whole path, a part of it per frame. */
   whole(picture: Picture, done: () => void) {
     this.stop();
-    this.begin(picture);
+    this.begin(picture, this.target);
     let from = 0;
     let last = 0;
     const next = (now: number) => {
@@ -229,9 +243,10 @@ export class Renderer {
     this.waiting = requestAnimationFrame(next);
   }
 
-  private begin(picture: Picture) {
+  private begin(picture: Picture, target: WebGLFramebuffer | null) {
     const gl = this.gl;
-    gl.bindFramebuffer(gl.FRAMEBUFFER, this.target);
+    this.aside = target !== null;
+    gl.bindFramebuffer(gl.FRAMEBUFFER, target);
     gl.viewport(0, 0, this.size[0], this.size[1]);
     gl.clearColor(...picture.background, 1);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
@@ -272,8 +287,7 @@ export class Renderer {
     const gl = this.gl;
     const chosen = this.levels[this.level];
     const offset = this.levels.slice(0, this.level).reduce((sum, l) => sum + l.length, 0);
-    gl.bindVertexArray(this.path);
-    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this.reduced);
+    gl.bindVertexArray(this.reduced);
     let border = chosen.length;
     if (picture.until < this.count) {
       border = 0;
@@ -281,7 +295,7 @@ export class Renderer {
     }
     const draw = (a: number, b: number) => {
       const first = Math.max(a - 1, 0);
-      if (b - first > 1) gl.drawElements(gl.LINE_STRIP, b - first, gl.UNSIGNED_INT, 4 * (offset + first));
+      if (b - first > 1) gl.drawArrays(gl.LINE_STRIP, offset + first, b - first);
     };
     this.shade(picture, false);
     draw(0, border);
@@ -296,10 +310,12 @@ export class Renderer {
     const gl = this.gl;
     for (const extra of picture.extras) this.lines(extra.places, extra.color);
     this.mark(picture);
-    gl.bindFramebuffer(gl.READ_FRAMEBUFFER, this.target);
-    gl.bindFramebuffer(gl.DRAW_FRAMEBUFFER, null);
-    const [w, h] = this.size;
-    gl.blitFramebuffer(0, 0, w, h, 0, 0, w, h, gl.COLOR_BUFFER_BIT, gl.NEAREST);
+    if (this.aside) {
+      gl.bindFramebuffer(gl.READ_FRAMEBUFFER, this.target);
+      gl.bindFramebuffer(gl.DRAW_FRAMEBUFFER, null);
+      const [w, h] = this.size;
+      gl.blitFramebuffer(0, 0, w, h, 0, 0, w, h, gl.COLOR_BUFFER_BIT, gl.NEAREST);
+    }
     this.drawn = { segments: Math.max(segments, 0), whole };
   }
 
@@ -318,15 +334,6 @@ export class Renderer {
   private mark(picture: Picture) {
     if (picture.marked.length === 0) return;
     const gl = this.gl;
-    const pairs = new Uint32Array(2 * picture.marked.length);
-    picture.marked.forEach((point, i) => {
-      pairs[2 * i] = point - 1;
-      pairs[2 * i + 1] = point;
-    });
-    gl.bindVertexArray(this.path);
-    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this.marks);
-    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, pairs, gl.STREAM_DRAW);
-    gl.uniform4f(this.uniforms.only, ...picture.mark, 1);
     gl.disable(gl.DEPTH_TEST);
     for (const [x, y] of [
       [0, 0],
@@ -336,10 +343,8 @@ export class Renderer {
       [0, -1],
     ]) {
       gl.uniform2f(this.uniforms.shift, (2 * x) / this.size[0], (2 * y) / this.size[1]);
-      gl.drawElements(gl.LINES, pairs.length, gl.UNSIGNED_INT, 0);
+      this.lines(picture.marked, picture.mark);
     }
     gl.uniform2f(this.uniforms.shift, 0, 0);
-    gl.uniform4f(this.uniforms.only, 0, 0, 0, 0);
-    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this.reduced);
   }
 }
