@@ -596,3 +596,11 @@ mod property {
         }
     }
 }
+
+/// Lengths of a machine without a tool table are not known: what the program asks for stays.
+#[test]
+fn tool_lengths_without_a_table() {
+    let text = "G21 G90\nT1 M6\nG43 H1\nG0 Z5\nG1 X1 F100\nG49\nM2\n";
+    let written = write(text, &options(Language::Linuxcnc));
+    assert!(written.contains("G43 H1") && written.contains("G49"), "{written}");
+}

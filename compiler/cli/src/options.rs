@@ -205,7 +205,7 @@ pub struct BuildArgs {
     #[command(flatten)]
     pub options: crate::emit::TargetOptions,
     /// Begin at this line of the program: what was in force there is set, and the tool approaches from above
-    #[arg(long, value_name = "LINE")]
+    #[arg(long, value_name = "LINE", value_parser = clap::value_parser!(u32).range(1..))]
     pub from_line: Option<u32>,
     /// Height of the approach for --from-line, mm in the work frame [default: highest point of the program]
     #[arg(long, value_name = "MM", requires = "from_line")]

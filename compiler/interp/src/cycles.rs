@@ -172,7 +172,7 @@ impl<S: Sink> Interp<'_, S> {
         self.cycle_words(&mut hole, again)?;
         for pass in 0..repeats {
             if self.spent() {
-                break;
+                return Err(self.too_many());
             }
             self.mark(&Mark::CycleBegin(g));
             let done = self.cycle_pass(&mut hole, pass == 0);
@@ -299,9 +299,14 @@ impl<S: Sink> Interp<'_, S> {
         Ok(())
     }
 
-    /// The program has made more calls than it may; the caller's budget check says so after the block.
+    /// The block has made more calls than one may.
     pub(crate) fn spent(&self) -> bool {
-        self.emitted > self.setup.budgets.calls
+        self.emitted - self.begun > self.setup.budgets.passes
+    }
+
+    /// What is wrong then.
+    pub(crate) fn too_many(&self) -> Box<Fault> {
+        self.endless("this cycle makes more moves than the limit allows")
     }
 
     fn spindle_count(&self) -> i32 {
@@ -428,8 +433,11 @@ impl<S: Sink> Interp<'_, S> {
             }
             self.cycle_rapid(hole, hole.at, depth + clearance);
             let next = depth - hole.peck;
-            if next == depth || self.spent() {
+            if next == depth {
                 break; // a peck too small to change the depth would never end
+            }
+            if self.spent() {
+                return Err(self.too_many());
             }
             depth = next;
         }

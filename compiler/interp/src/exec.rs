@@ -157,7 +157,9 @@ impl<S: Sink> Interp<'_, S> {
         }
         if let Some(g) = self.todo(Group::PathControl, step::PATH) {
             let (p, q) = (self.block.or_minus_one(b'p'), self.block.or_minus_one(b'q'));
-            self.convert_path(g, p, q, self.block.get(b'r'))?;
+            // R chooses the planner in 2.10; in 2.9 it can only be a cycle's.
+            let planner = self.block.get(b'r').filter(|_| self.setup.version == gr_canon::Version::V2_10);
+            self.convert_path(g, p, q, planner)?;
         }
         if let Some(g) = self.todo(Group::Distance, step::DISTANCE) {
             let incremental = u8::from(g == 910);

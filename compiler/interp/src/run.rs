@@ -244,6 +244,8 @@ pub struct Interp<'a, S: Sink> {
     pub(crate) frames: u32,
     pub(crate) blocks: u64,
     pub(crate) emitted: u64,
+    /// `emitted` before the block.
+    pub(crate) begun: u64,
     /// Totals when the main program last came on by itself: budgets count from there.
     pub(crate) spent: (u64, u64),
     /// Control flow of the main program was met on lines before this one only.
@@ -335,6 +337,7 @@ impl<'a, S: Sink> Interp<'a, S> {
             frames: 0,
             blocks: 0,
             emitted: 0,
+            begun: 0,
             spent: (0, 0),
             frontier: 0,
             findings: Vec::new(),
@@ -681,6 +684,7 @@ impl<'a, S: Sink> Interp<'a, S> {
         }
         self.blocks += 1;
         self.check_budgets()?;
+        self.begun = self.emitted;
         self.execute_block()
     }
 

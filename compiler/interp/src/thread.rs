@@ -150,7 +150,7 @@ impl<S: Sink> Interp<'_, S> {
             return fault(rs274::THREAD_K, "K is not greater than J");
         }
         let thread = self.thread(end[2]);
-        self.cut_thread(&thread, &end);
+        self.cut_thread(&thread, &end)?;
         self.m.current = end;
         Ok(())
     }
@@ -182,11 +182,14 @@ impl<S: Sink> Interp<'_, S> {
         }
     }
 
-    fn cut_thread(&mut self, thread: &Thread, end: &Axes) {
+    fn cut_thread(&mut self, thread: &Thread, end: &Axes) -> Res {
         let target = end[2] + thread.height * thread.slope;
         let mut n = 1;
         let mut depth = thread.depth(n);
-        while depth < thread.full_depth() && !self.spent() {
+        while depth < thread.full_depth() {
+            if self.spent() {
+                return Err(self.too_many());
+            }
             self.thread_pass(thread, target, depth);
             n += 1;
             depth = thread.depth(n);
@@ -194,12 +197,13 @@ impl<S: Sink> Interp<'_, S> {
         for _ in 0..=thread.spring_passes {
             self.thread_pass(thread, target, thread.full_depth());
             if self.spent() {
-                break;
+                return Err(self.too_many());
             }
         }
         let mut to = self.m.current;
         to[..3].copy_from_slice(&end[..3]);
         self.emit(Call::StraightTraverse(to));
+        Ok(())
     }
 
     fn thread_pass(&mut self, thread: &Thread, target: f64, depth: f64) {

@@ -573,3 +573,13 @@ fn random_blocks_agree_with_the_real_one() {
         agree(&(text.replace("G5 X1 Y1 I1 J1 P1 Q1\n", "") + "M2\n"));
     }
 }
+
+/// One block that makes motion without end is a mistake at its line, not a shorter program.
+#[test]
+fn a_cycle_of_too_many_moves_is_endless() {
+    for text in ["G21 F100\nG83 X1 Z-1000 R1 Q.0000001\nM2\n", "G21 F100\nG91 G81 X1 Z-1 R1 L2000000000\nM2\n"] {
+        let (_, outcome) = run(text);
+        assert_eq!(outcome.end, End::Fault, "{text}");
+        assert_eq!((outcome.findings[0].fault.code, outcome.findings[0].line), (code::RUN_ENDLESS, 1), "{text}");
+    }
+}

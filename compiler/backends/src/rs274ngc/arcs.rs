@@ -25,6 +25,11 @@ struct Candidate {
 
 impl Emitter<'_> {
     pub fn arc(&mut self, view: &View<'_, '_>, arc: &Arc) {
+        // Where turns must be written one by one, this many are a mistake rather than a helix.
+        const TURNS: i32 = 10_000;
+        if arc.turns.unsigned_abs() > TURNS.unsigned_abs() {
+            return self.cannot("an arc of more than 10000 turns", view.source);
+        }
         if view.state.sync.is_some_and(|s| !s.velocity) {
             return self.cannot("an arc that follows the spindle", view.source);
         }

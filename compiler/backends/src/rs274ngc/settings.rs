@@ -174,7 +174,13 @@ impl Emitter<'_> {
             Some(w) => w.g(490) || zero && !w.g(430),
             None => zero && (view.state.tool <= 0 || named != Some(view.state.tool)),
         };
+        // Nothing is known of the lengths of a machine without a tool table; the program says which it wants.
+        let unmeasured = zero && !off && named.is_none();
+        let said = if unmeasured { self.number_of('h', view.source) } else { None };
         let block = match (named, self.options.language) {
+            (None, Language::Linuxcnc | Language::FanucMill) if said.is_some() => {
+                format!("G43 H{}", said.unwrap_or_default())
+            }
             _ if off || (zero && named.is_none()) => "G49".to_string(),
             (Some(n), Language::Linuxcnc | Language::FanucMill) => format!("G43 H{n}"),
             (_, Language::Linuxcnc) => format!("G43.1 {}", self.changed_all(offset)),
@@ -194,6 +200,16 @@ impl Emitter<'_> {
     fn changed_all(&self, offset: &Axes) -> String {
         let words = self.changed(offset, &self.frame.tool_offset);
         if words.is_empty() { "Z0".into() } else { words.join(" ") }
+    }
+
+    /// The number behind a letter of a source line, where it is a plain one.
+    fn number_of(&self, letter: char, source: Source) -> Option<u32> {
+        let line = self.sources.line(source.file, source.line)?;
+        let code = line.split(['(', ';']).next()?.to_ascii_lowercase();
+        let rest = code.split_once(letter)?.1.trim_start();
+        let digits: String = rest.chars().take_while(char::is_ascii_digit).collect();
+        let after = rest[digits.len()..].chars().next();
+        if after == Some('.') { None } else { digits.parse().ok() }
     }
 
     /// The tool whose offset this is, the one in the spindle first.
