@@ -580,6 +580,7 @@ fn a_cycle_of_too_many_moves_is_endless() {
     for text in ["G21 F100\nG83 X1 Z-1000 R1 Q.0000001\nM2\n", "G21 F100\nG91 G81 X1 Z-1 R1 L2000000000\nM2\n"] {
         let (_, outcome) = run(text);
         assert_eq!(outcome.end, End::Fault, "{text}");
-        assert_eq!((outcome.findings[0].fault.code, outcome.findings[0].line), (code::RUN_ENDLESS, 1), "{text}");
+        let told = outcome.findings.iter().any(|f| f.fault.code == code::RUN_ENDLESS && f.line == 1);
+        assert!(told, "{text}: {:?}", outcome.findings);
     }
 }
