@@ -78,7 +78,8 @@ fn page_path_and_choice() {
     assert!(status(&page) == "200" && page.contains("<gcc-robot-preview>") && page.contains("frame-ancestors 'none'"));
     let path = served.get("path");
     let body: Value = serde_json::from_str(path.split_once("\r\n\r\n").unwrap().1).unwrap();
-    assert_eq!(body["path"]["count"], 2);
+    // Where it begins, the rapid there, the feed move.
+    assert_eq!(body["path"]["count"], 3);
     assert_eq!(body["problem"], "");
     let choose = format!("{}choose", served.path);
     assert_eq!(status(&served.ask("POST", &choose, "", "2")), "204");

@@ -212,7 +212,9 @@ export class Renderer {
   private adapt(now: number) {
     const passed = now - this.lastQuick;
     this.lastQuick = now;
-    if (passed > 50 && passed < 400) this.level = Math.min(this.level + 1, this.levels.length - 1);
+    const coarser = passed > 200 ? 3 : passed > 100 ? 2 : 1;
+    // After more than a second it is another movement.
+    if (passed > 50 && passed < 1000) this.level = Math.min(this.level + coarser, this.levels.length - 1);
     else if (passed < 18 && passed > 0) this.level = Math.max(this.level - 1, 0);
   }
 

@@ -283,8 +283,8 @@ function million() {
 }
 
 /** Frames per second of a page with nothing but a turning element, as large as the others. */
-async function bare(context) {
-  const blank = await context.newPage();
+async function bare() {
+  const blank = await chrome.newPage();
   const fps = await blank.evaluate(
     () =>
       new Promise((resolve) => {
@@ -313,7 +313,7 @@ test("a million segments: load, orbit, rest", { timeout: 240_000 }, async () => 
   const first = await statistics(page);
   assert.ok(first.points >= 1_000_000 && first.segments >= 1_000_000, `${first.points} points`);
 
-  // Orbit for two seconds, one step per frame.
+  // Orbit for three seconds, one step per frame; the first half second finds out what the hardware can do.
   const { frames, ms, moving } = await page.evaluate(
     () =>
       new Promise((resolve) => {
@@ -322,8 +322,8 @@ test("a million segments: load, orbit, rest", { timeout: 240_000 }, async () => 
         let frames = 0;
         const step = () => {
           const ms = performance.now() - begun;
-          if (ms > 2000) return resolve({ frames, ms, moving: preview.statistics() });
-          frames++;
+          if (ms > 3000) return resolve({ frames, ms: ms - 500, moving: preview.statistics() });
+          if (ms > 500) frames++;
           preview.orbit(4, frames % 7 ? 1 : -6);
           requestAnimationFrame(step);
         };
@@ -357,7 +357,7 @@ test("a million segments: load, orbit, rest", { timeout: 240_000 }, async () => 
   writeFileSync(join(shots, "preview-million.txt"), `${told}\n${first.device}\n`);
   console.log(`# 1 000 000 segments: ${told} (${first.device})`);
   // On a machine that can't even show an empty page at 30 frames per second, half of what it can.
-  const possible = await bare(page.context());
+  const possible = await bare();
   assert.ok(fps >= Math.min(15, possible / 2), `${fps} of ${possible} frames per second`);
   assert.ok(rest <= 1200, `${rest} ms from rest to the whole path`);
   await page.close();
