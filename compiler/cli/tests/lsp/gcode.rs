@@ -407,7 +407,14 @@ fn the_chosen_robot_is_asked() {
     c.notify("workspace/didChangeConfiguration", json!({ "settings": {} }));
     c.wait_for("workspace/inlayHint/refresh");
     c.edit(&uri, "X5000", "X5001");
-    let found = c.diagnostics(&uri);
+    // What was asked before the settings changed may still be told first.
+    let mut found = c.diagnostics(&uri);
+    for _ in 0..3 {
+        if of_robot(&found).is_none() {
+            break;
+        }
+        found = c.diagnostics(&uri);
+    }
     assert_eq!(of_robot(&found), None);
     c.shut_down();
 }
