@@ -156,9 +156,29 @@ impl Controller {
 
 impl Drop for Controller {
     fn drop(&mut self) {
-        if let Some(name) = &self.user {
-            let _ = Command::new("userdel").arg(name).status();
+        let Some(name) = &self.user else { return };
+        // The controller's shared memory is the machine's: the next user can't start before this one's is gone.
+        for tries in 0..100 {
+            if !Command::new("pgrep").args(["-u", name]).output().is_ok_and(|o| o.status.success()) {
+                break;
+            }
+            if tries == 50 {
+                let _ = Command::new("pkill").args(["-KILL", "-u", name]).status();
+            }
+            std::thread::sleep(Duration::from_millis(200));
         }
+        let list = Command::new("ipcs").arg("-m").output().map(|o| o.stdout).unwrap_or_default();
+        for row in String::from_utf8_lossy(&list).lines() {
+            let cells: Vec<&str> = row.split_whitespace().collect();
+            // ipcs cuts long names.
+            if let [_, id, owner, ..] = cells[..]
+                && owner.len() >= 8
+                && name.starts_with(owner)
+            {
+                let _ = Command::new("ipcrm").args(["-m", id]).status();
+            }
+        }
+        let _ = Command::new("userdel").arg(name).status();
     }
 }
 
