@@ -93,7 +93,7 @@ fn walls_that_lean() {
 
 #[test]
 fn rounded_floors() {
-    for (d, edge, radius) in [(6.0, 3.0, 3.0), (8.0, 2.0, 2.0), (6.0, 0.0, 2.0), (8.0, 1.0, 2.0), (6.0, 3.0, 0.5)] {
+    for (d, edge, radius) in [(6.0, 3.0, 3.0), (8.0, 2.0, 2.0), (6.0, 0.0, 2.0), (8.0, 1.0, 2.0), (6.0, 3.0, 0.5), (12.0, 6.0, 0.5), (12.0, 6.0, 2.0)] {
         good(&rounded_pocket("$", d, edge, radius));
     }
     good(&rounded_pocket("BIDIRECTIONAL($,$,$,.LEFT.,$)", 6.0, 3.0, 3.0));

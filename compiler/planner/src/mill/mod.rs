@@ -142,13 +142,22 @@ fn job<'a>(e: &mut Emit<'_>, step: &'a Workingstep, m: &'a Milling, feature: &'a
     let clean = (radius - edge + libm::sqrt(given.tolerance * (2.0 * edge - given.tolerance).max(0.0))).clamp(radius * 5e-3, radius);
     let coarse = by;
     let by = if m.bottom { by.min(2.0 * clean) } else { by };
-    // A rounded edge deeper than the cut is narrower at the top of the wall than the tool: it may come nearer.
+    // A rounded edge deeper than the cut is narrower at the top of the wall than the tool: it may come nearer. A radius
+    // at the foot of the wall that is no larger than the edge's own stays clear of it.
+    let own = |r: f64| r <= edge;
     let upright = match &feature.shape {
         Shape::Pocket { slope, planar_radius, bosses, .. } | Shape::OpenPocket { slope, planar_radius, bosses, .. } => {
-            *slope == 0.0 && planar_radius.unwrap_or(0.0) == 0.0 && bosses.iter().all(|b| b.slope == 0.0 && b.top <= 0.0)
+            *slope == 0.0 && own(planar_radius.unwrap_or(0.0)) && bosses.iter().all(|b| b.slope == 0.0 && b.top <= 0.0)
         }
-        Shape::Step { wall, radius, bosses, .. } => *wall == 0.0 && *radius == 0.0 && bosses.iter().all(|b| b.slope == 0.0 && b.top <= 0.0),
-        Shape::Hole { final_diameter, bottom, .. } => final_diameter.is_none() && matches!(bottom, HoleBottom::Flat | HoleBottom::Through),
+        Shape::Step { wall, radius, bosses, .. } => *wall == 0.0 && own(*radius) && bosses.iter().all(|b| b.slope == 0.0 && b.top <= 0.0),
+        Shape::Hole { final_diameter, bottom, .. } => {
+            let round = match bottom {
+                HoleBottom::Flat | HoleBottom::Through => true,
+                HoleBottom::Radiused(r) | HoleBottom::Spherical(r) => own(*r),
+                HoleBottom::Conical(..) => false,
+            };
+            final_diameter.is_none() && round
+        }
         Shape::Outside { .. } => true,
         Shape::Boss(b) => b.slope == 0.0,
         _ => false,

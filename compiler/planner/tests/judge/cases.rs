@@ -17,6 +17,7 @@ pub struct Case {
     pub surface: Box<dyn Fn(f64, f64, f64) -> f64>,
     pub cover: bool,
     pub floors: Vec<f64>,
+    pub round: f64,
 }
 
 pub const BLOCK: [f64; 3] = [60.0, 40.0, 12.0];
@@ -55,6 +56,7 @@ pub fn case(name: &str, part: Part, tool_r: f64, floor: f64, surface: impl Fn(f6
         surface: Box::new(surface),
         cover: true,
         floors: Vec::new(),
+        round: 0.0,
     }
 }
 
@@ -78,6 +80,7 @@ pub fn judge(c: &Case) -> Judged {
     let verdict = planned.as_ref().map_or_else(Verdict::default, |p| {
         let mut j = Judge::new(c.block, c.low, c.high, c.h);
         j.floors = c.floors.clone();
+        j.round = c.round;
         j.run(p, &c.surface, c.floor, c.tolerance, c.cover)
     });
     Judged { planned, verdict, out }

@@ -66,6 +66,8 @@ pub struct Judge {
     block: [f64; 3],
     /// Heights at which floors lie, where walls are upright: 2½D work puts a tool on no others. Empty: any.
     pub floors: Vec<f64>,
+    /// Radius at the foot of the walls: a tool whose own edge is smaller goes up it, others stand on floors only.
+    pub round: f64,
 }
 
 const AIR: f64 = -1e9;
@@ -77,7 +79,7 @@ impl Judge {
     pub fn new(block: [f64; 3], low: [f64; 2], high: [f64; 2], h: f64) -> Judge {
         let (x0, y0) = (low[0] + 0.37 * h, low[1] + 0.41 * h);
         let (nx, ny) = (((high[0] - x0) / h) as usize + 1, ((high[1] - y0) / h) as usize + 1);
-        let mut j = Judge { h, nx, ny, x0, y0, z: vec![AIR; nx * ny], block, floors: Vec::new() };
+        let mut j = Judge { h, nx, ny, x0, y0, z: vec![AIR; nx * ny], block, floors: Vec::new(), round: 0.0 };
         for i in 0..nx * ny {
             let (x, y) = j.at(i);
             if x >= 0.0 && y >= 0.0 && x <= block[0] && y <= block[1] {
@@ -235,7 +237,7 @@ impl Judge {
                 .collect();
             let disc = self.disc(s);
             let mut stands = self.over(&goal, &disc, |tip, over, goal| tip.max(goal - over), f64::NEG_INFINITY);
-            if !self.floors.is_empty() {
+            if !self.floors.is_empty() && s.edge >= self.round {
                 let mut floors: Vec<f64> = self.floors.iter().map(|f| f.max(floor + s.bottom)).collect();
                 floors.sort_by(f64::total_cmp);
                 for tip in &mut stands {
