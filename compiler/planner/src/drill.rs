@@ -29,13 +29,12 @@ struct Job<'a> {
 
 /// Drills every copy of a hole.
 pub(crate) fn drill(e: &mut Emit<'_>, step: &Workingstep, d: &Drilling, feature: &Feature, security: f64) {
-    let Some(depth) = depth(e, step, d, feature) else { return };
-    let Some(feed) = step.operation.technology.feed else { return };
     let keyword = step.operation.keyword.as_str();
     if keyword == "THREAD_DRILLING" {
-        let why = ": drilling and threading in one stroke; MULTISTEP_DRILLING or DRILLING and TAPPING are";
-        return e.say(code::PLAN_NOT_LOWERED, step.operation.origin, &[keyword, why]);
+        return crate::mill::thread::drill(e, step, d, feature, security);
     }
+    let Some(depth) = depth(e, step, d, feature) else { return };
+    let Some(feed) = step.operation.technology.feed else { return };
     let aside = if keyword == "BACK_BORING" {
         let Some(aside) = aside(e, step, d, feature) else { return };
         aside
@@ -74,6 +73,7 @@ fn depth(e: &mut Emit<'_>, step: &Workingstep, d: &Drilling, feature: &Feature) 
         Shape::Hole { diameter, bottom, .. } => Some((*diameter, *bottom)),
         _ => None,
     };
+    // Counted to the tip, as files have it.
     let given = d.depth.or(match step.operation.keyword.as_str() {
         "CENTER_DRILLING" => None,
         "COUNTER_SINKING" => hole.and_then(|(w, _)| Some(w / 2.0 / libm::tan(tool.tip_angle?))),
@@ -228,7 +228,7 @@ fn down(e: &mut Emit<'_>, job: &Job<'_>) {
 
 fn multistep(e: &mut Emit<'_>, job: &Job<'_>) {
     let [first, by, retract, dwell] = job.d.peck.unwrap_or_default();
-    if !(first > 0.0 && by > 0.0 && retract >= 0.0) || job.depth / by > MOST_PECKS {
+    if !(first > 0.0 && by > 0.0 && retract.is_finite()) || job.depth / by > MOST_PECKS {
         let text = format!("first {first}, then {by}");
         return e.say(code::PLAN_BAD_SIZE, job.step.operation.origin, &["MULTISTEP_DRILLING", "depth_of_step", &text, "above zero"]);
     }
@@ -245,8 +245,8 @@ fn multistep(e: &mut Emit<'_>, job: &Job<'_>) {
         if dwell > 0.0 {
             e.push(Op::Dwell(dwell));
         }
-        // All the way out where the distance reaches that far, else just enough to break the chip.
-        let up = (-z + retract).min(job.retract);
+        // Just enough to break the chip; all the way out without a distance.
+        let up = if retract > 0.0 { (-z + retract).min(job.retract) } else { job.retract };
         e.rapid(job.at(up));
         let clear = (-z + ABOVE_LAST_PECK).min(up);
         if clear < up {

@@ -12,13 +12,20 @@ use crate::process::*;
 pub(crate) fn follow(e: &mut Emit<'_>, paths: &[Toolpath], frame: &Frame, technology: Option<(&Technology, Functions)>, security: f64, first: bool) {
     let mut joined = !first;
     let mut by_plane = false;
-    let usual = technology.map(|t| t.1).unwrap_or_default();
     for p in paths {
         e.from(p.origin);
         match &p.path {
             PathKind::Feedstop(seconds) => e.push(Op::Dwell(*seconds)),
             PathKind::BySecurityPlane => by_plane = true,
             PathKind::Direct => by_plane = false,
+            PathKind::Axes(rows) => {
+                if !by_axes(e, p, rows, technology, security, joined && !by_plane) {
+                    e.say(code::PLAN_CANNOT_CUT, p.origin, &["the tool path", "it begins with axes that are not where it is known"]);
+                    continue;
+                }
+                joined = true;
+                by_plane = false;
+            }
             PathKind::Location { curve, axis } => {
                 let axes = match axis.as_ref().map(|a| directions(a, curve, frame)) {
                     Some(Some(axes)) => axes,
@@ -37,13 +44,7 @@ pub(crate) fn follow(e: &mut Emit<'_>, paths: &[Toolpath], frame: &Frame, techno
                     let over = if above { start } else { [start[0], start[1], security.max(start[2])] };
                     e.travel(over, axes[0], security);
                 }
-                if let Some((t, _)) = technology {
-                    let own = p.technology.as_ref().unwrap_or(t);
-                    e.technology(own, p.functions.unwrap_or(usual));
-                    if let Some(f) = own.feed {
-                        e.feed(f * p.ratio.filter(|r| *r > 0.0 && r.is_finite()).unwrap_or(1.0));
-                    }
-                }
+                conditions(e, p, technology);
                 let rapid = p.rapid || technology.is_none();
                 let go = |e: &mut Emit<'_>, to| if rapid { e.rapid(to) } else { e.line(to) };
                 e.set_axis(axes[0]);
@@ -61,6 +62,33 @@ pub(crate) fn follow(e: &mut Emit<'_>, paths: &[Toolpath], frame: &Frame, techno
             }
         }
     }
+}
+
+/// Technology and functions of a piece, or those of its operation.
+fn conditions(e: &mut Emit<'_>, p: &Toolpath, usual: Option<(&Technology, Functions)>) {
+    let Some((t, functions)) = usual else { return };
+    let own = p.technology.as_ref().unwrap_or(t);
+    e.technology(own, p.functions.unwrap_or(functions));
+    if let Some(f) = own.feed {
+        e.feed(f * p.ratio.filter(|r| *r > 0.0 && r.is_finite()).unwrap_or(1.0));
+    }
+}
+
+/// Axes to positions of the setup; those that are not named stay. False: the first place is not known.
+fn by_axes(e: &mut Emit<'_>, p: &Toolpath, rows: &[[Option<f64>; 3]], technology: Option<(&Technology, Functions)>, security: f64, joined: bool) -> bool {
+    let Some(first) = rows.first() else { return true };
+    if !joined {
+        let [Some(x), Some(y), Some(z)] = *first else { return false };
+        e.travel([x, y, security.max(z)], [0.0, 0.0, 1.0], security);
+    }
+    conditions(e, p, technology);
+    for row in rows {
+        let here = e.at.unwrap_or_else(|| e.b.pose().xyz());
+        e.at = Some(here);
+        let to = std::array::from_fn(|i| row[i].unwrap_or(here[i]));
+        if p.rapid || technology.is_none() { e.rapid(to) } else { e.line(to) }
+    }
+    true
 }
 
 fn directions(axis: &Curve, path: &Curve, frame: &Frame) -> Option<Vec<[f64; 3]>> {

@@ -237,7 +237,7 @@ impl Planner<'_> {
     fn cut(&mut self, s: &Workingstep) {
         let o = &s.operation;
         let security = self.security;
-        let moving = |t: &Toolpath| !t.rapid && matches!(t.path, PathKind::Location { .. });
+        let moving = |t: &Toolpath| !t.rapid && matches!(t.path, PathKind::Location { .. } | PathKind::Axes(_));
         let fed = |t: &Toolpath| t.technology.unwrap_or(o.technology).feed.is_some();
         if o.technology.feed.is_none() && (o.toolpaths.is_empty() || o.toolpaths.iter().any(|t| moving(t) && !fed(t))) {
             let why = "the feed follows from a feed, or from a feed per tooth with a spindle speed";

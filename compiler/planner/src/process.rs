@@ -243,12 +243,10 @@ pub enum Shape {
         /// Radius between walls.
         orthogonal_radius: Option<f64>,
     },
-    /// An open pocket: its boundary, and the part of it that is a wall.
+    /// An open pocket.
     OpenPocket {
-        /// Boundary, open.
+        /// Its walls, open.
         boundary: Contour,
-        /// Wall, if it is less than the boundary.
-        wall: Option<Contour>,
         /// What stays.
         bosses: Vec<Boss>,
         /// Draft of the walls, rad.
@@ -387,7 +385,9 @@ pub enum PocketBottom {
     Through,
     /// Flat.
     Planar,
-    /// Rounded, general: its name.
+    /// Part of a ball, free space inside it: its centre in the feature frame, and its radius.
+    Ball([f64; 3], f64),
+    /// General: its name.
     Other(&'static str),
 }
 
@@ -583,6 +583,8 @@ pub struct Drilling {
     pub stop_at_bottom: bool,
     /// Waiting position and depth of a test cut.
     pub test_cut: Option<(f64, Option<[f64; 3]>)>,
+    /// Thread drilling goes in on the helix too.
+    pub helical: bool,
     /// The chuck compensates (tapping).
     pub floating_chuck: bool,
 }
@@ -720,6 +722,8 @@ pub enum PathKind {
     },
     /// Waits, s.
     Feedstop(f64),
+    /// Positions of the axes X, Y, Z in the setup; what is not given stays where it is.
+    Axes(Vec<[Option<f64>; 3]>),
     /// By the security plane to the next piece.
     BySecurityPlane,
     /// Straight to the next piece.
@@ -765,6 +769,14 @@ impl Curve {
     /// Last point.
     pub fn end(&self) -> [f64; 3] {
         self.pieces.last().map_or(self.start, Piece::end)
+    }
+    /// Direction at its first point.
+    pub fn tangent(&self) -> Option<[f64; 3]> {
+        use crate::frame::{cross, sub, unit};
+        match *self.pieces.first()? {
+            Piece::Line(p) => unit(sub(p, self.start)),
+            Piece::Arc { center, normal, .. } => unit(cross(normal, sub(self.start, center))),
+        }
     }
     /// The same curve the other way round.
     pub fn reversed(&self) -> Curve {
@@ -890,6 +902,13 @@ impl Closed {
 
 fn flat(p: [f64; 3]) -> [f64; 2] {
     [p[0], p[1]]
+}
+
+impl Operation {
+    /// Only two axes may move at a time.
+    pub fn two_axes(&self) -> bool {
+        self.direction.as_deref() == Some("TWO_AXES")
+    }
 }
 
 impl Process {

@@ -271,6 +271,8 @@ impl<'m> Reader<'m> {
                     out.push(Element::Function(Function { origin: origin(node), name: node.string("its_id").into_owned(), kind }));
                 }
             }
+            _ if node.is_a("tool_probing") => self.not_lowered(node, ": where the tool setter stands is known to the machine alone"),
+            "WORKPIECE_COMPLETE_PROBING" => self.not_lowered(node, ": which points are touched is left to the control; WORKPIECE_PROBING names them"),
             _ if node.is_a("executable") => self.not_lowered(node, ""),
             other => {
                 let what = format!("; a workplan takes workingsteps, functions and structures, not {other}");
@@ -405,6 +407,10 @@ impl<'m> Reader<'m> {
             "LOAD_TOOL" => FunctionKind::LoadTool(node.node("its_tool").and_then(|t| self.tool(t))?),
             "SET_MARK" | "WAIT_FOR_MARK" => {
                 self.no_effect(node, "its_id", "there is one channel");
+                return None;
+            }
+            "INDEX_PALLET" | "INDEX_TABLE" => {
+                self.not_lowered(node, ": which way the part lies at an index is known to the machine alone; a setup of its own says it");
                 return None;
             }
             _ => {

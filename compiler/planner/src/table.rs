@@ -187,6 +187,9 @@ fn pocket(out: &mut String, bosses: usize, slope: f64, bottom: PocketBottom, pla
     match bottom {
         PocketBottom::Through => out.push_str(", through"),
         PocketBottom::Planar => {}
+        PocketBottom::Ball(_, radius) => {
+            let _ = write!(out, ", ball bottom of radius {radius}");
+        }
         PocketBottom::Other(what) => {
             let _ = write!(out, ", {what} bottom");
         }

@@ -247,3 +247,134 @@ fn a_face_inside_the_raw_part_is_told() {
     let told = out.iter().find(|d| d.code == code::PLAN_OVERRUNS_PART).expect("told");
     assert!(told.message.contains("10.0000 mm"), "{}", told.message);
 }
+
+fn along(pieces: &[&str]) -> Part {
+    let mut p = Part::new(BLOCK);
+    let tool = p.tool("ENDMILL", 10.0, 0.0, None);
+    let line: Vec<String> = [(10.0, 10.0), (50.0, 10.0)].iter().map(|q| format!("#{}", p.point([q.0, q.1, -2.0]))).collect();
+    let line = p.add(format!("POLYLINE('',({}))", line.join(",")));
+    let path = p.add(format!("CUTTER_LOCATION_TRAJECTORY(.T.,.CONTACT.,$,$,$,.T.,#{line},$,$)"));
+    let (near, far) = (p.point([-10.0, 10.0, 8.0]), p.point([70.0, 10.0, 8.0]));
+    let all: Vec<String> = pieces
+        .iter()
+        .map(|t| if t.is_empty() { format!("#{path}") } else { format!("#{}", p.add(t.replace("@near", &format!("#{near}")).replace("@far", &format!("#{far}")))) })
+        .collect();
+    let list = p.add(format!("TOOLPATH_LIST(({}))", all.join(",")));
+    let (t, f) = (p.technology(), p.functions());
+    let op = p.add(format!("FREEFORM_OPERATION(#{list},$,'op',5.,$,#{tool},#{t},#{f},$,$,$,$)"));
+    p.machine("TOOLPATH_FEATURE", &[op], [0.0, 0.0, TOP], Some(0.0), "");
+    p
+}
+
+/// Ends of the moves at feed, over the top of the part.
+fn feeds(p: &Part) -> Vec<[f64; 3]> {
+    let (p, _) = planned(p);
+    p.program.steps().filter(|s| s.op.feeds()).map(|s| s.end.xyz()).map(|q| [q[0], q[1], q[2] - TOP]).collect()
+}
+
+fn same(a: &[[f64; 3]], b: &[[f64; 3]]) -> bool {
+    a.len() == b.len() && a.iter().zip(b).all(|(p, q)| (0..3).all(|i| (p[i] - q[i]).abs() < 1e-9))
+}
+
+#[test]
+fn approach_and_lift_paths_lead_to_the_path_beside_them() {
+    let angle = |role: &str, at: &str| format!("AP_LIFT_PATH_ANGLE(.T.,.{role}.,$,$,$,@{at},$,30.,4.)");
+    let all = feeds(&along(&[&angle("APPROACH", "near"), "", &angle("LIFT", "far")]));
+    let (c, s) = (4.0 * 30f64.to_radians().cos(), 2.0);
+    let wanted = [[10.0 - c, 10.0, -2.0 + s], [10.0, 10.0, -2.0], [50.0, 10.0, -2.0], [50.0 + c, 10.0, -2.0 + s], [70.0, 10.0, 8.0]];
+    assert!(same(&all, &wanted), "{all:?}");
+    // On an arc: the last point before it lies on the circle, square to the way there.
+    let all = feeds(&along(&["AP_LIFT_PATH_TANGENT(.T.,.APPROACH.,$,$,$,@near,$,5.)", ""]));
+    let (fix, touch, centre) = ([-10.0, 8.0], [all[0][0], all[0][2]], [10.0, 3.0]);
+    let d = [touch[0] - centre[0], touch[1] - centre[1]];
+    assert!((d[0].hypot(d[1]) - 5.0).abs() < 1e-9 && (d[0] * (touch[0] - fix[0]) + d[1] * (touch[1] - fix[1])).abs() < 1e-9, "{all:?}");
+    assert!(same(&all[1..], &[[10.0, 10.0, -2.0], [50.0, 10.0, -2.0]]), "{all:?}");
+    // Without a path beside it, or from inside the circle, there is no way.
+    for bad in [vec!["AP_LIFT_PATH_TANGENT(.T.,.APPROACH.,$,$,$,@near,$,50.)", ""], vec!["AP_LIFT_PATH_ANGLE(.T.,.LIFT.,$,$,$,@near,$,30.,4.)", ""]] {
+        assert!(refused(&along(&bad)).iter().any(|d| d.message.contains("no way leads")), "{bad:?}");
+    }
+}
+
+#[test]
+fn axis_trajectories_are_coordinates_of_the_setup() {
+    let axes = |names: &str, columns: &[&[f64]]| {
+        let mut p = along(&[""]);
+        let curves: Vec<String> = columns
+            .iter()
+            .map(|c| {
+                let points: Vec<String> = c.iter().map(|v| format!("#{}", p.add(format!("CARTESIAN_POINT('',({v:?}))")))).collect();
+                format!("#{}", p.add(format!("POLYLINE('',({}))", points.join(","))))
+            })
+            .collect();
+        let path = p.add(format!("AXIS_TRAJECTORY(.T.,.CONTACT.,$,$,$,.T.,({names}),({}))", curves.join(",")));
+        let list = p.add(format!("TOOLPATH_LIST((#{path}))"));
+        let tool = p.tool("ENDMILL", 8.0, 0.0, None);
+        let (t, f) = (p.technology(), p.functions());
+        let op = p.add(format!("FREEFORM_OPERATION(#{list},$,'op',5.,$,#{tool},#{t},#{f},$,$,$,$)"));
+        p.steps.clear();
+        p.machine("TOOLPATH_FEATURE", &[op], [5.0, 5.0, TOP], Some(0.0), "");
+        p
+    };
+    let all = feeds(&axes("'X','Y','Z'", &[&[1.0, 2.0], &[3.0, 4.0], &[10.0, 11.0]]));
+    assert!(same(&all, &[[1.0, 3.0, 10.0 - TOP], [2.0, 4.0, 11.0 - TOP]]), "{all:?}");
+    assert!(refused(&axes("'X','Y'", &[&[1.0, 2.0], &[3.0, 4.0]])).iter().any(|d| d.message.contains("not where it is known")));
+    assert!(refused(&axes("'X','B'", &[&[1.0, 2.0], &[3.0, 4.0]])).iter().any(|d| d.message.contains("only X, Y and Z")));
+    assert!(refused(&axes("'X','Y'", &[&[1.0, 2.0], &[3.0]])).iter().any(|d| d.message.contains("different numbers")));
+}
+
+#[test]
+fn thread_drilling_goes_out_on_the_helix() {
+    let make = |forward: &str, hand: &str| {
+        let mut p = Part::new(BLOCK);
+        let dim = p.add("MILLING_TOOL_DIMENSION(8.,59.,$,12.,0.,$,$)".into());
+        let body = p.add(format!("TWIST_DRILL(#{dim},2,.RIGHT.,.F.,$)"));
+        let cut = p.add("CUTTING_COMPONENT(90.,$,$,$,$)".into());
+        let tool = p.add(format!("MILLING_CUTTING_TOOL('thriller',#{body},(#{cut}),$,$,$)"));
+        let op = p.drill("THREAD_DRILLING", tool, None, &format!(",{forward}"));
+        let place = p.place([0.0; 3]);
+        let area = p.add(format!("PARTIAL_AREA_DEFINITION(6.,#{place},$)"));
+        let [fit, form, hand] = ["6H", "M", hand].map(|t| p.add(format!("DESCRIPTIVE_PARAMETER('p','{t}')")));
+        let count = p.add("NUMERIC_PARAMETER('threads per inch',12.7,'1/in')".into());
+        let doc = p.add("SPECIFICATION((),'ISO 724',$,$)".into());
+        let f = p.feature("CATALOGUE_THREAD", &[op], [30.0, 20.0, TOP], Some(6.0), &format!(",#{area},(),.T.,$,#{fit},#{form},10.,#{count},#{hand},#{doc}"));
+        p.step(f, op);
+        p
+    };
+    let helix = |p: &Part| {
+        let (p, _) = planned(p);
+        let arcs = p.program.steps().filter_map(|s| if let Op::Arc(a) = s.op { Some((a.turns.signum(), s.end.axes[2] - s.start.axes[2])) } else { None });
+        arcs.filter(|a| (a.1.abs() - 2.0).abs() < 1e-9).collect::<Vec<_>>()
+    };
+    // A right-hand thread upwards is counter-clockwise; the edge is as long as the thread: one turn.
+    assert_eq!(helix(&make(".F.", "right hand")).iter().map(|a| (a.0, a.1 > 0.0)).collect::<Vec<_>>(), [(1, true)]);
+    assert_eq!(helix(&make(".F.", "left hand")).iter().map(|a| (a.0, a.1 > 0.0)).collect::<Vec<_>>(), [(-1, true)]);
+    let both: Vec<_> = helix(&make(".T.", "right hand")).iter().map(|a| (a.0, a.1 > 0.0)).collect();
+    assert_eq!(both, [[(-1, false); 3], [(1, true); 3]].concat());
+    insta::assert_snapshot!(text(&planned(&make(".F.", "right hand")).0));
+}
+
+#[test]
+fn tool_directions_along_the_feature_are_none_of_their_own() {
+    let make = |direction: &str, approach: &str| {
+        let c = judge::cases::rectangular_pocket("$", approach, 6.0, Some(4.0));
+        let text = c.part.text();
+        let id = 9000;
+        let extra = format!("#{id}={direction};
+#9001=DIRECTION('',(0.,0.,2.));
+#9002=DIRECTION('',(0.,1.,1.));
+");
+        text.replace("MILLING($,$,'op'", &format!("MILLING($,#{id},'op'")).replacen("#1=PROJECT", &format!("{extra}#1=PROJECT"), 1)
+    };
+    let out = |t: String| {
+        let (p, out) = plan(t.as_bytes(), FileId(0), &Options::default());
+        (p, out.into_iter().filter(|d| d.severity == Severity::Error).map(|d| d.message).collect::<Vec<_>>())
+    };
+    assert_eq!(out(make("THREE_AXES_TILTED_TOOL(#9001)", "$")).1, [""; 0]);
+    assert!(out(make("THREE_AXES_TILTED_TOOL(#9002)", "$")).1[0].contains("THREE_AXES_TILTED_TOOL"));
+    // Two axes at a time: straight down, no slope.
+    let (p, errors) = out(make("TWO_AXES()", "$"));
+    assert_eq!(errors, [""; 0]);
+    let all = |s: &gr_ir::Step<'_>| (0..3).filter(|i| (s.start.axes[*i] - s.end.axes[*i]).abs() > 1e-9).count();
+    assert!(p.expect("a program").program.steps().filter(|s| s.op == Op::Linear).all(|s| all(&s) < 3));
+    assert!(out(make("TWO_AXES()", "PLUNGE_RAMP($,6.)")).1[0].contains("TWO_AXES"));
+}

@@ -104,6 +104,21 @@ fn patterns_repeat_their_feature() {
 }
 
 #[test]
+fn patterns_inside_patterns() {
+    let base = with("#73", "#73=MACHINING_WORKINGSTEP('many',#15,#80,#48,$);\n#91=CARTESIAN_POINT('',(0.,0.,0.));\n#92=AXIS2_PLACEMENT_3D('',#91,$,$);\n#93=DIRECTION('',(0.,1.,0.));\n")
+        .replace("'',(100.0,75.0,30.0)", "'',(10.0,0.0,30.0)");
+    let inner = "#90=CIRCULAR_PATTERN('c',#2,(#48),#92,#34,1.5707963267948966,4,(),(),$,0.);\n#94=TOLERANCED_LENGTH_MEASURE(200.,#45);\n";
+    let outer = "#80=RECTANGULAR_PATTERN('p',#2,(#48),#92,#90,#94,#93,2,1,$,$,(),());\n";
+    let (p, out) = read(&base.replace("#91=", &format!("{inner}{outer}#91=")));
+    assert_eq!(codes(&out), []);
+    let round = |v: f64| v.round() as i64;
+    let places: Vec<(i64, i64)> = p.steps()[0].feature.copies.iter().map(|f| (round(f.origin[0]), round(f.origin[1]))).collect();
+    assert_eq!(places, [(10, 0), (0, 10), (-10, 0), (0, -10), (-190, 0), (-200, 10), (-210, 0), (-200, -10)]);
+    let (_, out) = plan(base.replace("#91=", &format!("{inner}{}#91=", outer.replace("#90", "#80"))).as_bytes(), FileId(0), &Options::default());
+    assert_eq!(codes(&out), [code::PLAN_GOES_ROUND]);
+}
+
+#[test]
 fn files_without_a_plan() {
     for text in ["", "ISO-10303-21;\nHEADER;\nFILE_SCHEMA(('AUTOMOTIVE_DESIGN'));\nENDSEC;\nDATA;\n#1=CARTESIAN_POINT('',(0.,0.,0.));\nENDSEC;\nEND-ISO-10303-21;\n", "\u{0}\u{1}#1="] {
         let (planned, out) = plan(text.as_bytes(), FileId(0), &Options::default());

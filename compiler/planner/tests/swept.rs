@@ -100,6 +100,22 @@ fn rounded_floors() {
 }
 
 #[test]
+fn floors_that_are_not_flat() {
+    for (kind, d, e) in [("BALL_ENDMILL", 6.0, 3.0), ("ENDMILL", 6.0, 0.0), ("BULLNOSE_ENDMILL", 6.0, 1.0)] {
+        good(&ball_floor(kind, d, e));
+        good(&cone_floor(kind, d, e, 59.0));
+        good(&cone_floor(kind, d, e, 90.0));
+    }
+}
+
+#[test]
+fn woodruff_ends() {
+    for (kind, d, e, w, r) in [("ENDMILL", 6.0, 0.0, 6.0, 12.0), ("ENDMILL", 5.0, 0.0, 9.0, 12.0), ("BALL_ENDMILL", 6.0, 3.0, 6.0, 12.0), ("BULLNOSE_ENDMILL", 6.0, 1.0, 6.0, 3.0)] {
+        good(&woodruff(kind, d, e, w, r));
+    }
+}
+
+#[test]
 fn sections() {
     let u = |p: &mut judge::part::Part, w: f64, r: f64, a: f64| {
         let (w, r) = (p.length(w), p.length(r));

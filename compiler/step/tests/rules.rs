@@ -106,9 +106,10 @@ fn page() -> String {
 
 fn messages() -> String {
     let mut out = String::from("| code | | says |\n|---|---|---|\n");
-    for c in gr_spec::Code::all() {
-        let def = c.def();
-        if def.slug.starts_with("p21/") || def.slug.starts_with("step/") {
+    let mut all: Vec<_> = gr_spec::Code::all().map(|c| c.def()).collect();
+    all.sort_by_key(|d| d.code);
+    for def in all {
+        if ["p21/", "step/", "plan/", "reference/", "stepnc/"].iter().any(|a| def.slug.starts_with(a)) {
             let kind = format!("{:?}", def.severity).to_lowercase();
             let _ = writeln!(out, "| {} `{}` | {kind} | {} |", def.code, def.slug, def.message.replace('|', "\\|"));
         }

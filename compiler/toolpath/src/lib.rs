@@ -41,7 +41,7 @@ pub use contour::{Contour, Lead, Side, contour, contour_closed, largest_tool, sl
 pub use face::{Face, face};
 pub use geom::{Bounds, P2, Seg, Vertex};
 pub use motion::{Approach, Depth, Entry, Kind, Move, P3, Tag, levels, motion};
-pub use offset::{erode, grow, offset_open};
+pub use offset::{common, erode, grow, offset_open};
 pub use path::Path2;
 pub use region::Region;
 pub use residual::{Residual, residuals};

@@ -209,6 +209,16 @@ pub fn erode(region: &Region, d: f64) -> Result<Vec<Region>, Error> {
     Ok(grouped(loops_at(&loops, d.max(TOL), &|p| region.contains(p))?))
 }
 
+/// What a region has in common with the inside of a closed curve.
+pub fn common(region: &Region, inside: &Path2) -> Result<Vec<Region>, Error> {
+    if !inside.is_closed() {
+        return Err(Error::NotClosed);
+    }
+    let inside = inside.oriented(true);
+    let loops: Vec<&Path2> = region.loops().chain([&inside]).collect();
+    Ok(grouped(loops_at(&loops, TOL, &|p| region.contains(p) && inside.contains(p))?))
+}
+
 /// Everything within `d` of the insides of closed curves: their union, grown with round corners.
 pub fn grow(paths: &[Path2], d: f64) -> Result<Vec<Region>, Error> {
     let d = crate::positive(d, "offset")?;

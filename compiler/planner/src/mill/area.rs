@@ -12,6 +12,56 @@ use crate::process::*;
 /// More levels for one wall than this are a mistake.
 const MOST_WALLS: usize = 5_000;
 
+/// A floor that is not flat: on every level it leaves a disk, which shrinks on the way down.
+#[derive(Clone, Copy)]
+enum Floor {
+    Flat,
+    /// Inside of a ball: its centre, how far that lies below the feature's top, its radius.
+    Ball(P2, f64, f64),
+    /// From a depth on, beginning with a radius: half its angle, rad.
+    Cone(f64, f64, f64),
+}
+
+impl Floor {
+    /// Radius of what is left for a tool with this edge whose tip is at a depth: its widest part may go so far from
+    /// the middle. None: nothing; infinite: the floor is further down.
+    fn disk(self, y: f64, edge: f64) -> Option<f64> {
+        match self {
+            Floor::Flat => Some(f64::INFINITY),
+            Floor::Ball(_, centre, radius) => {
+                let (r, h) = (radius - edge, y - edge - centre);
+                let below = if h <= 0.0 { r } else { libm::sqrt((r * r - h * h).max(0.0)) };
+                (r > 0.0 && h < r).then_some(below + edge)
+            }
+            Floor::Cone(from, radius, half) => {
+                let t = libm::tan(half);
+                let left = radius - (y - from) * t + edge * (1.0 + t - 1.0 / libm::cos(half));
+                (left > 0.0).then(|| if y < from { f64::INFINITY } else { left.min(radius) })
+            }
+        }
+    }
+    fn middle(self) -> P2 {
+        match self {
+            Floor::Ball(c, ..) => c,
+            _ => P2::default(),
+        }
+    }
+    /// How deep the tip of a tool gets.
+    fn deepest(self, radius: f64, edge: f64) -> Option<f64> {
+        match self {
+            Floor::Flat => None,
+            Floor::Ball(_, centre, ball) => {
+                let (r, flat) = (ball - edge, radius - edge);
+                (r > flat).then(|| libm::sqrt(r * r - flat * flat) + edge + centre)
+            }
+            Floor::Cone(from, wide, half) => {
+                let t = libm::tan(half);
+                (wide >= radius).then(|| from + ((wide - radius) / t + edge * (1.0 + 1.0 / t - 1.0 / libm::sin(half))).max(0.0))
+            }
+        }
+    }
+}
+
 /// What is to be emptied.
 struct Area {
     /// At the top.
@@ -27,6 +77,10 @@ struct Area {
     gain: f64,
     /// Levels without islands begin inside the outline.
     open: bool,
+    floor: Floor,
+    /// The edge of the tool that goes down to the floor, and what it may leave between two rings on it.
+    edge: f64,
+    ring: f64,
 }
 
 struct Island {
@@ -44,7 +98,7 @@ impl Area {
         if self.slope == 0.0 { round } else { y.min(self.depth) * libm::tan(self.slope) - self.gain + round }
     }
     fn steady(&self) -> bool {
-        self.slope == 0.0 && self.fillet == 0.0 && self.islands.iter().all(|i| i.slope == 0.0)
+        self.slope == 0.0 && self.fillet == 0.0 && matches!(self.floor, Floor::Flat) && self.islands.iter().all(|i| i.slope == 0.0)
     }
     /// What is free at a depth.
     fn at(&self, y: f64) -> Done<Vec<Region>> {
@@ -56,6 +110,7 @@ impl Area {
         } else {
             vec![self.outline.clone()]
         };
+        let whole = self.on_floor(whole, y)?;
         let mut solid = Vec::new();
         for i in self.islands.iter().filter(|i| i.top < y - 1e-9) {
             let by = (y - i.top) * libm::tan(i.slope) - i.gain;
@@ -68,6 +123,28 @@ impl Area {
         }
         whole.into_iter().map(|r| Region::new(r.outer().clone(), solid.clone()).map_err(words)).collect()
     }
+    /// What the floor leaves of an outline at a depth.
+    fn on_floor(&self, whole: Vec<Region>, y: f64) -> Done<Vec<Region>> {
+        let Some(disk) = self.floor.disk(y, self.edge) else { return Ok(Vec::new()) };
+        if disk >= self.furthest() - 1e-6 {
+            return Ok(whole);
+        }
+        let disk = Path2::circle(self.floor.middle(), disk).map_err(words)?;
+        let mut out = Vec::new();
+        for r in &whole {
+            out.extend(tp::common(r, &disk).map_err(words)?);
+        }
+        Ok(out)
+    }
+    /// Of the outline, from the middle of the floor.
+    fn furthest(&self) -> f64 {
+        let (b, m) = (self.outline.bounds(), self.floor.middle());
+        let round = self.outline.outer().segs().iter().all(|s| s.radius().is_some_and(|r| (r - (s.at(0.5) - m).norm()).abs() < 1e-6));
+        if round {
+            return b.size().x / 2.0;
+        }
+        [b.min, b.max, P2::new(b.min.x, b.max.y), P2::new(b.max.x, b.min.y)].into_iter().map(|c| c.dist(m)).fold(0.0, f64::max)
+    }
     /// Depths between which the outline stays the same: tops of islands.
     fn breaks(&self, bottom: f64) -> Vec<f64> {
         let mut out: Vec<f64> = self.islands.iter().map(|i| i.top).filter(|t| *t > 1e-6 && *t < bottom - 1e-6).collect();
@@ -79,16 +156,21 @@ impl Area {
     /// Depths for the wall alone between two levels: no stair further from the wall than the tolerance.
     fn walls(&self, above: f64, y: f64, tolerance: f64) -> Done<Vec<f64>> {
         let slope = self.islands.iter().map(|i| i.slope).fold(0.0, f64::max);
-        let most = |a: f64, b: f64| (self.lean(b) - self.lean(a)).abs().max((b - a) * libm::tan(slope));
+        let far = self.furthest();
+        let disk = |y: f64| self.floor.disk(y, self.edge).unwrap_or(0.0).min(far);
+        let aside = |a: f64, b: f64| (self.lean(b) - self.lean(a)).abs().max((b - a) * libm::tan(slope)).max(disk(a) - disk(b));
+        let flat = matches!(self.floor, Floor::Flat);
+        // Where the floor is nearly flat stairs are low, and rings are as near to each other as the tool needs.
+        let fine = |a: f64, b: f64| aside(a, b) <= tolerance || b - a <= tolerance && (flat || aside(a, b) <= self.ring);
         let mut out = Vec::new();
         let mut at = above;
-        while most(at, y) > tolerance && y - at > tolerance {
+        while !fine(at, y) {
             let (mut low, mut high) = (at, y);
             for _ in 0..40 {
                 let mid = (low + high) / 2.0;
-                if most(at, mid) > tolerance { high = mid } else { low = mid }
+                if fine(at, mid) { low = mid } else { high = mid }
             }
-            at = low.max(at + tolerance);
+            at = if flat { low.max(at + tolerance) } else { low.max(at + tolerance * 1e-3) };
             if at < y - 1e-6 {
                 out.push(at);
             }
@@ -98,6 +180,32 @@ impl Area {
         }
         Ok(out)
     }
+}
+
+/// How deep the tip of a tool gets on a floor that is not flat, and how deep that floor is; in the frame of the feature.
+pub(super) fn floor_depth(feature: &Feature, radius: f64, edge: f64, leave: f64) -> Option<(Option<f64>, f64)> {
+    let (floor, depth) = floor(feature, leave)?;
+    Some((floor.deepest(radius, edge), depth))
+}
+
+/// The floor where it is not flat, less by what is to stay on it, and its own depth.
+fn floor(feature: &Feature, leave: f64) -> Option<(Floor, f64)> {
+    match &feature.shape {
+        Shape::Pocket { bottom: PocketBottom::Ball(c, r), .. } | Shape::OpenPocket { bottom: PocketBottom::Ball(c, r), .. } => {
+            Some((Floor::Ball(P2::new(c[0], c[1]), -c[2], r - leave), r - c[2]))
+        }
+        Shape::Hole { diameter, final_diameter, bottom: HoleBottom::Conical(angle, _) } => {
+            let (half, wide) = (half_angle(*angle), final_diameter.unwrap_or(*diameter) / 2.0);
+            Some((Floor::Cone(feature.depth - leave, wide, half), feature.depth + wide / libm::tan(half)))
+        }
+        _ => None,
+    }
+}
+
+/// The angle of a cone against its axis: the standard says only that it is the angle of the tip. From a right angle on
+/// it can only be the whole one.
+pub(crate) fn half_angle(angle: f64) -> f64 {
+    if angle < std::f64::consts::FRAC_PI_2 - 1e-9 { angle } else { angle / 2.0 }
 }
 
 impl Job<'_> {
@@ -134,26 +242,24 @@ impl Job<'_> {
     fn outline(&self) -> Done<Area> {
         let plain = |outline: Path2| -> Done<Area> {
             let outline = Region::new(outline, Vec::new()).map_err(words)?;
-            Ok(Area { outline, islands: Vec::new(), slope: 0.0, fillet: 0.0, depth: self.depth, gain: 0.0, open: false })
+            Ok(self.plain(outline, Vec::new(), false))
         };
-        let bottom = |b: &PocketBottom| match b {
-            PocketBottom::Other(what) => Err(format!("a pocket with a {what} bottom")),
+        let bottom = |b: &PocketBottom, planar: Option<f64>| match b {
+            PocketBottom::Other(what) => Err(format!("a pocket with a {what} bottom; it is a surface, which needs explicit tool paths")),
+            PocketBottom::Ball(..) if planar.is_some_and(|r| r > 0.0) => Err("a rounded floor with a radius at its edge".into()),
             _ => Ok(()),
         };
         let mut area = match &self.feature.shape {
             Shape::Pocket { boundary, bosses, slope, bottom: floor, planar_radius, orthogonal_radius } => {
-                bottom(floor)?;
+                bottom(floor, *planar_radius)?;
                 let mut a = plain(self.pocket_outline(boundary, *orthogonal_radius)?)?;
                 a.islands = self.islands(bosses)?;
                 a.slope = self.slope(*slope)?;
                 a.fillet = self.fillet(planar_radius.unwrap_or(0.0));
                 a
             }
-            Shape::OpenPocket { boundary, wall, bosses, slope, bottom: floor, planar_radius, .. } => {
-                bottom(floor)?;
-                if wall.is_some() {
-                    return Err("an open pocket with a wall_boundary: which side of it is open is not settled; write the walls as open_boundary alone".into());
-                }
+            Shape::OpenPocket { boundary, bosses, slope, bottom: floor, planar_radius, .. } => {
+                bottom(floor, *planar_radius)?;
                 let lean = self.slope(*slope)?;
                 let mut a = plain(self.opened(boundary, self.depth * libm::tan(lean))?)?;
                 a.islands = self.islands(bosses)?;
@@ -171,16 +277,27 @@ impl Job<'_> {
             }
             Shape::Hole { diameter, final_diameter, bottom } => {
                 let mut a = plain(Path2::circle(P2::default(), diameter / 2.0).map_err(words)?)?;
-                a.slope = self.slope(final_diameter.map_or(0.0, |f| libm::atan((diameter - f) / 2.0 / self.depth)))?;
+                a.slope = self.slope(final_diameter.map_or(0.0, |f| libm::atan((diameter - f) / 2.0 / self.feature.depth)))?;
                 a.fillet = match bottom {
                     HoleBottom::Radiused(r) | HoleBottom::Spherical(r) => self.fillet(r.min(diameter / 2.0)),
-                    HoleBottom::Conical(..) => return Err("a milled hole with a conical bottom".into()),
+                    HoleBottom::Conical(angle, tip) => {
+                        if half_angle(*angle) < 0.05 {
+                            return Err(format!("a cone of {:.4} degrees", angle.to_degrees()));
+                        }
+                        if tip.is_some_and(|r| r > self.edge + 1e-6) {
+                            return Err("a cone with a tip radius larger than that of its tool".into());
+                        }
+                        0.0
+                    }
                     _ => 0.0,
                 };
                 a
             }
             _ => return Err(String::new()),
         };
+        if let Some((floor, _)) = floor(self.feature, self.m.allowance_bottom) {
+            area.floor = floor;
+        }
         if area.slope > 0.0 {
             area.gain = self.gain(area.slope);
         }
@@ -188,6 +305,13 @@ impl Job<'_> {
             return Err(format!("a radius of {} mm at its floor, deeper than the feature", area.fillet));
         }
         Ok(area)
+    }
+
+    fn plain(&self, outline: Region, islands: Vec<Island>, open: bool) -> Area {
+        // Rings of a round edge as near as their scallops allow, of a flat one as its passes.
+        let scallop = 2.0 * libm::sqrt((self.tolerance * (2.0 * self.edge - self.tolerance)).max(0.0));
+        let ring = (scallop + 2.0 * (self.radius - self.edge)).min(self.coarse);
+        Area { outline, islands, slope: 0.0, fillet: 0.0, depth: self.depth, gain: 0.0, open, floor: Floor::Flat, edge: self.edge, ring }
     }
 
     fn pocket_outline(&self, boundary: &Closed, corner: Option<f64>) -> Done<Path2> {
@@ -215,7 +339,7 @@ impl Job<'_> {
         // The pocket is on one side of the chord, the air on the other.
         let area: f64 = tp::Path2::from_segs(line.segs().iter().copied().chain([tp::Seg::Line { a: b, b: a }]), true).map_err(words)?.area();
         let out = if area > 0.0 { mouth.left() * (1.0 / mouth.norm()) } else { mouth.left() * (-1.0 / mouth.norm()) };
-        let far = self.radius + RUN_OUT + lean;
+        let far = self.radius + self.m.allowance_side + RUN_OUT + lean;
         // Walls that go apart are prolonged, so that nothing is left beside the mouth.
         let prolonged = |t: P2, sideways: P2| {
             let (along, aside) = (t.dot(out), t.dot(sideways));
@@ -240,7 +364,7 @@ impl Job<'_> {
             (left, right) = (left.max(s), right.max(-s));
         }
         // The tool's centre goes as far as the side of the raw part.
-        let out = self.radius + RUN_OUT + lean;
+        let out = self.radius + self.m.allowance_side + RUN_OUT + lean;
         let (side, width) = match (left > 1e-6, right > 1e-6) {
             (true, true) if left <= right => (v, left),
             (true, false) => (v, left),
@@ -256,13 +380,20 @@ impl Job<'_> {
         let area = self.outline()?;
         let moves = self.emptied(e, &area)?;
         if let Shape::Pocket { .. } | Shape::Hole { .. } = self.feature.shape {
-            if let Some(region) = area.at(self.depth.min(self.bottom))?.first() {
+            // A floor that is not flat leaves a disk further down: corners are those of the walls.
+            let y = if matches!(area.floor, Floor::Flat) { self.depth.min(self.bottom) } else { 0.0 };
+            if let Some(region) = area.at(y)?.first() {
                 self.rest(e, region, |_| true);
             }
         } else if let Shape::OpenPocket { boundary, .. } = &self.feature.shape {
             let wall = path(boundary)?;
             let (a, b) = (wall.start(), wall.end());
             self.rest(e, &area.outline, |p| wall.dist(p) < self.radius && p.dist(a) > 1e-6 && p.dist(b) > 1e-6);
+        }
+        if let Some((_, deep)) = floor_depth(self.feature, self.radius, self.edge, self.m.allowance_bottom)
+            && self.bottom + self.m.allowance_bottom < deep - 1e-6
+        {
+            self.leaves(e, &format!("the last {:.4} mm above the middle of its floor, where it is too narrow", deep - self.bottom));
         }
         let asked = match &self.feature.shape {
             Shape::Pocket { planar_radius, .. } | Shape::OpenPocket { planar_radius, .. } => planar_radius.unwrap_or(0.0),
@@ -271,7 +402,7 @@ impl Job<'_> {
             _ => 0.0,
         };
         let through = self.bottom > self.depth;
-        if self.edge > asked + 1e-6 && !through {
+        if self.edge > asked + 1e-6 && !through && matches!(area.floor, Floor::Flat) {
             self.leaves(e, &format!("a radius of {} mm all along the foot of its walls", self.edge));
         }
         if !area.steady() && !self.m.finish {
@@ -283,6 +414,9 @@ impl Job<'_> {
     /// How far the stairs of roughing stand out from the walls.
     fn stairs(&self, area: &Area) -> f64 {
         let levels = (self.bottom / self.axial - 1e-9).ceil().max(1.0);
+        if !matches!(area.floor, Floor::Flat) {
+            return self.bottom / levels;
+        }
         let slope = area.islands.iter().map(|i| i.slope).fold(area.slope, f64::max);
         let each = self.bottom / levels;
         (each * libm::tan(slope)).max(area.lean(self.bottom) - area.lean(self.bottom - each))
@@ -339,7 +473,8 @@ impl Job<'_> {
                 what.allowance = self.m.allowance_side;
                 what.cut_mode = self.cut_mode().unwrap_or(tp::CutMode::Climb);
                 if let Ok(passes) = tp::contour_closed(&part, &what) {
-                    let entry = tp::Entry { approach: tp::Approach::Ramp { angle: super::USUAL_RAMP }, ..tp::Entry::default() };
+                    let down = if self.two_axes { tp::Approach::Plunge } else { tp::Approach::Ramp { angle: super::USUAL_RAMP } };
+                    let entry = tp::Entry { approach: down, ..tp::Entry::default() };
                     moves.extend(tp::motion(&passes, &self.level(high, wall), &entry, Some(&part), inset).map_err(words)?);
                 }
             }
@@ -418,11 +553,11 @@ impl Job<'_> {
 
     /// A plane by a strategy that follows its edge: the tool's centre goes over all of it, and past it by the overrun.
     fn face_as_area(&self, e: &mut Emit<'_>, outline: &Path2, bosses: &[Boss], overrun: f64) -> Done<Moves> {
-        let grown = tp::grow(std::slice::from_ref(outline), self.radius + overrun).map_err(words)?;
+        let grown = tp::grow(std::slice::from_ref(outline), self.radius + self.m.allowance_side + overrun).map_err(words)?;
         let outer = grown.first().ok_or("its boundary encloses nothing")?.outer().clone();
         let outline = Region::new(outer, Vec::new()).map_err(words)?;
         let islands = self.islands(bosses)?;
-        let area = Area { outline, islands, slope: 0.0, fillet: 0.0, depth: self.depth, gain: 0.0, open: true };
+        let area = self.plain(outline, islands, true);
         self.emptied(e, &area)
     }
 
@@ -440,13 +575,14 @@ impl Job<'_> {
         if self.m.bottom {
             // Everything as far as the sides of the raw part: the tool's centre goes as far as they do.
             let (a, b) = self.stock()?;
-            let out = P2::new(self.radius, self.radius) * (1.0 + 1e-3);
+            let out = self.radius + self.m.allowance_side;
+            let out = P2::new(out, out) * (1.0 + 1e-3);
             let (a, b) = (a - out, b + out);
             let outline = Path2::polyline(&[a, P2::new(b.x, a.y), b, P2::new(a.x, b.y)], true).map_err(words)?;
             let gain = if slope == 0.0 { 0.0 } else { self.gain(slope) };
             let islands = vec![Island { path: line.clone(), top: 0.0, slope, gain }];
             let outline = Region::new(outline, Vec::new()).map_err(words)?;
-            let area = Area { outline, islands, slope: 0.0, fillet: 0.0, depth: self.depth, gain: 0.0, open: true };
+            let area = self.plain(outline, islands, true);
             let moves = self.emptied(e, &area)?;
             if let Some(region) = area.at(self.bottom)?.first() {
                 self.rest(e, region, |p| line.dist(p) < 2.0 * self.radius);
@@ -479,11 +615,38 @@ impl Job<'_> {
                 let side = if p.is_ccw() { tp::Side::Right } else { tp::Side::Left };
                 let passes = tp::contour(&p, side, &what).map_err(words)?;
                 let h = if slope > 0.0 { self.level(above, y) } else { self.heights(0.0, self.bottom) };
-                moves.extend(tp::motion(&passes, &h, &self.entry(false)?, None, self.radius).map_err(words)?);
+                let far = self.room_to_enter();
+                let b = p.bounds().grown(far);
+                let around = Path2::polyline(&[b.min, P2::new(b.max.x, b.min.y), b.max, P2::new(b.min.x, b.max.y)], true).map_err(words)?;
+                let outside = Region::new(around, vec![p.clone()]).map_err(words)?;
+                let inset = self.radius + self.m.allowance_side;
+                moves.extend(tp::motion(&passes, &h, &self.entry(false)?, Some(&outside), inset).map_err(words)?);
             }
             above = y;
         }
         Ok(moves)
+    }
+
+    /// Beside a wall, for its passes and ways in and out.
+    fn room_to_enter(&self) -> f64 {
+        let of = |a: &Approach| match a {
+            Approach::Helix(r, _) | Approach::Tangent(r) => 2.0 * r,
+            Approach::Angle(_, l) => *l,
+            _ => 0.0,
+        };
+        4.0 * self.radius + self.m.allowance_side + of(&self.m.approach).max(of(&self.m.retract)) + RUN_OUT
+    }
+
+    /// The side of an open profile where the tool is. None where it comes too near to itself.
+    fn free_side(&self, line: &Path2, left: bool, stock: f64) -> Option<Region> {
+        let far = self.room_to_enter() + stock;
+        let (a, b) = (line.start() - line.start_tangent() * far, line.end() + line.end_tangent() * far);
+        let size = line.bounds().size();
+        let away = (line.end() - line.start()).unit().left() * ((far + size.x + size.y) * if left { 1.0 } else { -1.0 });
+        let corners = [line.end(), b, b + away, a + away, a, line.start()];
+        let rest = corners.windows(2).map(|w| tp::Seg::Line { a: w[0], b: w[1] });
+        let outline = Path2::from_segs(line.segs().iter().copied().chain(rest), true).ok()?;
+        Region::new(outline, Vec::new()).ok()
     }
 
     /// Material in front of a wall for several passes, if the strategy allows them and the raw part is known.
@@ -506,6 +669,9 @@ impl Job<'_> {
         what.stepover = self.by;
         let side = if left == Some(true) { tp::Side::Left } else { tp::Side::Right };
         let passes = tp::contour(line, side, &what).map_err(words)?;
-        tp::motion(&passes, &self.heights(0.0, self.bottom), &self.entry(true)?, None, self.radius).map_err(words)
+        let free = self.free_side(line, left == Some(true), what.stock);
+        let entry = if free.is_some() { self.entry(true)? } else { tp::Entry::default() };
+        let inset = self.radius + self.m.allowance_side;
+        tp::motion(&passes, &self.heights(0.0, self.bottom), &entry, free.as_ref(), inset).map_err(words)
     }
 }

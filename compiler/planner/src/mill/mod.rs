@@ -3,10 +3,10 @@
 //! [`section`] is the plane geometry of that section,
 //! [`thread`] goes round in a helix.
 
-mod area;
+pub(crate) mod area;
 mod section;
 mod slot;
-mod thread;
+pub(crate) mod thread;
 
 use gr_text::code;
 use gr_toolpath as tp;
@@ -59,10 +59,16 @@ struct Job<'a> {
     retract: f64,
     tolerance: f64,
     tells: bool,
+    /// Never all three axes at once.
+    two_axes: bool,
 }
 
 pub(crate) fn mill(e: &mut Emit<'_>, step: &Workingstep, m: &Milling, feature: &Feature, given: &Given) {
     if let Shape::Thread { .. } = feature.shape {
+        if step.operation.two_axes() {
+            let why = "its tool direction TWO_AXES: a thread is milled on a helix, with three axes at once";
+            return e.say(code::PLAN_CANNOT_CUT, step.origin, &[&format!("#{} {}", feature.origin.id, feature.keyword), why]);
+        }
         return thread::mill(e, step, m, feature, given.security);
     }
     let Some(job) = job(e, step, m, feature, given) else { return };
@@ -101,7 +107,8 @@ fn job<'a>(e: &mut Emit<'_>, step: &'a Workingstep, m: &'a Milling, feature: &'a
             | Shape::Pocket { bottom: PocketBottom::Through, .. }
             | Shape::OpenPocket { bottom: PocketBottom::Through, .. }
     );
-    let depth = feature.depth;
+    let floor = area::floor_depth(feature, radius, edge, m.allowance_bottom);
+    let depth = floor.map_or(feature.depth, |f| f.1);
     if !(depth > 0.0) {
         e.say(code::PLAN_BAD_SIZE, feature.origin, &[&feature.keyword, "depth", &depth.to_string(), "above zero"]);
         return None;
@@ -115,8 +122,17 @@ fn job<'a>(e: &mut Emit<'_>, step: &'a Workingstep, m: &'a Milling, feature: &'a
         bad(e, what, v, if side { "zero or more" } else { "between zero and the depth" });
         return None;
     }
+    let deepest = match floor {
+        Some((Some(tip), _)) => tip,
+        Some((None, _)) => {
+            let (what, why) = (format!("#{} {}", feature.origin.id, feature.keyword), "the tool is too large for its floor");
+            e.say(code::PLAN_CANNOT_CUT, step.origin, &[&what, why]);
+            return None;
+        }
+        None => depth - m.allowance_bottom,
+    };
     // Past the bottom by the overcut, and with a rounded edge by that too, so that the opening is as wide below.
-    let bottom = if through { depth + o.overcut.filter(|v| *v > 0.0).unwrap_or(BREAK_THROUGH) + edge } else { depth - m.allowance_bottom };
+    let bottom = if through { depth + o.overcut.filter(|v| *v > 0.0).unwrap_or(BREAK_THROUGH) + edge } else { deepest };
     let axial = match m.axial {
         Some(a) if a > 0.0 => a,
         None => depth,
@@ -146,8 +162,8 @@ fn job<'a>(e: &mut Emit<'_>, step: &'a Workingstep, m: &'a Milling, feature: &'a
     // at the foot of the wall that is no larger than the edge's own stays clear of it.
     let own = |r: f64| r <= edge;
     let upright = match &feature.shape {
-        Shape::Pocket { slope, planar_radius, bosses, .. } | Shape::OpenPocket { slope, planar_radius, bosses, .. } => {
-            *slope == 0.0 && own(planar_radius.unwrap_or(0.0)) && bosses.iter().all(|b| b.slope == 0.0 && b.top <= 0.0)
+        Shape::Pocket { slope, planar_radius, bosses, bottom: floor, .. } | Shape::OpenPocket { slope, planar_radius, bosses, bottom: floor, .. } => {
+            !matches!(floor, PocketBottom::Ball(..)) && *slope == 0.0 && own(planar_radius.unwrap_or(0.0)) && bosses.iter().all(|b| b.slope == 0.0 && b.top <= 0.0)
         }
         Shape::Step { wall, radius, bosses, .. } => *wall == 0.0 && own(*radius) && bosses.iter().all(|b| b.slope == 0.0 && b.top <= 0.0),
         Shape::Hole { final_diameter, bottom, .. } => {
@@ -163,7 +179,7 @@ fn job<'a>(e: &mut Emit<'_>, step: &'a Workingstep, m: &'a Milling, feature: &'a
         _ => false,
     };
     let radius = if upright && bottom < edge { radius - edge + libm::sqrt(bottom * (2.0 * edge - bottom)) } else { radius };
-    Some(Job { step, m, feature, radius, edge, clean, by, coarse, axial, depth, bottom, retract, tolerance: given.tolerance, tells: given.tells })
+    Some(Job { step, m, feature, radius, edge, clean, by, coarse, axial, depth, bottom, retract, tolerance: given.tolerance, tells: given.tells, two_axes: o.two_axes() })
 }
 
 /// From the radial depth and the overlap: the smaller of the two.
@@ -257,10 +273,14 @@ impl Job<'_> {
         tp::Depth { step, safe, ..self.heights(top, bottom) }
     }
     fn entry(&self, open: bool) -> Done<tp::Entry> {
+        let slanting = |a: &Approach| matches!(a, Approach::Ramp(_) | Approach::Helix(..) | Approach::Zigzag(..) | Approach::Angle(..));
+        if self.two_axes && (slanting(&self.m.approach) || slanting(&self.m.retract)) {
+            return Err("its tool direction TWO_AXES, against the slope of its approach: that needs three axes at once".into());
+        }
         let to = |a: &Approach, way_in: bool| -> Done<tp::Approach> {
             Ok(match a {
                 // Into a closed area a cutter that may not cut at its centre goes down slowly on a slope.
-                Approach::None if way_in && !open => tp::Approach::Ramp { angle: USUAL_RAMP },
+                Approach::None if way_in && !open && !self.two_axes => tp::Approach::Ramp { angle: USUAL_RAMP },
                 Approach::None | Approach::Axis => tp::Approach::Plunge,
                 Approach::Ramp(angle) => tp::Approach::Ramp { angle: *angle },
                 Approach::Helix(radius, angle) => tp::Approach::Helix { radius: *radius, angle: *angle },

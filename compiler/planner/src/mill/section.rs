@@ -19,61 +19,77 @@ pub(super) struct Cut {
     pub steady: bool,
 }
 
-/// The curve of a section, prolonged above its top.
-pub(super) fn curve(section: &Section, depth: f64, up: f64) -> Done<Path2> {
+/// The curve of a section, with the top of the part so far on both sides of it.
+pub(super) fn curve(section: &Section, depth: f64, land: f64) -> Done<Path2> {
     match section {
-        Section::SquareU { width, radius, angle } => square(*width, *radius, *angle, depth, up),
-        Section::RoundedU { width } => round(width / 2.0, depth, up),
-        Section::Circular { radius, .. } => round(*radius, depth, up),
-        Section::Vee { radius, angle, tilt } => vee(*radius, *angle, *tilt, depth, up),
-        Section::Tee { width, .. } => square(*width, [0.0; 2], [0.0; 2], depth, up),
-        Section::General(contour) => general(contour, depth, up),
+        Section::SquareU { width, radius, angle } => square(*width, *radius, *angle, depth, land),
+        Section::RoundedU { width } => round(width / 2.0, depth, land),
+        Section::Circular { radius, .. } => round(*radius, depth, land),
+        Section::Vee { radius, angle, tilt } => vee(*radius, *angle, *tilt, depth, land),
+        Section::Tee { width, .. } => square(*width, [0.0; 2], [0.0; 2], depth, land),
+        Section::General(contour) => general(contour, depth, land),
     }
 }
 
-fn square(width: f64, radius: [f64; 2], angle: [f64; 2], depth: f64, up: f64) -> Done<Path2> {
+/// How far from its middle a circle about a centre at this height meets the top.
+fn chord(radius: f64, height: f64) -> f64 {
+    libm::sqrt((radius * radius - height * height).max(0.0))
+}
+
+fn square(width: f64, radius: [f64; 2], angle: [f64; 2], depth: f64, land: f64) -> Done<Path2> {
     let good = |a: f64| (0.0..1.5).contains(&a);
     if !good(angle[0]) || !good(angle[1]) {
         return Err("a section whose walls lean inwards or lie flat".into());
     }
     let h = width / 2.0;
-    let t = |i: usize| radius[i].max(0.0) * libm::tan((std::f64::consts::FRAC_PI_2 - angle[i]) / 2.0);
-    if t(0) + t(1) > width + 1e-9 {
+    // From the floor up the wall at +u, and out on the top.
+    let half = |i: usize| {
+        let (r, a) = (radius[i].max(0.0), angle[i]);
+        let (s, c) = (libm::sin(a), libm::cos(a));
+        let t = r * libm::tan((std::f64::consts::FRAC_PI_2 - a) / 2.0);
+        let mut out = Vec::new();
+        if t > 0.0 && t * c > depth - 1e-6 {
+            // The rounding itself goes through the top.
+            let x = h - t + chord(r, r - depth);
+            out.extend([Vertex::arc(h - t, -depth, libm::tan(libm::acos(1.0 - depth / r) / 4.0)), Vertex::line(x, 0.0)]);
+        } else {
+            if t > 0.0 {
+                out.push(Vertex::arc(h - t, -depth, libm::tan((std::f64::consts::FRAC_PI_2 - a) / 4.0)));
+            }
+            out.extend([Vertex::line(h + s * t, -depth + c * t), Vertex::line(h + depth * s / c, 0.0)]);
+        }
+        let end = out[out.len() - 1].p;
+        out.push(Vertex::line(end.x + land, 0.0));
+        (t, out)
+    };
+    // The second wall is at -u, the first at +u.
+    let ((t0, right), (t1, left)) = (half(0), half(1));
+    if t0 + t1 > width + 1e-9 {
         return Err("a section whose radii do not fit its width".into());
     }
-    let (s, c) = (|i: usize| libm::sin(angle[i]), |i: usize| libm::cos(angle[i]));
-    let high = |i: usize| (depth + up).max(t(i) * c(i) + 1e-3) / c(i);
-    let (left, right) = (P2::new(-h, -depth), P2::new(h, -depth));
-    // The second wall is at -u, the first at +u.
-    let v = |p: P2, bulge: f64| Vertex { p, bulge };
-    let bulge = |i: usize| libm::tan((std::f64::consts::FRAC_PI_2 - angle[i]) / 4.0);
-    let mut out = vec![v(left + P2::new(-s(1), c(1)) * high(1), 0.0)];
-    if t(1) > 0.0 {
-        out.push(v(left + P2::new(-s(1), c(1)) * t(1), bulge(1)));
-    }
-    out.push(v(left + P2::new(t(1), 0.0), 0.0));
-    if t(0) > 0.0 {
-        out.push(v(right - P2::new(t(0), 0.0), bulge(0)));
-    }
-    out.push(v(right + P2::new(s(0), c(0)) * t(0), 0.0));
-    out.push(v(right + P2::new(s(0), c(0)) * high(0), 0.0));
+    let bulges = left.iter().map(|v| v.bulge).rev().skip(1).chain([0.0]);
+    let mut out: Vec<Vertex> = left.iter().rev().zip(bulges).map(|(v, b)| Vertex::arc(-v.p.x, v.p.y, b)).collect();
+    out.extend(right);
     Path2::from_vertices(&out, false).map_err(words)
 }
 
-fn round(radius: f64, depth: f64, up: f64) -> Done<Path2> {
-    let top = radius - depth;
-    let mut out = Vec::new();
-    if top < up {
-        out.push(Vertex::line(-radius, up));
+fn round(radius: f64, depth: f64, land: f64) -> Done<Path2> {
+    let centre = radius - depth;
+    let (x, y) = if centre < 0.0 { (radius, centre) } else { (chord(radius, centre), 0.0) };
+    let sweep = if centre < 0.0 { std::f64::consts::PI } else { 2.0 * libm::acos(centre / radius) };
+    let mut out = vec![Vertex::line(-x - land, 0.0)];
+    if centre < 0.0 {
+        out.push(Vertex::line(-x, 0.0));
     }
-    out.extend([Vertex::arc(-radius, top, 1.0), Vertex::line(radius, top)]);
-    if top < up {
-        out.push(Vertex::line(radius, up));
+    out.extend([Vertex::arc(-x, y, libm::tan(sweep / 4.0)), Vertex::line(x, y)]);
+    if centre < 0.0 {
+        out.push(Vertex::line(x, 0.0));
     }
+    out.push(Vertex::line(x + land, 0.0));
     Path2::from_vertices(&out, false).map_err(words)
 }
 
-fn vee(radius: f64, angle: f64, tilt: f64, depth: f64, up: f64) -> Done<Path2> {
+fn vee(radius: f64, angle: f64, tilt: f64, depth: f64, land: f64) -> Done<Path2> {
     let square = std::f64::consts::FRAC_PI_2;
     // The tilt is the angle of the first side from the x axis. Nought would lay that side flat: programs write it
     // for a V that stands upright.
@@ -83,22 +99,24 @@ fn vee(radius: f64, angle: f64, tilt: f64, depth: f64, up: f64) -> Done<Path2> {
     }
     let c = P2::new(0.0, radius - depth);
     let low = |a: f64, side: f64| c + P2::new(side * libm::cos(a), -libm::sin(a)) * radius;
-    let high = |p: P2, a: f64, side: f64| {
-        let l = (up.max(p.y + 1e-3) - p.y) / libm::cos(a);
-        p + P2::new(side * libm::sin(a), libm::cos(a)) * l
-    };
     let (p, q) = (low(second, -1.0), low(first, 1.0));
-    let bulge = if radius > 0.0 { libm::tan((std::f64::consts::PI - first - second) / 4.0) } else { 0.0 };
-    let v = |p: P2, bulge: f64| Vertex { p, bulge };
-    let mut out = vec![v(high(p, second, -1.0), 0.0), v(p, bulge)];
-    if radius > 0.0 {
-        out.push(v(q, 0.0));
+    match (p.y < -1e-6, q.y < -1e-6) {
+        (true, true) => {}
+        (false, false) => return round(radius, depth, land),
+        _ => return Err("a V with a radius that reaches its top on one side".into()),
     }
-    out.push(v(high(q, first, 1.0), 0.0));
+    let top = |p: P2, a: f64, side: f64| p.x - side * p.y * libm::tan(a);
+    let (x, z) = (top(p, second, -1.0), top(q, first, 1.0));
+    let bulge = if radius > 0.0 { libm::tan((std::f64::consts::PI - first - second) / 4.0) } else { 0.0 };
+    let mut out = vec![Vertex::line(x - land, 0.0), Vertex::line(x, 0.0), Vertex { p, bulge }];
+    if radius > 0.0 {
+        out.push(Vertex { p: q, bulge: 0.0 });
+    }
+    out.extend([Vertex::line(z, 0.0), Vertex::line(z + land, 0.0)]);
     Path2::from_vertices(&out, false).map_err(words)
 }
 
-fn general(contour: &Contour, depth: f64, up: f64) -> Done<Path2> {
+fn general(contour: &Contour, depth: f64, land: f64) -> Done<Path2> {
     if contour.closed {
         return Err("a section that is closed".into());
     }
@@ -116,9 +134,10 @@ fn general(contour: &Contour, depth: f64, up: f64) -> Done<Path2> {
     if a.y < -1e-6 || b.y < -1e-6 {
         return Err("a section that does not reach the top of the slot".into());
     }
-    let rise = |p: P2| P2::new(p.x, up.max(p.y + 1e-3));
-    let first = Seg::Line { a: rise(a), b: a };
-    let last = Seg::Line { a: b, b: rise(b) };
+    // On the top of the part, or straight up where the section goes on above it.
+    let on = |p: P2, side: f64| if p.y > 1e-6 { P2::new(p.x, p.y + land) } else { P2::new(p.x + side * land, p.y) };
+    let first = Seg::Line { a: on(a, -1.0), b: a };
+    let last = Seg::Line { a: b, b: on(b, 1.0) };
     Path2::from_segs(std::iter::once(first).chain(line.segs().iter().copied()).chain([last]), false).map_err(words)
 }
 
@@ -176,10 +195,11 @@ impl Cut {
         if fits(self.depth) {
             return self.depth;
         }
-        if !fits(0.0) {
+        let least = 1e-4f64.min(self.depth);
+        if !fits(least) {
             return 0.0;
         }
-        let (mut low, mut high) = (0.0, self.depth);
+        let (mut low, mut high) = (least, self.depth);
         for _ in 0..60 {
             let mid = (low + high) / 2.0;
             if fits(mid) { low = mid } else { high = mid }
@@ -202,6 +222,10 @@ impl Cut {
         let straight = 2.0 * libm::sqrt((2.0 * r * tolerance - tolerance * tolerance).max(1e-12));
         let mut out: Vec<(f64, f64)> = Vec::new();
         for s in self.centres.segs() {
+            // Not round the edge to the top of the part.
+            if s.at(0.5).y - s.tangent(0.5).left().y * r > -1e-6 {
+                continue;
+            }
             let step = match *s {
                 Seg::Arc { a, c, sweep, .. } if sweep > 0.0 => {
                     let inner = a.dist(c);

@@ -23,9 +23,6 @@ impl Job<'_> {
             Travel::Curve(c) => c.clone(),
         };
         let closed = line.closed || ends.contains(&SlotEnd::Loop);
-        if ends.iter().any(|e| matches!(e, SlotEnd::Woodruff(_))) {
-            return Err("a slot with a Woodruff end: a disc cutter lies across the slot there".into());
-        }
         let line = path(&line)?;
         if closed && !line.is_closed() {
             return Err("a slot with a loop end whose course does not come back".into());
@@ -42,9 +39,13 @@ impl Job<'_> {
             }
         }
         self.uneven(e, section);
-        let up = 2.0 * self.radius + RUN_OUT + self.m.allowance_side;
-        let shape = curve(section, self.depth, up)?;
+        let land = 2.0 * self.radius + RUN_OUT + self.m.allowance_side;
+        let shape = curve(section, self.depth, land)?;
         let cut = Cut::new(&shape, self.depth, self.radius, self.edge)?;
+        let rising = ends.iter().any(|e| matches!(e, SlotEnd::Woodruff(_)));
+        if rising && (closed || !cut.steady) {
+            return Err("a Woodruff end of a slot whose section is not rectangular, or that is a loop".into());
+        }
         let floor = cut.deepest().min(self.bottom);
         if !(floor > 1e-6) {
             return Err(format!("its section has no room for a tool of {} mm", 2.0 * self.radius));
@@ -65,8 +66,89 @@ impl Job<'_> {
         } else if !cut.steady && !self.m.finish && !ball {
             self.leaves(e, "stairs on its walls; a finishing workingstep or a ball takes them");
         }
+        if rising && self.m.finish {
+            self.rising_ends(&cut, &line, ends, floor, &mut moves)?;
+        } else if rising {
+            self.leaves(e, &format!("stairs of up to {:.4} mm on its Woodruff ends; a finishing workingstep takes them", self.axial.min(floor)));
+        }
         self.slot_rest(e, &line, &cut, floor, ends, closed);
         Ok(moves)
+    }
+
+    /// How far past the end of the course the tool reaches on the arc of a Woodruff end, its tip at a depth. The arc
+    /// is tangent to the floor where the course ends.
+    fn risen(&self, radius: f64, y: f64) -> Done<f64> {
+        let inner = radius - self.edge;
+        if !(inner > 0.0) {
+            return Err(format!("a Woodruff end of radius {radius}, no larger than the edge of its tool"));
+        }
+        let below = inner - (self.depth - y);
+        Ok(self.edge + if below <= 0.0 { inner } else { libm::sqrt((inner * inner - below * below).max(0.0)) })
+    }
+
+    /// Course and ends on a level: a Woodruff end is a flat one further out.
+    fn on_level(&self, line: &Path2, ends: &[SlotEnd], y: f64) -> Done<(Path2, Vec<SlotEnd>)> {
+        let mut by = [0.0; 2];
+        let mut out = Vec::new();
+        for (i, by) in by.iter_mut().enumerate() {
+            let Some(end) = ends.get(i).or(ends.first()) else { continue };
+            out.push(match end {
+                SlotEnd::Woodruff(r) => {
+                    *by = self.risen(*r, y)?;
+                    SlotEnd::Flat(0.0, 0.0)
+                }
+                other => *other,
+            });
+        }
+        Ok((lengthened(line, by[0], by[1])?, out))
+    }
+
+    /// Down the arcs of Woodruff ends from wall to wall, so finely that no stair stands out beyond the tolerance.
+    fn rising_ends(&self, cut: &Cut, line: &Path2, ends: &[SlotEnd], floor: f64, moves: &mut Moves) -> Done<()> {
+        for i in 0..2 {
+            let Some(SlotEnd::Woodruff(radius)) = ends.get(i).or(ends.first()) else { continue };
+            let (at, out, along) = if i == 0 {
+                (line.start(), line.start_tangent() * -1.0, line.start_tangent())
+            } else {
+                (line.end(), line.end_tangent(), line.end_tangent())
+            };
+            let reach = |y: f64| self.risen(*radius, y).map(|x| x - self.radius - self.m.allowance_side);
+            let mut levels = vec![self.tolerance.min(floor)];
+            while let Some(y) = levels.last().copied().filter(|y| *y < floor) {
+                // As far down as a stair stays low or narrow.
+                let fine = |z: f64| Ok::<bool, String>(z - y <= self.tolerance && reach(y)? - reach(z)? <= self.by || reach(y)? - reach(z)? <= self.tolerance);
+                let (mut low, mut high) = (y, floor);
+                if fine(floor)? {
+                    low = floor;
+                }
+                for _ in 0..40 {
+                    let mid = (low + high) / 2.0;
+                    if fine(mid)? { low = mid } else { high = mid }
+                }
+                levels.push(low.max(y + self.tolerance * 1e-2).min(floor));
+                if levels.len() > MOST {
+                    return Err("its Woodruff end needs too many levels".into());
+                }
+            }
+            for (a, b) in self.narrowed(cut.across(floor)) {
+                let place = |y: f64, u: f64| Ok::<P2, String>(at + out * reach(y)? + along.left() * u);
+                let go = |to: P2, z: f64, kind: tp::Kind, tag: tp::Tag| tp::Move { to: tp::P3::over(to, z), kind, tag };
+                let first = place(levels[0], a)?;
+                moves.push(go(first, self.retract, tp::Kind::Rapid, tp::Tag::Approach));
+                moves.push(go(first, RUN_OUT.min(self.retract), tp::Kind::Rapid, tp::Tag::Approach));
+                for (k, y) in levels.iter().enumerate() {
+                    let (from, to) = if k % 2 == 0 { (a, b) } else { (b, a) };
+                    moves.push(go(place(*y, from)?, -y, tp::Kind::Line, tp::Tag::Cut));
+                    if b - a > 1e-6 {
+                        moves.push(go(place(*y, to)?, -y, tp::Kind::Line, tp::Tag::Cut));
+                    }
+                }
+                if let Some(last) = moves.last().copied() {
+                    moves.push(go(last.to.flat(), self.retract, tp::Kind::Rapid, tp::Tag::Retract));
+                }
+            }
+        }
+        Ok(())
     }
 
     /// Which wall is the first is not settled where the section is lopsided.
@@ -91,7 +173,8 @@ impl Job<'_> {
     fn by_levels(&self, cut: &Cut, line: &Path2, ends: &[SlotEnd], closed: bool, floor: f64, moves: &mut Moves) -> Done<()> {
         let open = ends.is_empty() || ends.contains(&SlotEnd::Open);
         let entry = self.entry(open)?;
-        if cut.steady {
+        let rising = ends.iter().any(|e| matches!(e, SlotEnd::Woodruff(_)));
+        if cut.steady && !rising {
             for (a, b) in self.narrowed(cut.across(floor)) {
                 self.across_level(line, (a, b), ends, closed, &self.heights(0.0, floor), &entry, moves)?;
             }
@@ -101,10 +184,12 @@ impl Job<'_> {
         let mut above = 0.0;
         for k in 1..=count as usize {
             let y = if k as f64 == count { floor } else { floor * k as f64 / count };
+            let (line, ends) = &if rising { self.on_level(line, ends, y)? } else { (line.clone(), ends.to_vec()) };
             for (a, b) in self.narrowed(cut.across(y)) {
                 self.across_level(line, (a, b), ends, closed, &self.level(above, y), &entry, moves)?;
             }
-            if self.m.finish {
+            // A ball follows the section afterwards.
+            if self.m.finish && !cut.steady && self.edge + 1e-9 < self.radius {
                 self.walls_between(cut, line, ends, closed, above, y, moves)?;
             }
             above = y;

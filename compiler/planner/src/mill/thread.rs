@@ -1,4 +1,4 @@
-//! Threads by a thread mill: a helix up or down the flank, begun and ended on half circles that touch it.
+//! Threads by a thread mill, or by a tool that drills and threads: a helix up or down the flank, begun and ended on half circles that touch it.
 
 use std::f64::consts::PI;
 
@@ -71,5 +71,66 @@ pub(super) fn mill(e: &mut Emit<'_>, step: &Workingstep, m: &Milling, feature: &
         }
         e.arc(at(middle, to), frame.z, at(away, to + rise), sweep);
         e.line(at(away, retract.max(to + rise)));
+    }
+}
+
+/// Drilling and threading with one tool: straight down its axis, or already on the helix, and out on the helix.
+pub(crate) fn drill(e: &mut Emit<'_>, step: &Workingstep, d: &Drilling, feature: &Feature, security: f64) {
+    let o = &step.operation;
+    let name = format!("#{} {}", feature.origin.id, feature.keyword);
+    let cannot = |e: &mut Emit<'_>, why: &str| e.say(code::PLAN_CANNOT_CUT, step.origin, &[&name, why]);
+    let Shape::Thread { major, pitch, right, inner: true, length } = &feature.shape else {
+        return cannot(e, "thread drilling makes an inner thread; this is none");
+    };
+    let Some(pitch) = o.tool.pitch.or(*pitch).filter(|p| *p > 0.0) else {
+        let why = "the thread says neither threads per inch nor is the tool's pitch known";
+        return e.say(code::PLAN_MISSING_VALUE, feature.origin, &[&feature.keyword, "number_of_threads", why]);
+    };
+    let r = o.tool.diameter / 2.0;
+    let radius = major / 2.0 - r;
+    let thread = if *length > 0.0 { *length } else { feature.depth };
+    let long = d.depth.unwrap_or(thread);
+    if radius <= 1e-3 {
+        return cannot(e, &format!("its tool of {} mm is no smaller than the thread", o.tool.diameter));
+    }
+    if !(long > 0.0) || long / pitch > MOST_TURNS || o.technology.feed.is_none() {
+        return cannot(e, "its length is none, or takes too many turns");
+    }
+    let tip = o.tool.tip_angle.map(|a| r / libm::tan(a)).filter(|t| t.is_finite() && *t > 0.0).unwrap_or(0.0);
+    let all = (long / pitch - 1e-9).ceil();
+    let turns = if o.tool.cutting_length.is_some_and(|l| l >= long) && !d.helical { 1.0 } else { all };
+    // Upwards counter-clockwise is right-handed.
+    let sense = if *right { 1.0 } else { -1.0 };
+    let retract = o.retract.filter(|r| *r > 0.0).unwrap_or(RUN_OUT);
+    let (bottom, rise) = (-long - tip, pitch / 4.0);
+    for frame in &feature.copies {
+        let at = |x: f64, z: f64| frame.point([x, 0.0, z]);
+        e.travel(at(0.0, retract), frame.z, security);
+        e.technology(&o.technology, o.functions);
+        let mut z = bottom;
+        if d.helical {
+            z = bottom + pitch * turns;
+            e.line(at(0.0, z));
+            e.arc(at(radius / 2.0, z), frame.z, at(radius, z), sense * PI);
+            for _ in 0..turns as usize {
+                e.arc(at(0.0, z), frame.z, at(radius, z - pitch), -sense * 2.0 * PI);
+                z -= pitch;
+            }
+        } else {
+            e.line(at(0.0, bottom));
+        }
+        if d.dwell > 0.0 {
+            e.push(gr_ir::Op::Dwell(d.dwell));
+        }
+        if !d.helical {
+            e.arc(at(radius / 2.0, z), frame.z, at(radius, z + rise), sense * PI);
+            z += rise;
+        }
+        for _ in 0..turns as usize {
+            e.arc(at(0.0, z), frame.z, at(radius, z + pitch), sense * 2.0 * PI);
+            z += pitch;
+        }
+        e.arc(at(radius / 2.0, z), frame.z, at(0.0, z + rise), sense * PI);
+        e.line(at(0.0, retract.max(z + rise)));
     }
 }

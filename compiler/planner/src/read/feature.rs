@@ -7,19 +7,30 @@ use super::{DEEPEST, Reader, origin, title};
 use crate::frame::{Frame, norm, sub};
 use crate::process::*;
 
+/// More copies of one feature than this are a mistake.
+const MOST_COPIES: usize = 100_000;
+
 impl<'m> Reader<'m> {
     /// A feature in the frame of its setup. `operation` chooses among the elements of a compound feature.
     pub fn feature(&mut self, node: Node<'m>, setup: Option<&Setup>, operation: u64) -> Option<Feature> {
         let piece = node.node("its_workpiece").map(|w| w.id());
         let place = setup.and_then(|s| s.workpieces.iter().find(|p| Some(p.0) == piece)).map_or(Frame::default(), |p| p.1);
         let outer = self.outer(node, &place, 0)?;
-        let (copies_of, node) = self.base_of_pattern(node)?;
-        let mut copies = Vec::new();
-        for o in outer {
-            match copies_of {
-                Some(pattern) => copies.extend(self.pattern(pattern, &o)?),
-                None => copies.push(o),
+        let (patterns, node) = self.base_of_pattern(node)?;
+        let mut copies = outer;
+        let mut replaced = false;
+        for pattern in &patterns {
+            let mut next = Vec::new();
+            for o in &copies {
+                next.extend(self.pattern(*pattern, o, replaced)?);
+                if next.len() > MOST_COPIES {
+                    self.say(code::PLAN_TOO_MUCH, *pattern, &[&title(*pattern), &MOST_COPIES.to_string(), "features"]);
+                    return None;
+                }
             }
+            copies = next;
+            // A general pattern says where its feature goes, whatever that feature's own placement.
+            replaced = pattern.keyword() == "GENERAL_PATTERN";
         }
         let placement = match node.node("feature_placement") {
             Some(p) => self.placement(p)?,
@@ -29,10 +40,7 @@ impl<'m> Reader<'m> {
             }
             None => Frame::default(),
         };
-        let copies: Vec<Frame> = match copies_of {
-            Some(p) if p.keyword() == "GENERAL_PATTERN" => copies,
-            _ => copies.iter().map(|c| c.place(&placement)).collect(),
-        };
+        let copies: Vec<Frame> = if replaced { copies } else { copies.iter().map(|c| c.place(&placement)).collect() };
         let depth = self.depth(node)?;
         let frame = copies.first().copied().unwrap_or(placement);
         let shape = self.shape(node, operation, &placement, setup)?;
@@ -55,25 +63,30 @@ impl<'m> Reader<'m> {
         Some(outer.iter().map(|o| o.place(&own)).collect())
     }
 
-    fn base_of_pattern(&mut self, node: Node<'m>) -> Option<(Option<Node<'m>>, Node<'m>)> {
-        if !node.is_a("replicate_feature") {
-            return Some((None, node));
+    /// The patterns around a feature, outermost first, and what they repeat.
+    fn base_of_pattern(&mut self, node: Node<'m>) -> Option<(Vec<Node<'m>>, Node<'m>)> {
+        let (mut patterns, mut at) = (Vec::new(), node);
+        while at.is_a("replicate_feature") {
+            if patterns.len() >= DEEPEST {
+                self.say(code::PLAN_GOES_ROUND, node, &[&title(node)]);
+                return None;
+            }
+            patterns.push(at);
+            let Some(base) = at.node("replicate_base_feature") else {
+                self.missing(at, "replicate_base_feature", "a pattern repeats a feature");
+                return None;
+            };
+            at = base;
         }
-        let Some(base) = node.node("replicate_base_feature") else {
-            self.missing(node, "replicate_base_feature", "a pattern repeats a feature");
-            return None;
-        };
-        if base.is_a("replicate_feature") {
-            self.not_lowered(base, ": a pattern inside a pattern");
-            return None;
-        }
-        Some((Some(node), base))
+        Some((patterns, at))
     }
 
-    /// Frames to put the base feature's placement into.
-    fn pattern(&mut self, node: Node<'m>, outer: &Frame) -> Option<Vec<Frame>> {
-        let own = node.node("feature_placement").and_then(|p| self.placement(p))?;
-        let own = outer.place(&own);
+    /// Frames to put the base feature's placement into. `replaced`: a pattern around this one says where it lies.
+    fn pattern(&mut self, node: Node<'m>, outer: &Frame, replaced: bool) -> Option<Vec<Frame>> {
+        let own = match node.node("feature_placement").and_then(|p| self.placement(p)) {
+            Some(own) if !replaced => outer.place(&own),
+            _ => *outer,
+        };
         match node.keyword() {
             "CIRCULAR_PATTERN" => {
                 let step = self.angle(node.real("angle_increment").unwrap_or(0.0));
@@ -168,7 +181,7 @@ impl<'m> Reader<'m> {
             "CLOSED_POCKET" => {
                 let boundary = self.need(node, "feature_boundary")?;
                 let boundary = self.closed(boundary, placement)?;
-                let (slope, bottom) = (self.slope(node), self.pocket_bottom(node));
+                let (slope, bottom) = (self.slope(node), self.pocket_bottom(node)?);
                 let bosses = self.bosses(node, placement)?;
                 let (planar_radius, orthogonal_radius) = (node.length("planar_radius"), node.length("orthogonal_radius"));
                 Shape::Pocket { boundary, bosses, slope, bottom, planar_radius, orthogonal_radius }
@@ -176,14 +189,13 @@ impl<'m> Reader<'m> {
             "OPEN_POCKET" => {
                 let boundary = self.need(node, "open_boundary")?;
                 let boundary = self.open_contour(boundary, placement)?;
-                let wall = match node.node("wall_boundary") {
-                    Some(w) => Some(self.open_contour(w, placement)?),
-                    None => None,
-                };
-                let (slope, bottom) = (self.slope(node), self.pocket_bottom(node));
+                if node.attr("wall_boundary").is_some() {
+                    self.no_effect(node, "wall_boundary", "the standard gives it for information only; the walls are the open_boundary");
+                }
+                let (slope, bottom) = (self.slope(node), self.pocket_bottom(node)?);
                 let bosses = self.bosses(node, placement)?;
                 let (planar_radius, orthogonal_radius) = (node.length("planar_radius"), node.length("orthogonal_radius"));
-                Shape::OpenPocket { boundary, wall, bosses, slope, bottom, planar_radius, orthogonal_radius }
+                Shape::OpenPocket { boundary, bosses, slope, bottom, planar_radius, orthogonal_radius }
             }
             "SLOT" => {
                 let path = self.need(node, "course_of_travel")?;
@@ -215,7 +227,7 @@ impl<'m> Reader<'m> {
                 } else {
                     self.open_contour(boundary, placement)?
                 };
-                Shape::Outside { boundary, left: None }
+                Shape::Outside { boundary, left: Some(false) }
             }
             "GENERAL_SHAPE_PROFILE" | "PARTIAL_CIRCULAR_SHAPE_PROFILE" | "CIRCULAR_CLOSED_SHAPE_PROFILE"
             | "RECTANGULAR_OPEN_SHAPE_PROFILE" | "RECTANGULAR_CLOSED_SHAPE_PROFILE" => self.shape_profile(node, placement)?,
@@ -286,13 +298,21 @@ impl<'m> Reader<'m> {
         node.real("slope").map_or(0.0, |s| self.angle(s))
     }
 
-    fn pocket_bottom(&mut self, node: Node<'m>) -> PocketBottom {
-        match node.node("bottom_condition").map(|b| b.keyword()) {
-            Some("THROUGH_POCKET_BOTTOM_CONDITION") => PocketBottom::Through,
-            Some("RADIUSED_POCKET_BOTTOM_CONDITION") => PocketBottom::Other("rounded"),
-            Some("GENERAL_POCKET_BOTTOM_CONDITION") => PocketBottom::Other("general"),
+    fn pocket_bottom(&mut self, node: Node<'m>) -> Option<PocketBottom> {
+        let Some(bottom) = node.node("bottom_condition") else { return Some(PocketBottom::Planar) };
+        Some(match bottom.keyword() {
+            "THROUGH_POCKET_BOTTOM_CONDITION" => PocketBottom::Through,
+            "RADIUSED_POCKET_BOTTOM_CONDITION" => {
+                let radius = self.positive(bottom, "floor_radius", "the floor is part of a ball")?;
+                let Some(center) = bottom.node("floor_radius_center").and_then(|p| self.point(p)) else {
+                    self.missing(bottom, "floor_radius_center", "the floor is part of a ball about it");
+                    return None;
+                };
+                PocketBottom::Ball(center, radius)
+            }
+            "GENERAL_POCKET_BOTTOM_CONDITION" => PocketBottom::Other("general"),
             _ => PocketBottom::Planar,
-        }
+        })
     }
 
     fn bosses(&mut self, node: Node<'m>, placement: &Frame) -> Option<Vec<Boss>> {

@@ -4,7 +4,7 @@ use gr_step::Node;
 use gr_text::code;
 
 use super::{Reader, origin};
-use crate::frame::{add, dot, scale, sub, unit};
+use crate::frame::{add, cross, dot, scale, sub, unit};
 use crate::process::*;
 
 impl<'m> Reader<'m> {
@@ -24,13 +24,12 @@ impl<'m> Reader<'m> {
         };
         let functions = node.node("its_machine_functions").map(|f| self.functions(f)).unwrap_or_default();
         let toolpaths = node.node("its_toolpath").map(|t| self.toolpaths(t, Some(&tool))).unwrap_or_default();
-        let direction = node.node("its_tool_direction").map(|d| d.keyword().to_string());
-        if let Some(d) = direction.as_deref().filter(|d| *d != "THREE_AXES") {
-            let why = format!(": tool direction {d}");
-            if toolpaths.is_empty() {
-                self.not_lowered(node, &why);
-            }
+        let direction = node.node("its_tool_direction");
+        if let Some(d) = direction.filter(|d| toolpaths.is_empty() && !self.along_feature(*d)) {
+            let why = format!(": tool direction {}; a feature is cut by a tool along its own axis", d.keyword());
+            self.not_lowered(node, &why);
         }
+        let direction = direction.map(|d| d.keyword().to_string());
         let kind = if node.is_a("drilling_type_operation") {
             OperationKind::Drill(self.drilling(node))
         } else if node.is_a("two5d_milling_operation") {
@@ -54,6 +53,17 @@ impl<'m> Reader<'m> {
         })
     }
 
+    /// A tool direction that says nothing but the axis of the feature.
+    fn along_feature(&self, direction: Node<'m>) -> bool {
+        match direction.keyword() {
+            "TWO_AXES" | "THREE_AXES" => true,
+            "THREE_AXES_TILTED_TOOL" => {
+                direction.node("its_tool_direction").and_then(|d| self.direction(d)).is_some_and(|d| d[2] > 1.0 - 1e-9)
+            }
+            _ => false,
+        }
+    }
+
     fn drilling(&mut self, node: Node<'m>) -> Drilling {
         let strategy = node.node("its_machining_strategy");
         let ratio = |a: &str| strategy.and_then(|s| s.real(a));
@@ -73,9 +83,6 @@ impl<'m> Reader<'m> {
         });
         let test = node.real("depth_of_testcut").filter(|d| *d > 0.0);
         let waiting = node.node("waiting_position").and_then(|p| self.point(p));
-        if node.keyword() == "THREAD_DRILLING" {
-            self.not_lowered(node, "");
-        }
         Drilling {
             depth: node.real("cutting_depth"),
             previous: node.real("previous_diameter").filter(|d| *d > 0.0 && d.is_finite()),
@@ -87,6 +94,7 @@ impl<'m> Reader<'m> {
             peck,
             stop_at_bottom: node.attr("spindle_stop_at_bottom").and_then(|v| v.boolean()).unwrap_or(false),
             test_cut: test.map(|d| (d, waiting)),
+            helical: node.attr("helical_movement_on_forward").and_then(|v| v.boolean()).unwrap_or(false),
             floating_chuck: node.attr("compensation_chuck").and_then(|v| v.boolean()).unwrap_or(false),
         }
     }
@@ -284,7 +292,100 @@ impl<'m> Reader<'m> {
 
     /// The pieces of an explicit tool path.
     pub fn toolpaths(&mut self, list: Node<'m>, tool: Option<&Tool>) -> Vec<Toolpath> {
-        list.nodes("its_list").into_iter().filter_map(|n| self.toolpath(n, tool)).collect()
+        let mut tied: Vec<(usize, Node<'m>)> = Vec::new();
+        let mut out = Vec::new();
+        for n in list.nodes("its_list") {
+            if let Some(path) = self.toolpath(n, tool) {
+                if n.is_a("approach_lift_path") {
+                    tied.push((out.len(), n));
+                }
+                out.push(path);
+            }
+        }
+        for (i, node) in tied {
+            let curve = |t: &Toolpath| match &t.path {
+                PathKind::Location { curve, .. } => Some(curve.clone()),
+                _ => None,
+            };
+            let next = out[i + 1..].iter().find_map(curve);
+            let before = out[..i].iter().rev().find_map(curve);
+            let way_in = match out[i].role.as_str() {
+                "APPROACH" => true,
+                "LIFT" => false,
+                _ => next.is_some() && before.is_none(),
+            };
+            let way = if way_in { next.and_then(|c| self.tied(node, &c)) } else { before.and_then(|c| self.tied(node, &c.reversed())).map(|c| c.reversed()) };
+            match way {
+                Some(curve) => out[i].path = PathKind::Location { curve, axis: None },
+                None => self.not_lowered(node, ": no way leads from its fix point onto the path beside it by its angle or radius"),
+            }
+        }
+        out
+    }
+
+    /// From the fix point of an approach to the beginning of a path: slanting at an angle to it, or on an arc tangent
+    /// to it, in the plane of the path's direction and the fix point.
+    fn tied(&mut self, node: Node<'m>, path: &Curve) -> Option<Curve> {
+        let fix = node.node("fix_point").and_then(|p| self.point(p))?;
+        if node.attr("fix_point_dir").is_some() {
+            self.no_effect(node, "fix_point_dir", "the tool keeps the direction that it has on the path");
+        }
+        let (start, along) = (path.start, path.tangent()?);
+        let aside = sub(fix, start);
+        let out = sub(aside, scale(along, dot(aside, along)));
+        let normal = unit(out).or_else(|| unit(sub([0.0, 0.0, 1.0], scale(along, along[2]))))?;
+        let at = |x: f64, y: f64| add(start, add(scale(along, x), scale(normal, y)));
+        if node.keyword() == "AP_LIFT_PATH_ANGLE" {
+            let angle = self.angle(node.real("angle")?);
+            let length = self.positive(node, "benddist", "the slanting way has a length")?;
+            let bend = at(-length * libm::cos(angle), length * libm::sin(angle));
+            return Some(Curve { start: fix, pieces: vec![Piece::Line(bend), Piece::Line(start)] });
+        }
+        let radius = self.positive(node, "radius", "an arc has one")?;
+        // In the plane: the circle stands on the origin, the path leaves along +x. From the fix point straight on to
+        // the circle, then round it counter-clockwise.
+        let (x, y) = (dot(aside, along), dot(aside, normal) - radius);
+        let far = libm::hypot(x, y);
+        if far < radius + 1e-9 || y + radius < 1e-9 {
+            return None;
+        }
+        let turn = libm::atan2(y, x) + libm::acos(radius / far);
+        let touch = at(radius * libm::cos(turn), radius + radius * libm::sin(turn));
+        let arc = Piece::Arc { center: at(0.0, radius), normal: cross(along, normal), end: start };
+        Some(Curve { start: fix, pieces: vec![Piece::Line(touch), arc] })
+    }
+
+    /// Positions of machine axes, one curve of one dimension for each axis.
+    fn axes(&mut self, node: Node<'m>, forward: bool) -> Option<PathKind> {
+        let names: Vec<String> = node.attr("axis_list")?.items().filter_map(|v| v.string().map(|s| s.trim().to_uppercase())).collect();
+        let curves = node.nodes("commands");
+        let index = |name: &String| ["X", "Y", "Z"].iter().position(|a| a == name);
+        let Some(which) = names.iter().map(index).collect::<Option<Vec<usize>>>().filter(|w| w.len() == curves.len() && !w.is_empty()) else {
+            self.not_lowered(node, ": of its axes only X, Y and Z are known, each with a command");
+            return None;
+        };
+        let mut rows: Vec<[Option<f64>; 3]> = Vec::new();
+        for (axis, curve) in which.into_iter().zip(curves) {
+            let Some(values) = (curve.keyword() == "POLYLINE").then(|| self.curve(curve, 0)).flatten().as_ref().and_then(corners) else {
+                self.not_lowered(node, ": a command that is no polyline");
+                return None;
+            };
+            if rows.is_empty() {
+                rows = vec![[None; 3]; values.len()];
+            }
+            if rows.len() != values.len() {
+                self.not_lowered(node, ": its axes have different numbers of positions");
+                return None;
+            }
+            for (row, value) in rows.iter_mut().zip(values) {
+                row[axis] = Some(value[0]);
+            }
+        }
+        self.say(code::PLAN_TAKES_TURNS, node, &[&super::title(node), "positions of its axes are taken as coordinates of the setup, as in G-code"]);
+        if !forward {
+            rows.reverse();
+        }
+        Some(PathKind::Axes(rows))
     }
 
     fn toolpath(&mut self, node: Node<'m>, tool: Option<&Tool>) -> Option<Toolpath> {
@@ -326,6 +427,12 @@ impl<'m> Reader<'m> {
                 let (curve, axis) = if forward { (curve, axis) } else { (curve.reversed(), axis.map(|a| a.reversed())) };
                 PathKind::Location { curve, axis }
             }
+            "AXIS_TRAJECTORY" => {
+                let forward = node.attr("its_direction").and_then(|v| v.boolean()).unwrap_or(true);
+                self.axes(node, forward)?
+            }
+            // Becomes a curve when its neighbours are known.
+            "AP_LIFT_PATH_ANGLE" | "AP_LIFT_PATH_TANGENT" => PathKind::Direct,
             "FEEDSTOP" => PathKind::Feedstop(node.real("dwell").filter(|d| *d >= 0.0 && d.is_finite()).unwrap_or(0.0)),
             "CONNECT_SECPLANE" => PathKind::BySecurityPlane,
             "CONNECT_DIRECT" => PathKind::Direct,
