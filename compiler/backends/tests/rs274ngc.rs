@@ -322,6 +322,9 @@ fn arcs_as_lines() {
 #[test]
 fn nothing_is_dropped_silently() {
     assert_eq!(errors("G21 G90\nM64 P1\nM2\n", Language::Grbl), [("emit/not-expressible", "M64 P1".to_string())]);
+    // However many hints come first.
+    let many = format!("G21 G90\n{}M64 P1\nM2\n", "(MSG, look)\nG4 P0.1\n".repeat(150));
+    assert_eq!(errors(&many, Language::Grbl).last(), Some(&("emit/not-expressible", "M64 P1".to_string())));
     assert_eq!(errors("G21 G90 F100\nG1 A10\nM2\n", Language::Grbl), [("emit/not-expressible", "G1 A10".to_string())]);
     assert_eq!(errors("G21 G90 M3 S100\nG33 Z-3 K1\nM2\n", Language::Grbl)[0].1, "G33 Z-3 K1");
     assert_eq!(errors("G21 G90 M3 S100\nG95 F1\nG1 X1\nM2\n", Language::Grbl)[0].1, "G1 X1");

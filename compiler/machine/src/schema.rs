@@ -90,10 +90,13 @@ const KINDS: &[KindRow] = &[
         joints: "PPPRRR",
         words: "six joints: three prismatic legs, three revolute wrist axes",
     },
-    KindRow { name: "dh", needs: &[], may: &["tip"], joints: "", words: "at least one joint, each with `dh`" },
-    KindRow { name: "mdh", needs: &[], may: &["tip"], joints: "", words: "at least one joint, each with `dh`" },
-    KindRow { name: "origins", needs: &[], may: &["tip"], joints: "", words: "at least one joint, each with `origin` and `axis`" },
+    KindRow { name: "dh", needs: &[], may: &["tip"], joints: "", words: "one to twelve joints, each with `dh`" },
+    KindRow { name: "mdh", needs: &[], may: &["tip"], joints: "", words: "one to twelve joints, each with `dh`" },
+    KindRow { name: "origins", needs: &[], may: &["tip"], joints: "", words: "one to twelve joints, each with `origin` and `axis`" },
 ];
+
+/// No machine has more joints, external axes included: what is planned has room for so many values in every point.
+pub const MOST_JOINTS: usize = 12;
 
 struct Check {
     file: FileId,
@@ -175,6 +178,10 @@ impl Check {
         let place = |key: &str| start.and_then(|s| s.array::<3>(key)).unwrap_or_default();
         let start_joints = start.and_then(|s| s.get("joints")).and_then(|given| self.joint_values(given, &joints, "start"));
         let cell = self.cell(raw, &joints);
+        if let Some(external) = raw.get("external").filter(|_| !cell.external.is_empty() && joints.len() + cell.external.len() > MOST_JOINTS) {
+            let what = format!("{} joints and {} external axes: together there can be at most {MOST_JOINTS}", joints.len(), cell.external.len());
+            self.value(&external.span, what);
+        }
         let mut machine = Machine {
             id: raw.string("id").unwrap_or_default(),
             title: raw.string("title").unwrap_or_default(),
@@ -279,7 +286,7 @@ impl Check {
         let kinds: String = joints.iter().map(|j| if j.kind == JointKind::Revolute { 'R' } else { 'P' }).collect();
         let fits = match row.name {
             "cartesian" => cartesian(joints),
-            _ if row.joints.is_empty() => !kinds.is_empty() && kinds.len() <= 32,
+            _ if row.joints.is_empty() => (1..=MOST_JOINTS).contains(&kinds.len()),
             _ => kinds == row.joints,
         };
         if !fits {
@@ -692,6 +699,18 @@ mod tests {
         assert!(faults(&format!("{cell}[[joint]]\nname = \"J1\"\nmin = 200\n"))[0].0 == "machine/bad-value");
         let two = crate::source("usp/2ups-prp").unwrap();
         assert_eq!(faults(&two.replace("2UPS+PRP\"\n\n", "3UPS+PRP\"\n\n").replace("structure = \"3UPS+PRP\"", "structure = \"2UPS+PR\""))[0].0, "machine/mobility");
+    }
+
+    #[test]
+    fn more_joints_than_have_room() {
+        let head = "format = 1\nid = \"shop/snake\"\ntitle = \"Snake\"\nkind = \"robot\"\n[kinematics]\nkind = \"dh\"\n";
+        let arm = |n: usize| (1..=n).fold(head.to_string(), |all, i| all + &format!("[[joint]]\nname = \"J{i}\"\ntype = \"revolute\"\ndh = [100, 0, 90, 0]\n"));
+        parse(FileId(0), &arm(12)).unwrap_or_else(|e| panic!("{e:?}"));
+        assert_eq!(faults(&arm(13))[0].0, "machine/joints");
+        let cell = |n: usize| (1..=n).fold("format = 1\nid = \"shop/cell\"\nextends = \"abb/irb2400\"\n".to_string(), |all, i| all + &format!("[[external]]\nname = \"E{i}\"\ntype = \"revolute\"\ncarries = \"part\"\n"));
+        parse(FileId(0), &cell(6)).unwrap_or_else(|e| panic!("{e:?}"));
+        let found = parse(FileId(0), &cell(7)).expect_err("too many");
+        assert!(found[0].message.contains("6 joints and 7 external axes"), "{found:?}");
     }
 
     #[test]

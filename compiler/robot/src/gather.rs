@@ -7,6 +7,7 @@ use gr_ir::{FeedMode, Note, Op, PathMode, Pose, Program, Source, Sources, State,
 use gr_machine::math::{Frame, M3, dot, euler, norm, product, rot_x, rot_z, rotation_vector, scale, sub, transpose};
 use gr_machine::{Chain, Control, Kind, Machine, Orientation, Rapid};
 use gr_text::{Code, Diagnostic, code};
+use std::collections::BTreeSet;
 use std::f64::consts::PI;
 
 use crate::cell::Cells;
@@ -68,32 +69,50 @@ pub(crate) struct Gathered {
 /// Collects findings, one per line and code.
 pub(crate) struct Findings<'a> {
     sources: &'a dyn Sources,
-    pub list: Vec<Diagnostic>,
-    seen: std::collections::BTreeSet<(Code, u32, u32)>,
+    list: gr_text::Findings,
+    seen: BTreeSet<(Code, u32, u32)>,
+    /// Words and tools that something was said about.
+    told: BTreeSet<(Code, String)>,
 }
 
-/// Findings told at most.
+/// Errors told at most, and as many warnings.
 const MOST: usize = 200;
 
 impl<'a> Findings<'a> {
     pub fn new(sources: &'a dyn Sources) -> Findings<'a> {
-        Findings { sources, list: Vec::new(), seen: std::collections::BTreeSet::new() }
+        Findings { sources, list: gr_text::Findings::new(MOST), seen: BTreeSet::new(), told: BTreeSet::new() }
     }
     pub fn say(&mut self, code: Code, source: Option<Source>, args: &[String]) {
         let source = source.unwrap_or_default();
-        if self.list.len() < MOST && self.seen.insert((code, source.file.0, source.line)) {
+        let key = (code, source.file.0, source.line);
+        if !self.seen.contains(&key) && self.list.admits(code) {
+            self.seen.insert(key);
             let (file, span) = self.sources.place(source);
-            self.list.push(Diagnostic::new(code, file, span, args));
+            self.list.add(Diagnostic::new(code, file, span, args));
         }
     }
     /// Once per program.
     pub fn once(&mut self, code: Code, source: Option<Source>, args: &[String]) {
-        if !self.list.iter().any(|d| d.code == code) {
+        if !self.list.has(code) {
+            self.say(code, source, args);
+        }
+    }
+    /// Once for each of its first argument.
+    pub fn once_each(&mut self, code: Code, source: Option<Source>, args: &[String]) {
+        let about = args.first().cloned().unwrap_or_default();
+        if self.told.insert((code, about)) {
             self.say(code, source, args);
         }
     }
     pub fn bad(&self) -> bool {
-        self.list.iter().any(|d| d.severity == gr_text::Severity::Error)
+        self.list.failed()
+    }
+    /// Errors so far.
+    pub fn errors(&self) -> usize {
+        self.list.errors()
+    }
+    pub fn take(&mut self) -> Vec<Diagnostic> {
+        std::mem::replace(&mut self.list, gr_text::Findings::new(MOST)).into_list()
     }
 }
 
@@ -171,7 +190,7 @@ impl<'a> Gather<'a> {
     pub fn run(&mut self, program: &Program) {
         let mut cursor = program.cursor();
         while let Some(view) = cursor.next() {
-            if self.ended || self.findings.list.len() >= MOST {
+            if self.ended || self.findings.list.full() {
                 break;
             }
             self.source = view.source;
@@ -258,10 +277,7 @@ impl<'a> Gather<'a> {
     /// Signals of a word, or what the operator must do.
     fn made(&mut self, made: crate::cell::Made) {
         if let Some(word) = made.by_hand {
-            let known = self.findings.list.iter().any(|d| d.code == code::ROBOT_BY_HAND && d.message.contains(&format!(" {word} ")));
-            if !known {
-                self.findings.say(code::ROBOT_BY_HAND, Some(self.source), &[word]);
-            }
+            self.findings.once_each(code::ROBOT_BY_HAND, Some(self.source), &[word]);
         }
         made.actions.into_iter().for_each(|a| self.act(a));
     }
@@ -386,10 +402,7 @@ impl<'a> Gather<'a> {
                 let table = t.frame.position[2];
                 if length != 0.0 && (length - table).abs() > 1e-3 {
                     let args = [number.to_string(), format!("{length:.3}"), format!("{table:.3}")];
-                    let told = self.findings.list.iter().any(|d| d.code == code::ROBOT_TOOL_LENGTH && d.message.contains(&format!("tool {number} ")));
-                    if !told {
-                        self.findings.say(code::ROBOT_TOOL_LENGTH, Some(self.source), &args);
-                    }
+                    self.findings.once_each(code::ROBOT_TOOL_LENGTH, Some(self.source), &args);
                 }
                 (t.name.clone(), nose.then(&t.frame), t.mass)
             }

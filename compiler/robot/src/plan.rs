@@ -22,7 +22,7 @@ pub fn plan(program: &Program, machine: &Machine, sources: &dyn Sources, options
     if let MachineChain::Incomplete { .. } = machine.chain {
         let why = machine.kinematics().forward(&[]).err().map_or(String::new(), |e| e.to_string());
         gather.findings.say(code::ROBOT_HOME, None, &[why]);
-        return Err(gather.findings.list);
+        return Err(gather.findings.take());
     }
     gather.run(program);
     let Gather { out: gathered, findings, .. } = gather;
@@ -72,14 +72,14 @@ impl Planner<'_> {
                 chosen = vec![self.chooser().cheapest(&chosen, &home)];
             }
         }
-        let (Some(home), false) = (home, self.findings.bad()) else { return Err(std::mem::take(&mut self.findings.list)) };
+        let (Some(home), false) = (home, self.findings.bad()) else { return Err(self.findings.take()) };
         let nodes: Vec<Node> = chosen.into_iter().next().unwrap_or_default();
         let emitted = Emit::new(self.machine, &self.solver, &self.limits, &self.speeds, &self.options.name).run(&mut self.g, &list, &nodes, &home, &mut self.findings);
         if self.findings.bad() {
-            return Err(std::mem::take(&mut self.findings.list));
+            return Err(self.findings.take());
         }
         let (program, summary) = emitted;
-        Ok(Planned { program, warnings: std::mem::take(&mut self.findings.list), summary })
+        Ok(Planned { program, warnings: self.findings.take(), summary })
     }
 
     fn chooser(&self) -> Chooser<'_> {
@@ -188,7 +188,7 @@ impl Planner<'_> {
     }
 
     fn full(&self) -> bool {
-        self.findings.list.len() >= 100
+        self.findings.errors() >= 100
     }
     fn next_move(&self, after: usize) -> Option<usize> {
         (after + 1..self.g.items.len()).find(|i| matches!(self.g.items[*i], Item::Move(_)))

@@ -5,7 +5,7 @@ use gr_machine::math::Frame;
 use gr_machine::{Machine, Signal};
 
 /// No machine here has more joints, external axes included.
-pub const MAX_JOINTS: usize = 12;
+pub const MAX_JOINTS: usize = gr_machine::MOST_JOINTS;
 
 /// A point of the path: where the tool is, and the joint values that put it there.
 #[derive(Clone, Copy, PartialEq, Debug)]

@@ -120,6 +120,21 @@ fn what_goes_wrong() {
     insta::assert_snapshot!("what_goes_wrong", out);
 }
 
+/// Errors have room of their own: however many warnings come first, no program goes out that has one.
+#[test]
+fn warnings_hide_no_error() {
+    let mut text = String::from("T1 M6\nG0 X0 Y0 Z20\n");
+    for i in 0..250 {
+        text += &format!("M{} P{}\n", 62 + i / 64, i % 64);
+    }
+    let warned = planned(&text, &cell()).unwrap_or_else(|e| panic!("{}", messages(&e, &text))).warnings;
+    assert_eq!(warned.iter().filter(|d| d.code == gr_text::code::ROBOT_BY_HAND).count(), 200);
+    assert_eq!(warned.last().unwrap().notes, ["not listed: 50 more warnings or hints"]);
+    text += "G1 X400 F900000\nM30\n";
+    let found = planned(&text, &cell()).expect_err("a joint is too fast");
+    assert!(found.iter().any(|d| d.code == gr_text::code::ROBOT_JOINT_SPEED), "{}", messages(&found, &text));
+}
+
 #[test]
 fn other_machines() {
     let mut out = String::new();

@@ -5,10 +5,12 @@
 
 mod decode;
 mod diagnostic;
+mod findings;
 mod lines;
 
 pub use decode::{Decoded, Encoding, decode};
 pub use diagnostic::{Diagnostic, Fix, Frame, Label};
+pub use findings::Findings;
 pub use gr_spec::{Code, Severity, code};
 pub use lines::LineIndex;
 

@@ -9,7 +9,7 @@ use gr_ir::{Source, Sources};
 use gr_machine::math::{about, add, cross, dot, norm, rotate, scale, sub};
 use gr_machine::{Chain, Kinematics, Machine, Signal};
 use gr_robot::{Action, MAX_JOINTS, RobotProgram, Target, Zone};
-use gr_text::{Code, Diagnostic, FileId, Span, code};
+use gr_text::{Code, Diagnostic, FileId, Findings, Span, code};
 use std::collections::BTreeSet;
 
 /// What a language has to write next.
@@ -113,8 +113,7 @@ pub(crate) struct Cx<'p> {
     sources: &'p dyn Sources,
     kinematics: Box<dyn Kinematics>,
     said: BTreeSet<(Code, String)>,
-    errors: usize,
-    out: Vec<Diagnostic>,
+    out: Findings,
 }
 
 /// Straight pieces of an arc stay this near to it, mm.
@@ -128,7 +127,7 @@ const FAR: f64 = 1e6;
 const MOST_PIECES: usize = 10_000;
 const MOST_FINDINGS: usize = 1000;
 
-/// Walks a program; false = nothing may be written.
+/// Walks a program. With an error among the findings nothing may be written.
 pub(crate) fn walk<'p>(
     program: &'p RobotProgram,
     sources: &'p dyn Sources,
@@ -153,13 +152,12 @@ pub(crate) fn walk<'p>(
         sources,
         kinematics: program.machine.kinematics(),
         said: BTreeSet::new(),
-        errors: 0,
-        out: Vec::new(),
+        out: Findings::new(MOST_FINDINGS),
     };
     if cx.fits() {
         cx.run(body);
     }
-    Output { files: Vec::new(), findings: cx.out }
+    Output { files: Vec::new(), findings: cx.out.into_list() }
 }
 
 impl<'p> Cx<'p> {
@@ -182,7 +180,7 @@ impl<'p> Cx<'p> {
         if !self.traits.unverified.is_empty() {
             self.unverified(self.traits.unverified);
         }
-        self.errors == 0
+        !self.failed()
     }
 
     fn run(&mut self, body: &mut dyn Body) {
@@ -207,7 +205,7 @@ impl<'p> Cx<'p> {
                 }
             }
             self.step(body, i, &step.action);
-            if matches!(step.action, Action::End) || self.errors >= MOST_FINDINGS {
+            if matches!(step.action, Action::End) || self.out.full() {
                 break;
             }
         }
@@ -448,10 +446,10 @@ impl<'p> Cx<'p> {
     pub fn say(&mut self, code: Code, args: &[String]) {
         let (file, span) = self.at.map_or((FileId(0), Span::default()), |s| self.sources.place(s));
         let finding = Diagnostic::new(code, file, span, args);
-        let error = finding.severity == gr_text::Severity::Error;
-        if self.out.len() < MOST_FINDINGS && self.said.insert((code, finding.message.clone())) {
-            self.errors += usize::from(error);
-            self.out.push(finding);
+        let key = (code, finding.message.clone());
+        if !self.said.contains(&key) && self.out.admits(code) {
+            self.said.insert(key);
+            self.out.add(finding);
         }
     }
 
@@ -551,7 +549,7 @@ impl<'p> Cx<'p> {
 
     /// Whether anything forbids writing.
     pub fn failed(&self) -> bool {
-        self.errors > 0
+        self.out.failed()
     }
 
     /// Decimals of positions, mm.

@@ -90,6 +90,23 @@ fn every_finding() {
     }
 }
 
+/// Errors have room of their own beside any number of warnings.
+#[test]
+fn warnings_hide_no_error() {
+    let (id, home, _) = robot_of("inform");
+    let mut b = Builder::new(machine(id), home);
+    for i in 0..3000 {
+        let shift = [if i % 2 == 0 { 1.0 } else { -1.0 }, 0.0, 0.0];
+        b.add(&Move::Line { shift, turn: [0.0; 3], speed: 10.0 + 0.0123 * f64::from(i), zone: None });
+    }
+    assert_eq!(run("inform", &b, true).findings.iter().find(|f| f.severity == Severity::Error), None);
+    b.add(&Move::Other(signal_of("M8", None, Signal::default())));
+    let output = run("inform", &b, true);
+    assert!(output.files.is_empty());
+    assert_eq!(output.findings.iter().filter(|f| f.severity != Severity::Error).count(), 1000);
+    assert!(output.findings.iter().any(|f| f.code.def().code == "E0622"));
+}
+
 #[test]
 fn damaged_programs_do_not_panic() {
     for target in TARGETS {

@@ -5,7 +5,7 @@ use super::{Emitted, Language, Options};
 use crate::sources::Words;
 use gr_ir::Sources;
 use gr_ir::{Axes, FeedMode, Note, Op, Plane, Program, Source, State, Stop, Turn, Units, View};
-use gr_text::{Code, Diagnostic, FileId, Severity, code};
+use gr_text::{Code, Diagnostic, FileId, Findings, code};
 
 /// Findings reported at most.
 const MOST_FAULTS: usize = 100;
@@ -18,10 +18,10 @@ pub fn emit(program: &Program, options: &Options, sources: &dyn Sources) -> Resu
     }
     let mut emitter = Emitter::new(program, options, sources);
     emitter.run(program);
-    if emitter.found.iter().any(|d| d.severity == Severity::Error) {
-        Err(emitter.found)
+    if emitter.found.failed() {
+        Err(emitter.found.into_list())
     } else {
-        Ok(Emitted { text: emitter.w.text, lines: emitter.w.lines, notes: emitter.found })
+        Ok(Emitted { text: emitter.w.text, lines: emitter.w.lines, notes: emitter.found.into_list() })
     }
 }
 
@@ -30,7 +30,7 @@ pub(super) struct Emitter<'a> {
     pub w: Writer,
     pub options: &'a Options,
     pub sources: &'a dyn Sources,
-    pub found: Vec<Diagnostic>,
+    pub found: Findings,
     /// Where the written program has the axes, in the frame of the moment.
     pub at: Axes,
     /// The axis was given by a word since the frame moved.
@@ -73,7 +73,7 @@ impl<'a> Emitter<'a> {
             w: Writer::new(options),
             options,
             sources,
-            found: Vec::new(),
+            found: Findings::new(MOST_FAULTS),
             at: program.start().axes,
             anchored: [false; 9],
             loose: [false; 9],
@@ -97,12 +97,11 @@ impl<'a> Emitter<'a> {
     }
 
     pub fn say(&mut self, code: Code, source: Source, args: &[String]) {
-        if self.last_fault == Some((source, code)) || self.found.len() >= MOST_FAULTS {
+        if self.last_fault.replace((source, code)) == Some((source, code)) || !self.found.admits(code) {
             return;
         }
-        self.last_fault = Some((source, code));
         let (file, span) = self.sources.place(source);
-        self.found.push(Diagnostic::new(code, file, span, args));
+        self.found.add(Diagnostic::new(code, file, span, args));
     }
 
     /// The language has no way to say it.
