@@ -52,6 +52,9 @@ pub enum Event {
     Refresh,
 }
 
+/// Of a text, what says its dialect: more than the first 200 lines of any program that people read.
+pub const HEAD: u32 = 65_536;
+
 /// Documents of this size are worth a progress report.
 const BIG: u32 = 4_000_000;
 
@@ -265,7 +268,7 @@ impl Analysis {
     /// The dialect may be declared in the first lines, and what the document is by its first characters.
     fn look_again(&mut self, uri: &lsp::Uri) {
         let Some(document) = self.documents.get_mut(uri) else { return };
-        let head = document.text.slice(Span::new(0, 4_096));
+        let head = document.text.slice(Span::new(0, HEAD));
         let config = matches!(document.kind, Kind::Config(_) | Kind::Other);
         let head = if config { document.text.to_string() } else { head };
         let new = kind_of(&document.path, &document.language, &head);
@@ -333,7 +336,7 @@ impl Analysis {
             document.stale = true;
             document.derived = Arc::default();
             if let Kind::Gcode(file, _) = document.kind {
-                let head = document.text.slice(Span::new(0, 4_096));
+                let head = document.text.slice(Span::new(0, HEAD));
                 let dialect = (document.station.dialect_of)(&document.path, &head);
                 document.kind = Kind::Gcode(file, dialect);
                 self.session.set_options(file, document.station.options(dialect));

@@ -28,7 +28,7 @@ pub struct TargetOptions {
     #[arg(long, value_enum, value_name = "UNIT")]
     pub units: Option<UnitArg>,
     /// Decimals of written numbers
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = crate::options::up_to::<15>)]
     pub decimals: Option<usize>,
     /// rs274ngc: how arcs are written
     #[arg(long, value_enum, value_name = "FORM")]

@@ -253,7 +253,7 @@ pub struct StyleArgs {
     #[arg(long)]
     pub no_spaces: bool,
     /// Blanks per level of nesting
-    #[arg(long, default_value_t = 2, value_name = "N")]
+    #[arg(long, default_value_t = 2, value_name = "N", value_parser = up_to::<32>)]
     pub indent: usize,
     /// Zeros in front of numbers
     #[arg(long, value_enum, default_value = "keep", value_name = "HOW")]
@@ -593,4 +593,9 @@ pub enum PlaceAim {
     Margin,
     /// Smallest error
     Error,
+}
+
+/// A number of at most `MOST`.
+pub fn up_to<const MOST: usize>(text: &str) -> Result<usize, String> {
+    text.parse().ok().filter(|n| *n <= MOST).ok_or_else(|| format!("a whole number from 0 to {MOST} is wanted"))
 }

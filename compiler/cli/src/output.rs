@@ -17,12 +17,18 @@ impl Pending {
             return Err(std::io::Error::new(std::io::ErrorKind::IsADirectory, "is a folder"));
         }
         let name = goal.file_name().ok_or_else(|| std::io::Error::other("is not a file name"))?;
-        let mut hidden = std::ffi::OsString::from(".");
-        hidden.push(name);
-        hidden.push(format!(".{}.part", std::process::id()));
-        let beside = goal.with_file_name(hidden);
-        let file = std::fs::File::create(&beside)?;
-        Ok(Pending { goal: goal.to_path_buf(), beside, file: Some(file) })
+        // Never a file that is there already: in a folder of everybody's it could lead elsewhere.
+        for n in 0..100 {
+            let mut hidden = std::ffi::OsString::from(".");
+            hidden.push(name);
+            hidden.push(format!(".{}.{n}.part", std::process::id()));
+            let beside = goal.with_file_name(hidden);
+            match std::fs::File::create_new(&beside) {
+                Err(e) if e.kind() == std::io::ErrorKind::AlreadyExists => {}
+                made => return Ok(Pending { goal: goal.to_path_buf(), beside, file: Some(made?) }),
+            }
+        }
+        Err(std::io::Error::other("its folder is full of unfinished files of ours (.part)"))
     }
     /// Copies what was written to standard output. A reader that went away (`| head`) is no error.
     pub fn to_stdout(self) -> std::io::Result<()> {

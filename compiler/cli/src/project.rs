@@ -122,36 +122,26 @@ impl Project {
         rule.map(|r| r.dialect.as_str()).or(self.file.project.dialect.as_deref())
     }
 
-    /// Files that patterns name, in order and each once.
-    pub fn files(&self, patterns: &[String]) -> Vec<PathBuf> {
-        let mut found = Vec::new();
+    /// Files that patterns name, in order and each once, and folders below that can't be read.
+    pub fn files(&self, patterns: &[String]) -> (Vec<PathBuf>, Vec<(PathBuf, std::io::Error)>) {
+        let (mut found, mut closed) = (Vec::new(), Vec::new());
+        let base = if self.folder.as_os_str().is_empty() { Path::new(".") } else { &self.folder };
+        let below = |path: &Path| path.strip_prefix(base).unwrap_or(path).to_path_buf();
         for pattern in patterns {
             if !pattern.contains(['*', '?']) {
                 found.push(self.folder.join(pattern));
                 continue;
             }
+            let wanted = |path: &Path| matches(pattern, &below(path).to_string_lossy().replace('\\', "/"));
             let mut all = Vec::new();
-            list(&self.folder, "", pattern, &mut all);
-            found.extend(all.into_iter().map(|name| self.folder.join(name)));
+            closed.extend(crate::sources::walk(base, &wanted, &mut all));
+            found.extend(all.iter().map(|path| self.folder.join(below(path))));
         }
         let mut seen = std::collections::BTreeSet::new();
         found.retain(|p| seen.insert(p.clone()));
-        found
-    }
-}
-
-fn list(folder: &Path, prefix: &str, pattern: &str, found: &mut Vec<String>) {
-    let Ok(entries) = std::fs::read_dir(folder) else { return };
-    let mut names: Vec<String> = entries.flatten().filter_map(|e| e.file_name().into_string().ok()).collect();
-    names.sort();
-    for name in names.iter().filter(|n| !n.starts_with('.')) {
-        let path = folder.join(name);
-        let full = format!("{prefix}{name}");
-        if path.is_dir() && !path.is_symlink() {
-            list(&path, &format!("{full}/"), pattern, found);
-        } else if matches(pattern, &full) {
-            found.push(full);
-        }
+        let mut told = std::collections::BTreeSet::new();
+        closed.retain(|(p, _)| told.insert(p.clone()));
+        (found, closed)
     }
 }
 

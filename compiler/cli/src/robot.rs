@@ -165,7 +165,7 @@ fn compensated(
 /// The machine of a goal, in a reference mode as its publication has it.
 fn machine(goal: &Goal<'_>) -> Result<Machine, String> {
     let machine = goal.machine.ok_or_else(|| format!("the target {} needs --machine; `gcc-robot machine list` shows the ids", goal.target))?;
-    Ok(if goal.options.reference.is_some() { as_published(machine) } else { machine.clone() })
+    Ok(if goal.options.reference.is_some() { gr_machine::as_published(machine) } else { machine.clone() })
 }
 
 fn robot(goal: &Goal<'_>) -> Result<Machine, String> {
@@ -174,11 +174,6 @@ fn robot(goal: &Goal<'_>) -> Result<Machine, String> {
         return Ok(machine);
     }
     Err(format!("the target {} is for robots; {} is none", goal.target, machine.id))
-}
-
-/// A machine with the model of its publication and the cell as it is.
-fn as_published(machine: &Machine) -> Machine {
-    gr_machine::reference(&machine.id).map_or_else(|| machine.clone(), |m| Machine { cell: machine.cell.clone(), ..m })
 }
 
 /// Whether `check --machine` asks the machine too.
@@ -355,7 +350,7 @@ pub fn verify(unit: &crate::pipeline::Unit, machine: &Machine, args: &crate::opt
 fn published(motion: &Motion, machine: &Machine) -> Result<gr_robot::verify::Report, String> {
     use gr_robot::reference::{Damped, follow, frames};
     use gr_robot::verify::{Point, Report};
-    let machine = as_published(machine);
+    let machine = gr_machine::as_published(machine);
     let mut points = Vec::new();
     let mut sources = Vec::new();
     let mut cursor = motion.program.cursor();

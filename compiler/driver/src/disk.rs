@@ -59,8 +59,9 @@ impl Disk {
         }
         let text = gr_text::decode(std::fs::read(path).ok()?).text;
         let file = Arc::new(file_of(&name, &text, CHUNK, dialect));
+        // Another query may have read the file meanwhile.
         let mut files = self.lock();
-        let at = known.unwrap_or(files.len());
+        let at = files.iter().position(|k| *k.path == *name).unwrap_or(files.len());
         let entry = Known { path: (*name).into(), contents: Some(file.clone()) };
         if at == files.len() {
             files.push(entry);

@@ -6,6 +6,18 @@ use gr_spec::{Rs274, code, rs274};
 
 use crate::{Fault, Interp, Res};
 
+/// The highest order of a spline that is worked out, as in the motion IR. The real controller names no limit; programs
+/// have orders of 3 to 6.
+const MAX_ORDER: u32 = 64;
+
+fn check_order(order: u32) -> Res {
+    if order > MAX_ORDER {
+        let what = format!("the order of this spline, {order}, is over {MAX_ORDER}");
+        return Err(Fault::own(code::RUN_ENDLESS).arg(what));
+    }
+    Ok(())
+}
+
 fn words(text: Rs274, why: &str) -> Box<Fault> {
     Fault::new(code::SPLINE_WORDS, text).arg(why)
 }
@@ -154,6 +166,7 @@ impl<S: Sink> Interp<'_, S> {
             self.queue.spline.points.push([self.m.current[one], self.m.current[two], first]);
         }
         if let Some(order) = self.block.get(b'l').filter(|l| *l > 3.0) {
+            check_order(order as u32)?;
             self.queue.spline.order = order as u32;
         }
         if x {
@@ -177,7 +190,9 @@ impl<S: Sink> Interp<'_, S> {
         }
         self.check_knotted(begun)?;
         if let Some(p) = self.block.get(b'p').filter(|p| *p != -1.0) {
-            self.queue.spline.order = crate::eval::to_int(p).max(0) as u32;
+            let order = crate::eval::to_int(p).max(0) as u32;
+            check_order(order)?;
+            self.queue.spline.order = order;
         }
         let [one, two] = self.spline_axes();
         let both = self.block.has(b"xyz"[one]) && self.block.has(b"xyz"[two]);

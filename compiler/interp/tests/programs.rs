@@ -196,6 +196,13 @@ fn endless_programs_end() {
 }
 
 #[test]
+fn the_order_of_a_spline_has_a_limit() {
+    let text = "F100\nG5.2 P1 L65 X1 Y1\nG5.3\nM2\n";
+    let (_, outcome) = run_with(&setup(), text, 2);
+    assert_eq!((outcome.end, outcome.findings[0].fault.code), (End::Fault, code::RUN_ENDLESS));
+}
+
+#[test]
 fn file_subroutines_and_remaps() {
     let mut setup = setup();
     setup.ini.values.insert(("rs274ngc".into(), "remap".into()), vec!["M400 modalgroup=10 argspec=Pq ngc=foo".into()]);

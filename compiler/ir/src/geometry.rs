@@ -182,12 +182,15 @@ pub fn knotted_point(order: u32, points: &[f64], knots: &[f64], share: f64) -> O
     de_boor(k, points, span, t, |i| knots[i])
 }
 
+/// The highest order (degree + 1) of a spline that is evaluated; the interpreter refuses programs that ask for more.
+pub const MAX_ORDER: usize = 64;
+
 /// The point at parameter `t`, which lies in the span that the points from `span` on shape.
 fn de_boor(k: usize, points: &[[f64; 3]], span: usize, t: f64, knot: impl Fn(usize) -> f64) -> Option<[f64; 2]> {
-    if k == 0 || k > 16 {
+    if k == 0 || k > MAX_ORDER {
         return None;
     }
-    let mut d = [[0.0; 3]; 16];
+    let mut d = [[0.0; 3]; MAX_ORDER];
     for (j, slot) in d.iter_mut().enumerate().take(k) {
         let [x, y, w] = *points.get(span + j)?;
         *slot = [x * w, y * w, w];
@@ -210,7 +213,7 @@ fn nurbs_pieces(points: &[f64], tolerance: f64) -> usize {
     // A curve of length L bent by at most its polygon: chords of √(8·tolerance·L) keep the tolerance for
     // radii from L up; four times as many cover sharper bends.
     let chord = libm::sqrt(8.0 * tolerance.max(1e-9) * polygon.max(1e-9)) / 4.0;
-    let pieces = libm::ceil(polygon / chord).clamp(points.len() as f64 * 4.0, MAX_PIECES);
+    let pieces = libm::ceil(polygon / chord).max(points.len() as f64 * 4.0).min(MAX_PIECES);
     (pieces as usize).max(4)
 }
 

@@ -53,7 +53,7 @@ pub use five_axis::{Carrier, FiveAxis, Rotary};
 pub use identify::{Fit, identify};
 pub use keys::json_schema;
 pub use kinematics::{Control, Kinematics, KinematicsError, Pose, Solution, Violation};
-pub use library::{builtin, is_path, list, reference, source, suggestion};
+pub use library::{as_published, builtin, is_path, list, reference, source, suggestion};
 pub use mobility::{Mobility, mobility};
 pub use opw::{Eight, Opw};
 pub use parameters::{Parameter, ParameterKind, parameter_columns};

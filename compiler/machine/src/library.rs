@@ -24,6 +24,11 @@ pub fn reference(id: &str) -> Option<Machine> {
     source(id).and_then(|text| parse_reference(FileId(0), text).ok())
 }
 
+/// A machine with the model of its publication, where there is one, and its cell as it is.
+pub fn as_published(machine: &Machine) -> Machine {
+    reference(&machine.id).map_or_else(|| machine.clone(), |m| Machine { cell: machine.cell.clone(), ..m })
+}
+
 /// The id that a misspelt one most likely means.
 pub fn suggestion(id: &str) -> Option<&'static str> {
     crate::keys::suggestion(id, &list().collect::<Vec<_>>())

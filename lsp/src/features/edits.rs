@@ -77,13 +77,12 @@ fn fixes(view: &View, at: Span) -> Answer<Vec<lsp::CodeAction>> {
 fn allow(view: &View, d: &Diagnostic) -> Option<lsp::CodeAction> {
     let path = view.station.files.iter().find(|p| p.file_name().is_some_and(|n| n == "gcc-robot.toml"))?;
     let open = view.others.iter().find(|o| o.path == *path);
-    let text = open.map_or_else(|| std::fs::read_to_string(path).unwrap_or_default(), |o| o.text.to_string());
-    let slug = d.code.def().slug;
-    let (at, new) = match (text.find("[lints]"), text.find("allow = [")) {
-        (Some(_), Some(list)) => (list + "allow = [".len(), format!("\"{slug}\", ")),
-        (Some(section), None) => (section + "[lints]".len(), format!("\nallow = [\"{slug}\"]")),
-        (None, _) => (text.len(), format!("\n[lints]\nallow = [\"{slug}\"]\n")),
+    let text = match open {
+        Some(o) => o.text.to_string(),
+        None => std::fs::read_to_string(path).ok()?,
     };
+    let slug = d.code.def().slug;
+    let (at, new) = allowed(&text, slug);
     let place = crate::text::Text::new(&text).range(Span::new(at as u32, at as u32), view.columns);
     let mut changes = HashMap::new();
     changes.insert(lsp::Uri::from_file_path(path)?, vec![lsp::TextEdit { range: place, new_text: new }]);
@@ -93,6 +92,31 @@ fn allow(view: &View, d: &Diagnostic) -> Option<lsp::CodeAction> {
         edit: Some(lsp::WorkspaceEdit { changes: Some(changes), ..lsp::WorkspaceEdit::default() }),
         ..lsp::CodeAction::default()
     })
+}
+
+/// Where a project file gets one more lint to allow, and what is written there.
+fn allowed(text: &str, slug: &str) -> (usize, String) {
+    let (mut at, mut section, mut inside) = (0, None, false);
+    for line in text.split_inclusive('\n') {
+        let (start, bare) = (at, line.trim());
+        at += line.len();
+        if bare.starts_with('[') {
+            inside = bare.split('#').next().is_some_and(|t| t.trim() == "[lints]");
+            if inside {
+                section = Some(start + line.trim_end().len());
+            }
+        } else if let (true, Some(rest)) = (inside, bare.strip_prefix("allow"))
+            && let Some(list) = rest.trim_start().strip_prefix('=').and_then(|v| v.trim_start().strip_prefix('['))
+        {
+            let first = start + line.trim_end().len() - list.len();
+            let comma = if list.trim_start().starts_with(']') { "" } else { ", " };
+            return (first, format!("\"{slug}\"{comma}"));
+        }
+    }
+    match section {
+        Some(end) => (end, format!("\nallow = [\"{slug}\"]")),
+        None => (text.len(), format!("\n[lints]\nallow = [\"{slug}\"]\n")),
+    }
 }
 
 fn gcode_actions(view: &mut View, at: Span) -> Answer<Vec<Action>> {
@@ -137,13 +161,12 @@ fn expand_call(view: &View, doc: gcode::Doc<'_>, line: u32, before: &gr_interp::
     let first = words.iter().find(|w| w.form != gr_gcode::Form::Comment && w.letter != b'n')?;
     let last = words.iter().rfind(|w| w.form != gr_gcode::Form::Comment)?;
     let span = Span::new(of.tight(first).start, of.tight(last).end);
-    let text = write_moves(&moves, before);
+    let text = write_moves(&moves, before)?;
     let title = format!("Write out this call of {}", names::label_text(&call.label));
     Some(Action { title, kind: ActionKind::Inline, edits: vec![Edit { span, text }] })
 }
 
-/// The operations of the first call from a line of the main file; none when there are too many, or more than motion
-/// and modes.
+/// The operations of the first call from a line of the main file; none when there are too many.
 fn called_from(program: &Program, line: u32) -> Option<Program> {
     const MOST: usize = 5_000;
     let calls = program.frames.iter().find(|f| f.file == FileId(0) && f.line == line && f.pass == 0)?.id;
@@ -189,5 +212,22 @@ pub fn refusal(f: &Failure) -> String {
     match f {
         Failure::Overtaken => "the text changed meanwhile".into(),
         Failure::Refused(why) => why.clone(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::allowed;
+
+    #[test]
+    fn a_lint_is_allowed_in_its_list() {
+        let written = |text: &str| {
+            let (at, new) = allowed(text, "a/b");
+            format!("{}{new}{}", &text[..at], &text[at..])
+        };
+        assert_eq!(written("x = 1\n"), "x = 1\n\n[lints]\nallow = [\"a/b\"]\n");
+        assert_eq!(written("[lints] # all\n# allow = [\"x\"]\n"), "[lints] # all\nallow = [\"a/b\"]\n# allow = [\"x\"]\n");
+        assert_eq!(written("[lints]\nallow = []\n"), "[lints]\nallow = [\"a/b\"]\n");
+        assert_eq!(written("[a]\nallow = [\"q\"]\n[lints]\nallow=[ \"x\" ] # so\n"), "[a]\nallow = [\"q\"]\n[lints]\nallow=[\"a/b\",  \"x\" ] # so\n");
     }
 }

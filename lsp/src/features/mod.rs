@@ -100,7 +100,7 @@ fn of_machine(view: &View, found: &[Diagnostic], file: FileId, dialect: &'static
 /// A `.gcode` file of which nobody says what control it is for: mostly a printer's. Its spelling alone is looked at.
 fn undeclared(view: &View) -> bool {
     let printer = view.path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gcode"));
-    printer && view.host.undeclared(&view.path, &view.text.slice(Span::new(0, 4_096)), &view.settings)
+    printer && view.host.undeclared(&view.path, &view.text.slice(Span::new(0, crate::analysis::HEAD)), &view.settings)
 }
 
 fn syntax_only(tables: &gr_gcode::File, file: FileId, _dialect: &gr_spec::Dialect) -> Vec<Diagnostic> {

@@ -32,7 +32,7 @@ pub fn triple(text: &str) -> Option<[f64; 3]> {
 /// The machine of a publication, where it is asked for.
 pub fn referenced(machine: Machine, reference: Option<AccuracyReference>) -> Machine {
     match reference {
-        Some(AccuracyReference::Usp2009) => gr_machine::reference(&machine.id).unwrap_or(machine),
+        Some(AccuracyReference::Usp2009) => gr_machine::as_published(&machine),
         None => machine,
     }
 }

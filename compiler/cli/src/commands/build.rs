@@ -170,8 +170,11 @@ impl<'a> Round<'a> {
             options.reference = options.reference.or(project.file.project.reference);
             options.reference_config = options.reference_config.map(|p| project.path_of(&p));
             let patterns = if row.sources.is_empty() { &project.file.project.sources } else { &row.sources };
-            let sources = project.files(patterns);
-            if sources.is_empty() {
+            let (sources, closed) = project.files(patterns);
+            if !closed.is_empty() {
+                super::unreadable(&closed, &mut self.sources, &mut self.renderer);
+                self.fail(Exit::Io);
+            } else if sources.is_empty() {
                 let name = project.path.display().to_string();
                 complain(&mut self.renderer, &mut self.sources, &name, code::PROJECT_NOTHING_TO_DO, std::slice::from_ref(&name));
                 self.fail(Exit::Findings);
@@ -231,6 +234,10 @@ impl<'a> Round<'a> {
         }
         self.files.extend(built.subs.iter().cloned());
         let Some(goal) = &job.goal else {
+            let others: Vec<String> = built.artifacts.iter().skip(1).map(|a| a.name.clone().unwrap_or_else(|| format!("*{}", a.suffix))).collect();
+            if !others.is_empty() && !self.global.quiet {
+                eprintln!("only the first file is shown; -o FILE writes {} too", others.join(", "));
+            }
             if let Some(main) = built.artifacts.into_iter().next() {
                 self.results.push((PathBuf::from("-"), main.bytes));
             }

@@ -14,7 +14,7 @@ use crate::options::{CheckArgs, Global};
 use crate::progress::Progress;
 use crate::render::Renderer;
 use crate::setup::{Station, is_program, station};
-use crate::sources::{Sources, read, reason, walk};
+use crate::sources::{Sources, read, walk};
 
 /// What came of one file.
 pub struct Checked {
@@ -96,8 +96,11 @@ fn programs(
     let mut exit = Exit::Ok;
     if paths.is_empty() {
         let project = station.project.as_ref()?;
-        let files = project.files(&project.file.project.sources);
-        if files.is_empty() {
+        let (files, closed) = project.files(&project.file.project.sources);
+        if !closed.is_empty() {
+            super::unreadable(&closed, sources, renderer);
+            exit = Exit::Io;
+        } else if files.is_empty() {
             nothing(project.path.display().to_string(), sources, renderer);
         }
         return Some((files, exit));
@@ -110,12 +113,10 @@ fn programs(
         }
         let before = files.len();
         let closed = walk(path, &is_program(station.dialect), &mut files);
-        for (at, e) in &closed {
-            let name = at.display().to_string();
-            super::complain(renderer, sources, &name, code::FILE_UNREADABLE, &[name.clone(), reason(e)]);
+        if !closed.is_empty() {
+            super::unreadable(&closed, sources, renderer);
             exit = Exit::Io;
-        }
-        if closed.is_empty() && files.len() == before {
+        } else if files.len() == before {
             nothing(path.display().to_string(), sources, renderer);
         }
     }

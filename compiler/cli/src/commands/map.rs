@@ -38,7 +38,7 @@ pub fn run(global: &Global, args: &MapArgs) -> Exit {
     };
     let budget = Budget::new(&machine, BudgetOptions { grade: args.grade, usp2009: args.reference.is_some() });
     let made = if args.quantity == "sensitivity" {
-        Ok(bars(&machine, plane, args))
+        bars(&machine, plane, args)
     } else {
         area(global, args, &machine, plane, &budget)
     };
@@ -167,7 +167,7 @@ fn told(map: &Map, machine: &Machine) -> String {
     out
 }
 
-fn bars(machine: &Machine, plane: Plane, args: &MapArgs) -> Made {
+fn bars(machine: &Machine, plane: Plane, args: &MapArgs) -> Result<Made, Refused> {
     let probe = Probe::downward(machine);
     let side = (args.resolution as usize).min(120);
     let all = map::mean_sensitivity(&probe, plane, (side, side));
@@ -186,8 +186,7 @@ fn bars(machine: &Machine, plane: Plane, args: &MapArgs) -> Made {
         }
         out
     };
-    let files = files(&args.output, &picture, csv).unwrap_or_default();
-    (text, files)
+    Ok((text, files(&args.output, &picture, csv)?))
 }
 
 fn files(goals: &[PathBuf], picture: &Picture, csv: impl Fn() -> String) -> Result<Vec<(PathBuf, Vec<u8>)>, Refused> {

@@ -46,6 +46,14 @@ pub fn complain(renderer: &mut Renderer, sources: &mut Sources, name: &str, code
     renderer.show(sources, &about_file(code, file, args));
 }
 
+/// Tells which folders can't be read.
+pub fn unreadable(closed: &[(std::path::PathBuf, std::io::Error)], sources: &mut Sources, renderer: &mut Renderer) {
+    for (at, e) in closed {
+        let name = at.display().to_string();
+        complain(renderer, sources, &name, gr_text::code::FILE_UNREADABLE, &[name.clone(), crate::sources::reason(e)]);
+    }
+}
+
 /// Shows one finding and ends the log.
 pub fn refuse(global: &Global, name: &Path, code: Code, args: &[String]) -> Exit {
     let mut renderer = global.renderer(false);

@@ -100,12 +100,19 @@ fn path(program: &gr_ir::Program) -> Vec<[f64; 3]> {
     out
 }
 
+/// mm.
+const MOST_HEIGHT: f64 = 100_000.0;
+
 fn largest(global: &Global, args: &PlaceArgs, machine: &Machine) -> Exit {
     let ends: Option<Vec<f64>> = args.heights.split(',').map(|t| t.trim().parse().ok().filter(|v: &f64| v.is_finite())).collect();
     let Some(ends) = ends.filter(|e| e.len() == 1 || e.len() == 2) else {
         let why = "one height, or the lowest and the highest: -240,240".to_string();
         return super::refuse(global, Path::new("place"), code::ACCURACY_BAD_OPTION, &["--heights".to_string(), why]);
     };
+    if ends.iter().any(|z| z.abs() > MOST_HEIGHT) {
+        let why = format!("heights beyond {MOST_HEIGHT} mm are out of every machine's reach");
+        return super::refuse(global, Path::new("place"), code::ACCURACY_BAD_OPTION, &["--heights".to_string(), why]);
+    }
     let (low, high) = (ends[0], *ends.last().unwrap_or(&ends[0]));
     let layers = ((high - low).abs() / 20.0).ceil() as usize;
     let heights: Vec<f64> = (0..=layers).map(|i| low + (high - low) * i as f64 / layers.max(1) as f64).collect();

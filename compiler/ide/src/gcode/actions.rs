@@ -87,7 +87,7 @@ fn expand(line: &LineOf<'_>, before: &Modal, after: &Modal, program: &Program) -
     }
     let title = format!("Write out this {}", code_name(b'g', f64::from(after.motion) / 10.0));
     // The next block of plain axis words would go on with the last motion, not with the cycle.
-    let text = format!("{}\n(the cycle ends here: write G80 or the next motion code)", write_moves(program, before));
+    let text = format!("{}\n(the cycle ends here: write G80 or the next motion code)", write_moves(program, before)?);
     let words = line.words();
     let first = words.iter().find(|w| w.form != Form::Comment && !(w.letter == b'n'))?;
     let last = words.iter().rfind(|w| w.form != Form::Comment)?;
@@ -118,18 +118,23 @@ pub fn write_out_compensation(doc: Doc<'_>, lines: std::ops::Range<u32>, ran: &[
         let Some(first) = words.iter().find(|w| w.form != Form::Comment && w.letter != b'n') else { continue };
         let last = words.iter().rfind(|w| w.form != Form::Comment)?;
         let (_, before, program) = ran.iter().find(|r| r.0 == line.line)?;
-        let text = write_moves(program, before);
+        let text = write_moves(program, before)?;
         edits.push(Edit { span: Span::new(line.tight(first).start, line.tight(last).end), text });
     }
     Some(Action { title: "Write out this contour without compensation".into(), kind: ActionKind::Inline, edits })
 }
 
-/// Moves as plain G0 G1 G2 G3 in absolute distance, the mode before put back.
-pub fn write_moves(program: &Program, before: &Modal) -> String {
+/// Moves as plain G0 G1 G2 G3 G4 in absolute distance, the mode before put back. None where the program does more than
+/// these can say, or where F is not a feed per minute.
+pub fn write_moves(program: &Program, before: &Modal) -> Option<String> {
+    if before.feed_mode != 0 {
+        return None;
+    }
     let scale = if before.units() == Units::Inch { 25.4 } else { 1.0 };
     let places = if before.units() == Units::Inch { 5 } else { 4 };
     let mut lines: Vec<String> = Vec::new();
     let mut code = "";
+    let mut told_feed = before.feed;
     if before.incremental != 0 {
         lines.push("G90".into());
     }
@@ -144,25 +149,35 @@ pub fn write_moves(program: &Program, before: &Modal) -> String {
             Op::Rapid => ("G0", axes(&view.start.axes, &view.end.axes, false)),
             Op::Linear => ("G1", axes(&view.start.axes, &view.end.axes, false)),
             Op::Arc(arc) => {
+                if view.state.plane != before.plane() || matches!(arc.plane, gr_ir::ArcPlane::Free(_)) {
+                    return None;
+                }
                 let shape = ArcShape::new(&arc, view.start, view.end);
                 let start = view.start.xyz();
                 let (first, second, _) = gr_ir::plane_axes(before.plane());
                 let base = |i: usize| if before.ijk_absolute != 0 { 0.0 } else { start[i] };
                 let word = |i: usize| format!(" {}{}", ['I', 'J', 'K'][i.min(2)], number((shape.center[i] - base(i)) / scale, places));
                 let new = if arc.turns > 0 { "G3" } else { "G2" };
-                (new, format!("{}{}{}", axes(&view.start.axes, &view.end.axes, false), word(first), word(second)))
+                let turns = if arc.turns.abs() > 1 { format!(" P{}", arc.turns.abs()) } else { String::new() };
+                (new, format!("{}{}{}{turns}", axes(&view.start.axes, &view.end.axes, false), word(first), word(second)))
             }
             Op::Dwell(s) => {
                 lines.push(format!("G4 P{}", number(s, 3)));
                 continue;
             }
-            _ => continue,
+            Op::Begin { .. } | Op::Close(_) | Op::Finish | Op::Feed { .. } | Op::FeedReferenceXyz => continue,
+            Op::Note(gr_ir::Note::Comment, _) => continue,
+            Op::Units(units) if units == before.units() => continue,
+            Op::Plane(plane) if plane == before.plane() => continue,
+            _ => return None,
         };
         if words.is_empty() {
             continue;
         }
-        let feed = if view.op.feeds() && code != new && code != "G1" && code != "G2" && code != "G3" {
-            format!(" F{}", number(view.state.feed * 60.0 / scale, 3))
+        let now = view.state.feed * 60.0 / scale;
+        let feed = if view.op.feeds() && (now - told_feed).abs() > 1e-9 * now.abs() {
+            told_feed = now;
+            format!(" F{}", number(now, 4))
         } else {
             String::new()
         };
@@ -172,7 +187,7 @@ pub fn write_moves(program: &Program, before: &Modal) -> String {
     if before.incremental != 0 {
         lines.push("G91".into());
     }
-    lines.join("\n")
+    Some(lines.join("\n"))
 }
 
 /// Adds what a program leaves out at its end.
