@@ -47,6 +47,8 @@ pub(crate) trait Db: salsa::Database {
     fn count(&self, what: Counted);
     /// Files found along the search path.
     fn disk(&self) -> &crate::disk::Disk;
+    /// Where chunks begin at present.
+    fn present(&self) -> &crate::layout::Present;
 }
 
 /// The database.
@@ -56,6 +58,7 @@ pub(crate) struct Database {
     storage: salsa::Storage<Self>,
     counters: Arc<Counters>,
     disk: Arc<crate::disk::Disk>,
+    present: Arc<crate::layout::Present>,
 }
 
 #[salsa::db]
@@ -68,6 +71,9 @@ impl Db for Database {
     }
     fn disk(&self) -> &crate::disk::Disk {
         &self.disk
+    }
+    fn present(&self) -> &crate::layout::Present {
+        &self.present
     }
 }
 

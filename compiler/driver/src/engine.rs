@@ -5,13 +5,14 @@ use std::sync::Arc;
 
 use gr_canon::{At, Call, CallFrame, Discard, FileId, FrameId, Mark, Sink};
 use gr_gcode::{Chunk, File, Form, LineKind};
-use gr_interp::{Carry, Files, Finding, Interp, Modal, Params, State, run_lines};
+use gr_interp::{Files, Finding, Interp, Modal, Params, State, run_lines};
 use gr_spec::code;
 
 use crate::Options;
-use crate::db::{Db, Document};
-use crate::layout::{Layout, chunk_of, first_percent};
-use crate::library::Library;
+use crate::carried::Carried;
+use crate::db::{ChunkText, Db, Document};
+use crate::layout::{Layout, first_percent};
+use crate::library::{Came, Library};
 use crate::lints::{Flags, Found, From, Lints, Seen, Summary, Where, left_on};
 
 /// State between two chunks: the interpreter's, and what lints remember.
@@ -264,13 +265,15 @@ pub(crate) fn of_finding(f: &Finding, options: &Options) -> Option<Found> {
     })
 }
 
-/// What a stretch with control flow gave.
+/// What a stretch with control flow gave. Lines are those of the file when it was run.
 pub(crate) struct FlowOutcome {
     pub(crate) boundary: Boundary,
     pub(crate) environment: Environment,
-    pub(crate) carry: Carry,
+    pub(crate) carried: Carried,
     /// The first line behind it; none = the program ended.
     pub(crate) next: Option<u32>,
+    /// The chunks that execution came to.
+    pub(crate) came: Box<[Came]>,
     pub(crate) found: Vec<Found>,
     pub(crate) frames: Vec<(FrameId, CallFrame)>,
     pub(crate) summary: Summary,
@@ -284,17 +287,19 @@ pub(crate) struct FlowOutcome {
 pub(crate) struct Stretch<'a> {
     pub(crate) db: &'a dyn Db,
     pub(crate) document: Document,
-    /// First line.
-    pub(crate) line: u32,
+    /// It begins with this chunk.
+    pub(crate) chunk: ChunkText,
     pub(crate) entry: &'a Boundary,
     pub(crate) env: &'a Environment,
-    pub(crate) carry: &'a Carry,
+    pub(crate) carried: &'a Carried,
 }
 
 impl<'a> Stretch<'a> {
     /// The files it may need.
     pub(crate) fn library(&self) -> Library<'a> {
-        Library::new(self.db, self.document, self.carry.files())
+        let chunks = self.carried.chunks().chain([self.chunk]);
+        let starts = self.db.present().get(self.document.id(self.db));
+        Library::knowing(self.db, self.document, starts, chunks, self.carried.files())
     }
     /// State before it.
     pub(crate) fn modal(&self) -> &'a Modal {
@@ -308,13 +313,16 @@ impl<'a> Stretch<'a> {
         let main = FileId(self.document.id(self.db));
         let percent = self.entry.modal().percent != 0;
         let shift = if percent { first_percent(self.db, self.document).unwrap_or(0) } else { 0 };
+        let starts = library.starts();
+        let line = starts.of(self.chunk).unwrap_or(0);
+        let carry = self.carried.at(main, starts);
         let mut state = (*self.entry.state).clone();
         // From lines of the chunk to lines of the file.
-        state.queue.count_lines_from(self.line.wrapping_neg());
+        state.queue.count_lines_from(line.wrapping_neg());
         state.queue.move_to(main);
-        let from = if self.entry.opening { self.line.max(shift + 1) } else { self.line };
+        let from = if self.entry.opening { line.max(shift + 1) } else { line };
         let setup = &self.document.run(self.db).options(self.db).setup;
-        let before = (state, self.env.params.clone(), self.carry);
+        let before = (state, self.env.params.clone(), &carry);
         Interp::carry_on(library, setup, sink, before, main, (from, shift as i32))
     }
 }
@@ -351,16 +359,19 @@ impl<S: Sink> Sink for Watch<'_, S> {
 
 /// Runs the program on until it is outside of calls and loops at the start of a chunk again, or to its end.
 pub(crate) fn flow(stretch: &Stretch<'_>) -> FlowOutcome {
-    let Stretch { db, document, line, entry, .. } = *stretch;
+    let Stretch { db, document, chunk, entry, .. } = *stretch;
     let options: &Options = document.run(db).options(db);
     let main = FileId(document.id(db));
     let mut library = stretch.library();
+    let starts = library.starts().clone();
+    let line = starts.of(chunk).unwrap_or(0);
     let watch = Watch { inner: entry.lints(options), db, frames: Vec::new(), calls: 0 };
     let mut interp = stretch.resume(&mut library, watch);
-    let starts_chunk = |l: u32| l > line && chunk_of(db, document, l).is_some_and(|(_, first)| first == l);
-    let why = interp.run_until(&starts_chunk);
+    // Behind a chunk that was run, or at the start of one that was: nothing that salsa need know.
+    let why = interp.run_until(&|l| l > line && starts.begins(l));
     let next = if why.is_none() { Some(interp.next_line()) } else { None };
-    let (mut state, environment, carry) = (interp.state(), Environment { params: interp.params().clone() }, interp.carry());
+    let (mut state, environment) = (interp.state(), Environment { params: interp.params().clone() });
+    let carried = Carried::of(interp.carry(), main, &starts);
     let main_line = interp.main_line();
     let mut findings = interp.take_findings();
     let others: Vec<FileId> = interp.opened_files().iter().copied().filter(|f| *f != main).collect();
@@ -381,7 +392,9 @@ pub(crate) fn flow(stretch: &Stretch<'_>) -> FlowOutcome {
     let boundary = Boundary::behind(state, &lints, false, next.unwrap_or(0));
     found.extend(lints.found);
     let frames = needed(frames, &found);
-    FlowOutcome { boundary, environment, carry, next, found, frames, summary: lints.summary, end, unclosed }
+    let summary = lints.summary;
+    let came = library.came_to();
+    FlowOutcome { boundary, environment, carried, next, came, found, frames, summary, end, unclosed }
 }
 
 /// The frames that findings were made in, and those around them.

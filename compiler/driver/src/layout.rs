@@ -1,10 +1,15 @@
 //! What the chunks of a file are to each other: where each begins, where control flow may go on, how the file as a
 //! whole is built. Made anew when the shape of a chunk changes; what stretches with control flow ask of it
-//! ([`chunk_of`], [`next_stop`]) is remembered one by one, so that they are run again only when their own answers
+//! ([`follows`], [`next_stop`]) is remembered one by one, so that they are run again only when their own answers
 //! change.
+
+use std::collections::BTreeMap;
+use std::ops::Deref;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use gr_canon::FileId;
 use gr_gcode::LineKind;
+use rustc_hash::FxHashMap;
 
 use crate::db::{ChunkText, Db, Document, Outline, Shape, shape};
 use crate::engine;
@@ -25,8 +30,8 @@ pub(crate) struct Part {
 #[derive(Clone, PartialEq, Debug, Default)]
 pub(crate) struct Layout {
     pub(crate) parts: Box<[Part]>,
-    /// First line of each chunk, and after the last one their number.
-    pub(crate) starts: Box<[u32]>,
+    /// Where the chunks begin.
+    pub(crate) starts: Arc<Starts>,
     /// Lines that skipping must look at.
     stops: Box<[u32]>,
     /// Lines with M2 or M30.
@@ -43,6 +48,69 @@ pub(crate) struct Layout {
     pub(crate) labels: Box<[Found]>,
     /// The file begins with a subroutine.
     pub(crate) only_subs: bool,
+}
+
+/// First line of each chunk, and after the last one the number of lines.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Starts {
+    lines: Box<[u32]>,
+    chunks: Box<[ChunkText]>,
+    index: FxHashMap<ChunkText, u32>,
+}
+
+impl PartialEq for Starts {
+    fn eq(&self, other: &Starts) -> bool {
+        self.lines == other.lines && self.chunks == other.chunks
+    }
+}
+
+impl Deref for Starts {
+    type Target = [u32];
+    fn deref(&self) -> &[u32] {
+        &self.lines
+    }
+}
+
+impl Starts {
+    fn new(lines: Vec<u32>, chunks: &[ChunkText]) -> Starts {
+        Starts { lines: lines.into(), chunks: chunks.into(), index: chunks.iter().zip(0..).map(|(c, i)| (*c, i)).collect() }
+    }
+    /// Number of a chunk.
+    pub(crate) fn index_of(&self, chunk: ChunkText) -> Option<usize> {
+        self.index.get(&chunk).map(|i| *i as usize)
+    }
+    /// First line of a chunk.
+    pub(crate) fn of(&self, chunk: ChunkText) -> Option<u32> {
+        self.lines.get(self.index_of(chunk)?).copied()
+    }
+    /// The chunk that holds a line, and its first line.
+    pub(crate) fn holding(&self, line: u32) -> Option<(ChunkText, u32)> {
+        if line >= *self.lines.last()? {
+            return None;
+        }
+        let at = self.lines.partition_point(|s| *s <= line).checked_sub(1)?;
+        Some((*self.chunks.get(at)?, self.lines[at]))
+    }
+    /// A chunk begins on this line, or the file ends before it.
+    pub(crate) fn begins(&self, line: u32) -> bool {
+        self.lines.binary_search(&line).is_ok()
+    }
+}
+
+/// Where the chunks of each file begin at present, beside salsa: for runs whose results move with their lines, so
+/// that a line more above must not make them run again. [`layout`] writes it; who reads it has asked for the layout
+/// before, or is asked by someone who has.
+#[derive(Default, Debug)]
+pub(crate) struct Present(Mutex<BTreeMap<u32, Arc<Starts>>>);
+
+impl Present {
+    fn set(&self, document: u32, starts: Arc<Starts>) {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).insert(document, starts);
+    }
+    /// Of a file.
+    pub(crate) fn get(&self, document: u32) -> Arc<Starts> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).get(&document).cloned().unwrap_or_default()
+    }
 }
 
 /// The layout of a file.
@@ -73,9 +141,11 @@ pub(crate) fn layout(db: &dyn Db, document: Document) -> Layout {
     let mut labels = Vec::new();
     crate::lints::labels(&shapes, &starts, options, &mut labels);
     labels.iter_mut().for_each(|f| f.place.file = main);
+    let starts = Arc::new(Starts::new(starts, chunks));
+    db.present().set(main.0, starts.clone());
     Layout {
         parts: parts.into(),
-        starts: starts.into(),
+        starts,
         stops: stops.into(),
         ends: ends.into(),
         percent: percent.unwrap_or(false),
@@ -100,22 +170,27 @@ pub(crate) fn bytes(db: &dyn Db, document: Document) -> Vec<u32> {
     starts
 }
 
-/// The chunk that holds a line.
+/// The chunk behind a chunk.
 #[salsa::tracked(returns(copy))]
-pub(crate) fn chunk_of(db: &dyn Db, document: Document, line: u32) -> Option<(ChunkText, u32)> {
+pub(crate) fn follows(db: &dyn Db, document: Document, chunk: ChunkText) -> Option<ChunkText> {
     let layout = layout(db, document);
-    if line >= *layout.starts.last()? {
-        return None;
-    }
-    let at = layout.parts.partition_point(|p| p.first_line <= line).checked_sub(1)?;
-    layout.parts.get(at).map(|p| (p.chunk, p.first_line))
+    layout.parts.get(layout.starts.index_of(chunk)? + 1).map(|p| p.chunk)
 }
 
-/// The first line from `line` on that skipping must look at; `u32::MAX` past the last one.
+/// First line of a chunk.
 #[salsa::tracked(returns(copy))]
-pub(crate) fn next_stop(db: &dyn Db, document: Document, line: u32) -> u32 {
-    let stops = &layout(db, document).stops;
-    stops.get(stops.partition_point(|l| *l < line)).copied().unwrap_or(u32::MAX)
+pub(crate) fn first_line(db: &dyn Db, document: Document, chunk: ChunkText) -> Option<u32> {
+    layout(db, document).starts.of(chunk)
+}
+
+/// The first line behind a chunk that skipping must look at: its chunk, and its line there.
+#[salsa::tracked(returns(copy))]
+pub(crate) fn next_stop(db: &dyn Db, document: Document, chunk: ChunkText) -> Option<(ChunkText, u32)> {
+    let Layout { starts, stops, .. } = layout(db, document);
+    let behind = *starts.get(starts.index_of(chunk)? + 1)?;
+    let line = *stops.get(stops.partition_point(|l| *l < behind))?;
+    let (chunk, first_line) = starts.holding(line)?;
+    Some((chunk, line - first_line))
 }
 
 /// Line of the first `%`.

@@ -5,6 +5,7 @@
 //! are remembered by chunk and entry state. Whatever the chunk size and the order of edits, the answers are
 //! those of a fresh session over the same text.
 
+mod carried;
 mod check;
 mod db;
 mod disk;

@@ -9,18 +9,28 @@ use std::sync::Arc;
 use gr_canon::FileId;
 use gr_gcode::{Chunk, File};
 use gr_interp::Files;
+use rustc_hash::FxHashSet;
 
 use crate::Options;
-use crate::db::{Db, Document, OpenFiles, RunOptions, scanned};
-use crate::layout::{chunk_of, next_stop};
+use crate::db::{ChunkText, Db, Document, OpenFiles, RunOptions, scanned};
+use crate::layout::{Starts, first_line, follows, layout, next_stop};
 
 /// The files a run may need: the main one, and others as they are called.
+///
+/// Lines are those of the file at present. The results of a run move with their lines, so it may look up where a chunk
+/// begins beside salsa; what salsa must know is which chunks the run came to and how it got there.
 pub(crate) struct Library<'a> {
     db: &'a dyn Db,
     document: Document,
     run: RunOptions,
     options: &'a Options,
     main: FileId,
+    starts: Arc<Starts>,
+    /// Chunks that the run came to by themselves, wherever they stand: its first one, those of labels, those that
+    /// skipping led to.
+    granted: RefCell<FxHashSet<ChunkText>>,
+    /// Remapped codes can tell the program its own line.
+    remaps: bool,
     visited: RefCell<BTreeMap<u32, Visited>>,
     /// The main file as a whole, for what can't be told from its chunks.
     whole: OnceCell<Arc<File>>,
@@ -30,34 +40,78 @@ pub(crate) struct Library<'a> {
 
 /// A chunk of the main file that execution came to.
 struct Visited {
+    input: ChunkText,
     chunk: Chunk,
+    /// What follows the chunk was asked for.
+    left: bool,
     /// Lines of the file in it that skipping must look at.
     stops: Vec<u32>,
 }
 
+impl Visited {
+    fn lines(&self) -> u32 {
+        self.chunk.scan.lines.len() as u32
+    }
+}
+
+/// A chunk that a run came to, where it was then.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) struct Came {
+    pub(crate) chunk: ChunkText,
+    /// First line.
+    pub(crate) first: u32,
+    /// Lines.
+    pub(crate) lines: u32,
+}
+
 impl<'a> Library<'a> {
-    /// Files of a document. `known` were opened before.
-    pub(crate) fn new(db: &'a dyn Db, document: Document, known: impl Iterator<Item = FileId>) -> Library<'a> {
+    /// Files of a document whose chunks begin at `starts`.
+    pub(crate) fn new(db: &'a dyn Db, document: Document, starts: Arc<Starts>) -> Library<'a> {
         let run = document.run(db);
-        let main = FileId(document.id(db));
         let options: &Options = run.options(db);
-        let mut library = Library {
+        Library {
             db,
             document,
             run,
             options,
-            main,
+            main: FileId(document.id(db)),
+            starts,
+            granted: RefCell::default(),
+            remaps: !options.setup.ini.all("rs274ngc", "remap").is_empty(),
             visited: RefCell::default(),
             whole: OnceCell::new(),
             subs: Vec::new(),
             empty: File::default(),
-        };
-        for id in known.filter(|id| *id != main) {
-            if let Some(file) = sub_file(db, run, id) {
+        }
+    }
+
+    /// Files of a document for a run that knows some chunks and files already.
+    pub(crate) fn knowing(
+        db: &'a dyn Db,
+        document: Document,
+        starts: Arc<Starts>,
+        chunks: impl Iterator<Item = ChunkText>,
+        files: impl Iterator<Item = FileId>,
+    ) -> Library<'a> {
+        let mut library = Library::new(db, document, starts);
+        library.granted.get_mut().extend(chunks);
+        let main = library.main;
+        for id in files.filter(|id| *id != main) {
+            if let Some(file) = sub_file(db, library.run, id) {
                 library.keep(id, file);
             }
         }
         library
+    }
+
+    /// Where the main file's chunks begin.
+    pub(crate) fn starts(&self) -> &Arc<Starts> {
+        &self.starts
+    }
+
+    /// The chunks of the main file that the run came to, in the order of their lines.
+    pub(crate) fn came_to(&self) -> Box<[Came]> {
+        self.visited.borrow().iter().map(|(first, v)| Came { chunk: v.input, first: *first, lines: v.lines() }).collect()
     }
 
     fn keep(&mut self, id: FileId, file: Arc<File>) {
@@ -69,22 +123,59 @@ impl<'a> Library<'a> {
     /// Calls `f` with the chunk of the main file that holds a line, and with its first line.
     fn visit<T>(&self, line: u32, f: impl FnOnce(&Visited, u32) -> T) -> Option<T> {
         let mut visited = self.visited.borrow_mut();
+        let behind = self.leave(&mut visited, line);
         let known = |visited: &BTreeMap<u32, Visited>| {
             let (first, v) = visited.range(..=line).next_back()?;
-            (line - first < v.chunk.scan.lines.len() as u32).then_some(*first)
+            (line - first < v.lines()).then_some(*first)
         };
         let first = match known(&visited) {
             Some(first) => first,
             None => {
-                let (input, first) = chunk_of(self.db, self.document, line)?;
-                let scan = scanned(self.db, input, self.run);
-                let stops = (0..scan.lines.len() as u32).filter(|l| gr_interp::is_stop(&scan, *l)).map(|l| l + first).collect();
-                let chunk = Chunk { text: input.text(self.db).clone(), scan };
-                visited.insert(first, Visited { chunk, stops });
+                let (input, first) = match behind {
+                    Some(next) => (next?, line),
+                    None => self.holding(line)?,
+                };
+                visited.insert(first, self.read(input, first));
                 first
             }
         };
         visited.get(&first).map(|v| f(v, first))
+    }
+
+    /// When a line is the first one behind a chunk that the run came to: what follows that chunk. The outer `None`: it
+    /// is not, or was asked before.
+    #[expect(clippy::option_option, reason = "nothing follows and not behind a chunk are two things")]
+    fn leave(&self, visited: &mut BTreeMap<u32, Visited>, line: u32) -> Option<Option<ChunkText>> {
+        let (first, before) = visited.range_mut(..line).next_back()?;
+        if before.left || line - first != before.lines() {
+            return None;
+        }
+        before.left = true;
+        Some(follows(self.db, self.document, before.input))
+    }
+
+    /// The chunk that holds a line, and its first line.
+    fn holding(&self, line: u32) -> Option<(ChunkText, u32)> {
+        let known = self.starts.holding(line).filter(|(chunk, _)| self.granted.borrow().contains(chunk));
+        // A jump to a line as such: now it matters where the chunks begin.
+        known.or_else(|| layout(self.db, self.document).starts.holding(line))
+    }
+
+    fn read(&self, input: ChunkText, first: u32) -> Visited {
+        let scan = scanned(self.db, input, self.run);
+        if self.remaps || scan.names.iter().any(|n| &**n == "_line") {
+            // Its lines are more to the program than places.
+            let _ = first_line(self.db, self.document, input);
+        }
+        let stops = (0..scan.lines.len() as u32).filter(|l| gr_interp::is_stop(&scan, *l)).map(|l| l + first).collect();
+        Visited { input, chunk: Chunk { text: input.text(self.db).clone(), scan }, left: false, stops }
+    }
+
+    /// The first line behind a chunk that skipping must look at.
+    fn next_stop(&self, chunk: ChunkText) -> u32 {
+        let Some((chunk, line)) = next_stop(self.db, self.document, chunk) else { return u32::MAX };
+        self.granted.borrow_mut().insert(chunk);
+        self.starts.of(chunk).map_or(u32::MAX, |first| first + line)
     }
 }
 
@@ -119,13 +210,13 @@ impl Files for Library<'_> {
         if id != self.main {
             return None;
         }
-        let here = self.visit(line, |v, first| {
+        let here = self.visit(line, |v, _| {
             let at = v.stops.partition_point(|l| *l < line);
-            v.stops.get(at).copied().ok_or(first + v.chunk.scan.lines.len() as u32)
+            v.stops.get(at).copied().ok_or(v.input)
         });
         Some(match here {
             Some(Ok(stop)) => stop,
-            Some(Err(behind)) => next_stop(self.db, self.document, behind),
+            Some(Err(chunk)) => self.next_stop(chunk),
             None => u32::MAX,
         })
     }

@@ -9,6 +9,7 @@ use gr_ir::measure::{Rates, Report, report};
 use gr_ir::{Lowering, Program};
 
 use crate::db::{Db, Document};
+use crate::layout::layout;
 use crate::library::Library;
 
 /// What a file adds up to, as far as it runs.
@@ -27,7 +28,7 @@ pub(crate) fn motion(db: &dyn Db, document: Document) -> Arc<Program> {
     if let Some(program) = crate::ufmg::motion(db, document) {
         return Arc::new(program);
     }
-    let mut library = Library::new(db, document, std::iter::empty());
+    let mut library = Library::new(db, document, layout(db, document).starts.clone());
     let mut interp = Interp::new(&mut library, setup, Watch { lowering: Lowering::new(), db, calls: 0 });
     interp.init();
     let main = FileId(document.id(db));

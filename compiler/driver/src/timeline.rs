@@ -3,18 +3,19 @@
 //! A chunk without control flow is interpreted on its own ([`step`]), and the result is remembered for the
 //! chunk, the state it is entered in and, if it touches them, the parameters. From a chunk with control flow on the
 //! program is run ([`flow`]) until it is outside of calls and loops at the start of a chunk again; that is remembered
-//! for the line, the state, the parameters and what control flow has left behind, and depends on the chunks that
-//! execution came to. Most edits leave the state after the chunk as it was, and then nothing below is done again.
+//! for the chunk, the state, the parameters and what control flow has left behind, and depends on the chunks that
+//! execution came to, not on where they stand. Most edits leave the state after the chunk as it was, and then nothing below is done again.
 
 use std::sync::Arc;
 
 use gr_canon::{CallFrame, FileId, FrameId};
-use gr_interp::Carry;
 use gr_spec::{Severity, code};
 
+use crate::carried::{Carried, Moved};
 use crate::db::{ChunkText, Counted, Db, Document, RunOptions, scanned};
 use crate::engine::{self, Boundary, End, Environment, Stretch};
 use crate::layout::{Layout, Part, layout};
+use crate::library::Came;
 use crate::lints::{Cuts, Found, From, Summary, Where};
 
 /// State between two chunks.
@@ -35,7 +36,7 @@ pub(crate) struct Env<'db> {
 #[salsa::interned(debug)]
 pub(crate) struct Labels<'db> {
     #[returns(ref)]
-    pub(crate) carry: Carry,
+    pub(crate) carried: Carried,
 }
 
 /// What interpreting a chunk gives.
@@ -81,7 +82,7 @@ pub(crate) fn step<'db>(
 /// What running a stretch with control flow gives.
 #[derive(Clone, PartialEq, Debug, salsa::SalsaValue)]
 pub(crate) struct Flow<'db> {
-    /// Lines relative to their files.
+    /// Lines, here and below, are those of the file when it was run: see [`Moved`].
     #[salsa_value(unsafe(prove(Arc<[Found]>: 'static)))]
     pub(crate) found: Arc<[Found]>,
     /// The call tree that the findings point into.
@@ -95,6 +96,9 @@ pub(crate) struct Flow<'db> {
     pub(crate) exit: Known<'db>,
     /// First line behind it, which begins a chunk; none = the program ended.
     pub(crate) next: Option<u32>,
+    /// The chunks that execution came to.
+    #[salsa_value(unsafe(prove(Box<[Came]>: 'static)))]
+    pub(crate) came: Box<[Came]>,
     /// What is opened and never closed in the other files that were opened.
     #[salsa_value(unsafe(prove(Box<[(FileId, Vec<Found>)]>: 'static)))]
     pub(crate) unclosed: Box<[(FileId, Vec<Found>)]>,
@@ -103,13 +107,21 @@ pub(crate) struct Flow<'db> {
 /// A call tree.
 pub(crate) type Frames = Arc<[(FrameId, CallFrame)]>;
 
-/// Runs the program from a line that begins a chunk until it is at rest at the start of another one.
+/// Runs the program from a chunk on until it is at rest at the start of another one. Only for those who have asked for
+/// the layout: where the chunks begin at present is not the query's business.
 #[salsa::tracked(returns(ref), no_eq)]
-pub(crate) fn flow<'db>(db: &'db dyn Db, document: Document, line: u32, entry: Entry<'db>, env: Env<'db>, labels: Labels<'db>) -> Flow<'db> {
+fn flow<'db>(
+    db: &'db dyn Db,
+    document: Document,
+    chunk: ChunkText,
+    entry: Entry<'db>,
+    env: Env<'db>,
+    labels: Labels<'db>,
+) -> Flow<'db> {
     db.count(Counted::Flow);
     // Subroutine files are read again when they may have changed.
     let _ = document.run(db).disk_revision(db);
-    let outcome = engine::flow(&Known { entry, env, labels }.stretch(db, document, line));
+    let outcome = engine::flow(&Known { entry, env, labels }.stretch(db, document, chunk));
     Flow {
         found: outcome.found.into(),
         frames: outcome.frames.into(),
@@ -118,9 +130,10 @@ pub(crate) fn flow<'db>(db: &'db dyn Db, document: Document, line: u32, entry: E
         exit: Known {
             entry: Entry::new(db, outcome.boundary),
             env: Env::new(db, outcome.environment),
-            labels: Labels::new(db, outcome.carry),
+            labels: Labels::new(db, outcome.carried),
         },
         next: outcome.next,
+        came: outcome.came,
         unclosed: outcome.unclosed.into(),
     }
 }
@@ -135,8 +148,9 @@ pub(crate) struct Known<'db> {
 
 impl<'db> Known<'db> {
     /// A run that goes on from here.
-    pub(crate) fn stretch(self, db: &'db dyn Db, document: Document, line: u32) -> Stretch<'db> {
-        Stretch { db, document, line, entry: self.entry.boundary(db), env: self.env.environment(db), carry: self.labels.carry(db) }
+    fn stretch(self, db: &'db dyn Db, document: Document, chunk: ChunkText) -> Stretch<'db> {
+        let (env, carried) = (self.env.environment(db), self.labels.carried(db));
+        Stretch { db, document, chunk, entry: self.entry.boundary(db), env, carried }
     }
 }
 
@@ -144,7 +158,7 @@ impl<'db> Known<'db> {
 #[salsa::tracked(returns(copy))]
 fn start(db: &dyn Db, run: RunOptions, percent: bool) -> Known<'_> {
     let (boundary, environment) = engine::start(run.options(db), percent);
-    Known { entry: Entry::new(db, boundary), env: Env::new(db, environment), labels: Labels::new(db, Carry::default()) }
+    Known { entry: Entry::new(db, boundary), env: Env::new(db, environment), labels: Labels::new(db, Carried::default()) }
 }
 
 /// A stretch of findings whose lines count from `first_line`.
@@ -186,7 +200,7 @@ pub(crate) fn timeline_to<'db>(db: &'db dyn Db, document: Document, line: u32) -
 /// The run that goes on from the nearest known state before a chunk.
 pub(crate) fn nearest<'db>(db: &'db dyn Db, document: Document, timeline: &Timeline<'db>, chunk: usize) -> Option<Stretch<'db>> {
     let (at, known) = timeline.entries.get(..=chunk)?.iter().enumerate().rev().find_map(|(i, k)| Some((i, (*k)?)))?;
-    Some(known.stretch(db, document, *layout(db, document).starts.get(at)?))
+    Some(known.stretch(db, document, layout(db, document).parts.get(at)?.chunk))
 }
 
 /// What is carried along for lints that compare distant parts.
@@ -321,7 +335,7 @@ fn fold<'db>(db: &'db dyn Db, document: Document, last_line: u32) -> Timeline<'d
     while at < parts.len() && fold.end.is_none() && parts[at].first_line <= last_line {
         fold.entries[at] = Some(fold.known);
         if parts[at].control {
-            let next = fold.flow(db, document, parts[at].first_line);
+            let next = fold.flow(db, document, layout, &parts[at]);
             at = next.map_or(parts.len(), |line| parts.partition_point(|p| p.first_line < line));
         } else {
             fold.step(db, document, &parts[at]);
@@ -387,9 +401,7 @@ impl<'db> Fold<'db> {
             self.spoken += step.found.len();
             self.groups.push(Group { first_line, found: step.found.clone(), frames: None });
             if step.found.iter().any(|f| f.from == From::Fault) {
-                let mut carry = labels.carry(db).clone();
-                carry.forget_labels();
-                labels = Labels::new(db, carry);
+                labels = Labels::new(db, labels.carried(db).without_labels());
             }
         }
         self.end = step.end.map(|e| e.shifted(first_line));
@@ -397,21 +409,26 @@ impl<'db> Fold<'db> {
     }
 
     /// Adds a stretch with control flow; returns the first line behind it.
-    fn flow(&mut self, db: &'db dyn Db, document: Document, line: u32) -> Option<u32> {
+    fn flow(&mut self, db: &'db dyn Db, document: Document, layout: &Layout, part: &Part) -> Option<u32> {
         let Known { entry, env, labels } = self.known;
-        let flow = flow(db, document, line, entry, env, labels);
-        self.late.take(&flow.summary, None, &document.run(db).options(db).rules);
+        let flow = flow(db, document, part.chunk, entry, env, labels);
+        let moved = Moved::new(&flow.came, &layout.starts, FileId(document.id(db)), part.chunk);
+        let moved = moved.as_ref();
+        let summary = moved.map(|m| m.summary(&flow.summary));
+        self.late.take(summary.as_ref().unwrap_or(&flow.summary), None, &document.run(db).options(db).rules);
         if !flow.found.is_empty() {
             self.spoken += flow.found.len();
-            self.groups.push(Group { first_line: 0, found: flow.found.clone(), frames: Some(flow.frames.clone()) });
+            let found = moved.map_or_else(|| flow.found.clone(), |m| m.found(&flow.found).into());
+            let frames = moved.map_or_else(|| flow.frames.clone(), |m| m.frames(&flow.frames).into());
+            self.groups.push(Group { first_line: 0, found, frames: Some(frames) });
         }
         for (file, found) in &flow.unclosed {
             if !self.others.iter().any(|(f, _)| f == file) {
                 self.others.push((*file, found.clone()));
             }
         }
-        self.end = flow.end;
+        self.end = flow.end.map(|end| moved.map_or(end, |m| m.end(end)));
         self.known = flow.exit;
-        flow.next
+        flow.next.map(|line| moved.map_or(line, |m| m.behind(line)))
     }
 }

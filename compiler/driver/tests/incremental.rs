@@ -128,6 +128,7 @@ fn structured() -> impl Strategy<Value = String> {
         1 => (301u32..304, body.clone()).prop_map(|(n, b)| format!("o{n} while [1]\n{b}o401 if [1]\no{n} break\no401 endif\no{n} endwhile\n")),
         1 => (501u32..503, 0u32..3).prop_map(|(n, l)| format!("M98 P{n} L{l}\n")),
         1 => Just("G1 X#<_value> Y#<_call_level>\n".to_string()),
+        1 => Just("G1 X[#<_line> MOD 3] F[#<_line> MOD 2]\n".to_string()),
         1 => Just("#<_global>=3\n".to_string()),
         1 => Just("G1 Z#<_global>\n".to_string()),
         1 => Just("G41.1 D1\nG1 X20 Y5\n".to_string()),
@@ -337,6 +338,46 @@ fn a_line_behind_a_call_leaves_the_call_alone() {
     let after = session.executed();
     assert_eq!(after.flows, before.flows);
     assert!(after.steps - before.steps <= 1);
+}
+
+/// A subroutine at the top and a call of it in every tenth line.
+fn calls_everywhere(lines: usize) -> String {
+    let block = |i: usize| if i % 10 == 9 { "o100 call\n".to_string() } else { format!("G1 X{}.5 Y{}\n", i % 97, i % 89) };
+    format!("G21 G90 G17\nS1000 M3\nF100\no100 sub\nG1 Z-1\no100 endsub\n{}M5\nM2\n", (0..lines).map(block).collect::<String>())
+}
+
+#[test]
+fn a_line_above_calls_leaves_them_alone() {
+    let mut text = calls_everywhere(4000);
+    let mut session = Session::new();
+    let file = session.open("part.ngc", &text, options(100));
+    assert_eq!(session.check(file).diagnostics, vec![]);
+    for at in [text.len() / 2, text.len() / 4, text.len() / 3] {
+        let at = at + text[at..].find('\n').unwrap() + 1;
+        for (old, new) in [("", "(one more line)\n"), ("(one more line)\n", "")] {
+            let before = session.executed();
+            text.replace_range(at..at + old.len(), new);
+            session.edit(file, at as u32..(at + old.len()) as u32, new);
+            assert_eq!(session.check(file), scratch(&text, 256));
+            assert!(session.executed().flows - before.flows <= 1);
+        }
+    }
+}
+
+#[test]
+fn findings_and_ways_below_move_with_their_lines() {
+    // The fault is in a subroutine at the top; its way leads over a call far below.
+    let mut text = calls_everywhere(1000).replace("G1 Z-1\n", "G1 Z-1\n#1=[1/[#2-1]]\n").replace("M5\n", "#2=1\no100 call [0] [1]\nM5\n");
+    let mut session = Session::new();
+    let file = session.open("part.ngc", &text, options(50));
+    let found = session.check(file).diagnostics;
+    assert_eq!(found.len(), 1, "{found:?}");
+    for at in [text.len() / 2, 0] {
+        let at = text[at..].find('\n').unwrap() + at + 1;
+        text.insert_str(at, "(one more line)\n");
+        session.edit(file, at as u32..at as u32, "(one more line)\n");
+        assert_eq!(session.check(file), scratch(&text, 256));
+    }
 }
 
 #[test]

@@ -10,7 +10,8 @@ use crate::{End, Files, Interp, Params, Setup, State};
 /// The label table and what goes with it, as plain data.
 #[derive(Clone, PartialEq, Eq, Hash, Debug, Default)]
 pub struct Carry {
-    /// In the order of their scopes and names.
+    /// In the order of their scopes and names. The controller's line number counts from the label's line, so that
+    /// moving the label moves both.
     labels: Vec<(u32, Box<str>, Box<str>, Offset)>,
     /// An `if` ran, a loop is being left by `break` or `continue`, the last call gave a value, a call has come back, an
     /// error inside a call was met.
@@ -30,6 +31,10 @@ impl Carry {
     pub fn files(&self) -> impl Iterator<Item = FileId> {
         self.labels.iter().map(|l| l.3.file())
     }
+    /// Lines of the labels in a file: for those who count lines from elsewhere than the file's start.
+    pub fn lines_mut(&mut self, file: FileId) -> impl Iterator<Item = &mut u32> {
+        self.labels.iter_mut().filter(move |l| l.3.file() == file).map(|l| l.3.line_mut())
+    }
 }
 
 impl<'a, S: Sink> Interp<'a, S> {
@@ -48,7 +53,7 @@ impl<'a, S: Sink> Interp<'a, S> {
             // The two scopes that are no subroutine keep their numbers.
             let scope = if scope_name.is_empty() { *scope } else { run.symbols.of(scope_name) };
             let name = run.symbols.of(name);
-            run.offsets.insert(Label { scope, name }, *at);
+            run.offsets.insert(Label { scope, name }, at.absolute());
         }
         [run.executed_if, run.doing_break, run.doing_continue, run.value_returned, run.came_back, run.main_unnamed] =
             carry.switches;
@@ -65,7 +70,7 @@ impl<'a, S: Sink> Interp<'a, S> {
             .map(|(label, at)| {
                 let scope = if label.is_subroutine_scope() { self.symbols.name(label.scope) } else { "" };
                 let fixed = if scope.is_empty() { label.scope } else { 0 };
-                (fixed, Box::from(scope), Box::from(self.symbols.name(label.name)), *at)
+                (fixed, Box::from(scope), Box::from(self.symbols.name(label.name)), at.relative())
             })
             .collect();
         labels.sort_by(|a, b| (a.0, &a.1, &a.2).cmp(&(b.0, &b.1, &b.2)));

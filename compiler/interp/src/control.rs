@@ -89,6 +89,17 @@ impl Offset {
     pub fn file(&self) -> FileId {
         self.file
     }
+    pub fn line_mut(&mut self) -> &mut u32 {
+        &mut self.line
+    }
+    /// With the controller's line number counted from the line.
+    pub fn relative(self) -> Offset {
+        Offset { sequence: self.sequence.wrapping_sub(self.line as i32), ..self }
+    }
+    /// Back from [`Offset::relative`].
+    pub fn absolute(self) -> Offset {
+        Offset { sequence: self.sequence.wrapping_add(self.line as i32), ..self }
+    }
 }
 
 /// Skipping to a label.

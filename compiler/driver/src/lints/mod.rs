@@ -124,6 +124,14 @@ impl Summary {
     pub(crate) fn is_full(&self) -> bool {
         self.dives.len() >= stock::MOST_PER_CHUNK
     }
+    /// The same with other places.
+    pub(crate) fn moved(mut self, place: impl Fn(Where) -> Where) -> Summary {
+        self.bare_cut = self.bare_cut.map(&place);
+        for dive in &mut self.dives {
+            dive.place = place(dive.place);
+        }
+        self
+    }
 }
 
 /// The sink that the lints watch the stream through.

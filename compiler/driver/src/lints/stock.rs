@@ -22,7 +22,7 @@ impl Default for Cuts {
 /// A rapid that goes deeper than what its chunk cut before it.
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) struct Dive {
-    place: Where,
+    pub(super) place: Where,
     end: [f64; 3],
     sideways: bool,
     /// What this chunk cut before it, since the last change of frame.
