@@ -182,10 +182,13 @@ fn build(program: &Program, index: usize, state: &State, pose: &Pose, safe: f64,
         let (parent, file, line, pass) = (frame.parent, frame.file, frame.line, frame.pass);
         out.frame(frame.id, &gr_canon::CallFrame { parent, file, line, name, pass });
     }
-    let mut restore = Restore { out, source: Source { line: INSERTED, ..Source::default() } };
+    let source = Source { line: INSERTED, ..Source::default() };
+    // The line that asked for the offset knows more than the offset: of a tool that was never measured it is 0.
+    let offset = program.steps().take(index).filter(|s| matches!(s.op, Op::ToolOffset(_))).last().map_or(source, |s| s.source);
+    let mut restore = Restore { out, source };
     restore.push(Op::Note(Note::Comment, &format!("restart at line {line}")));
     restore.frame(state);
-    restore.tool(state);
+    restore.tool(state, offset);
     if units_under_offset(program, index) {
         // The same change again, which shows in no motion: G28 depends on it.
         let other = if state.units == Units::Mm { Units::Inch } else { Units::Mm };
@@ -238,12 +241,12 @@ impl Restore {
         }
     }
 
-    fn tool(&mut self, s: &State) {
+    fn tool(&mut self, s: &State, offset: Source) {
         if s.tool > 0 {
             self.push(Op::ToolPrepare(s.tool));
             self.push(Op::ToolChange(0));
         }
-        self.push(Op::ToolOffset(s.tool_offset));
+        self.out.push(Op::ToolOffset(s.tool_offset), offset);
         if s.prepared > 0 && s.prepared != s.tool {
             self.push(Op::ToolPrepare(s.prepared));
         }

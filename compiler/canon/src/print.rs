@@ -495,19 +495,4 @@ mod tests {
         p.call(&At { file: FileId(0), line: 0, frame: FrameId::MAIN, now: b"" }, &Call::Message("über".into()));
         assert!(p.finish().unwrap().windows(2).any(|w| w == b"\xFCb"));
     }
-
-    /// `cargo test --profile ci -p gr-canon -- --ignored --nocapture`
-    #[test]
-    #[ignore = "a measurement"]
-    fn speed() {
-        let mut p = Printer::new(std::io::sink(), Version::V2_9);
-        let start = std::time::Instant::now();
-        for i in 0..1_000_000_u32 {
-            let t = f64::from(i);
-            let pose = [t * 0.000_371 - 150.0, 300.0 - t * 0.000_123_4, -5.0 * t / 1e6, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
-            p.call(&At { file: FileId(0), line: i, frame: FrameId::MAIN, now: b"G1 X1 Y2" }, &Call::StraightFeed(pose));
-        }
-        p.flush();
-        eprintln!("1 M STRAIGHT_FEED: {:?}", start.elapsed());
-    }
 }

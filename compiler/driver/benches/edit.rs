@@ -147,10 +147,29 @@ fn calls(lines: usize) -> String {
     text
 }
 
+/// A branch with a label of its own in every hundred lines: labels are met and never forgotten.
+fn branches(lines: usize) -> String {
+    let plain = generate::big(lines - lines / 50 - 3);
+    let mut text = String::with_capacity(plain.len() + lines);
+    for (n, line) in plain.lines().enumerate() {
+        text.push_str(line);
+        text.push('\n');
+        if n % 100 == 99 {
+            text.push_str(&format!("o{n} if [1]\nM8\no{n} endif\n"));
+        }
+    }
+    text
+}
+
 fn main() {
     for (lines, budget) in [(100_000, (0.5, 5.0)), (1_000_000, (3.0, 20.0))] {
-        let kinds: [(&str, fn(usize) -> String); 4] =
-            [("big", generate::big), ("mixed", generate::mixed), ("sub and loop", sub_and_loop), ("calls everywhere", calls)];
+        let kinds: [(&str, fn(usize) -> String); 5] = [
+            ("big", generate::big),
+            ("mixed", generate::mixed),
+            ("sub and loop", sub_and_loop),
+            ("calls everywhere", calls),
+            ("branches everywhere", branches),
+        ];
         for (kind, make) in kinds {
             let text = make(lines);
             let before = resident() - text.len() as f64 / 1e6;

@@ -1,8 +1,12 @@
 //! What a stretch with control flow is entered and left with, so that it does not matter how many lines stand above:
 //! labels by chunk, and the way from lines of then to lines of now.
 
+use std::hash::{Hash, Hasher};
+use std::sync::Arc;
+
 use gr_canon::{CallFrame, FileId, FrameId};
-use gr_interp::Carry;
+use gr_interp::{Carry, LabelAt, LabelName, Met};
+use rustc_hash::FxHashMap;
 
 use crate::db::ChunkText;
 use crate::engine::End;
@@ -11,45 +15,94 @@ use crate::library::Came;
 use crate::lints::{Found, Summary, Where};
 
 /// What control flow has left behind. Labels of the main file are on lines of their chunks.
+///
+/// A program may have as many labels as lines, and most stretches add few: labels stand in layers that are shared, each
+/// more than twice as big as the next.
 #[derive(Clone, PartialEq, Eq, Hash, Debug, Default)]
 pub(crate) struct Carried {
-    carry: Carry,
-    /// The chunk of each label of the main file.
-    homes: Box<[Option<ChunkText>]>,
+    pub(crate) carry: Carry,
+    layers: Vec<Arc<Layer>>,
+    /// Files that labels point into, ascending.
+    files: Box<[FileId]>,
+}
+
+#[derive(Debug, Default)]
+struct Layer {
+    labels: FxHashMap<LabelName, Label>,
+    hash: u64,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+struct Label {
+    at: LabelAt,
+    /// The chunk, when it is a label of the main file; its line is one of the chunk then.
+    home: Option<ChunkText>,
+}
+
+impl PartialEq for Layer {
+    fn eq(&self, other: &Layer) -> bool {
+        std::ptr::eq(self, other) || (self.hash == other.hash && self.labels == other.labels)
+    }
+}
+
+impl Eq for Layer {}
+
+impl Hash for Layer {
+    fn hash<H: Hasher>(&self, h: &mut H) {
+        h.write_u64(self.hash);
+    }
+}
+
+impl Layer {
+    fn new(labels: FxHashMap<LabelName, Label>) -> Layer {
+        let one = |entry: (&LabelName, &Label)| {
+            let mut hasher = rustc_hash::FxHasher::default();
+            entry.hash(&mut hasher);
+            hasher.finish()
+        };
+        // The order of the entries must not matter.
+        let hash = labels.iter().map(one).fold(0, u64::wrapping_add);
+        Layer { labels, hash }
+    }
 }
 
 impl Carried {
-    /// From lines of the file.
-    pub(crate) fn of(mut carry: Carry, main: FileId, starts: &Starts) -> Carried {
-        let home = |line: &mut u32| {
-            let (chunk, first) = starts.holding(*line)?;
-            *line -= first;
-            Some(chunk)
-        };
-        let homes = carry.lines_mut(main).map(home).collect();
-        Carried { carry, homes }
-    }
-    /// On lines of the file.
-    pub(crate) fn at(&self, main: FileId, starts: &Starts) -> Carry {
-        let mut carry = self.carry.clone();
-        for (line, home) in carry.lines_mut(main).zip(&self.homes) {
-            *line += home.and_then(|chunk| starts.of(chunk)).unwrap_or(0);
+    /// What a run that began with this leaves behind. Lines of `met` are those of the file.
+    pub(crate) fn after(&self, carry: Carry, met: Met, main: FileId, starts: &Starts) -> Carried {
+        let before = if met.forgot { Carried::default() } else { self.clone() };
+        let Carried { mut layers, files, .. } = before;
+        let mut files = files.into_vec();
+        let mut added = FxHashMap::default();
+        for (name, at) in met.labels {
+            let home = if at.file() == main { starts.holding(at.line()) } else { None };
+            let at = home.map_or(at, |(_, first)| at.on_line(at.line() - first));
+            added.insert(name, Label { at, home: home.map(|(chunk, _)| chunk) });
+            if let Err(place) = files.binary_search(&at.file()) {
+                files.insert(place, at.file());
+            }
         }
-        carry
+        while let Some(last) = layers.pop_if(|last| last.labels.len() <= 2 * added.len()) {
+            for (name, label) in &last.labels {
+                added.entry(name.clone()).or_insert(*label);
+            }
+        }
+        if !added.is_empty() {
+            layers.push(Arc::new(Layer::new(added)));
+        }
+        Carried { carry, layers, files: files.into() }
+    }
+    /// Where a label is: its line, and the chunk that the line counts from.
+    pub(crate) fn label(&self, name: &LabelName) -> Option<(LabelAt, Option<ChunkText>)> {
+        let label = self.layers.iter().rev().find_map(|layer| layer.labels.get(name))?;
+        Some((label.at, label.home))
     }
     /// Files that labels point into.
-    pub(crate) fn files(&self) -> impl Iterator<Item = FileId> {
-        self.carry.files()
-    }
-    /// Chunks that labels point into.
-    pub(crate) fn chunks(&self) -> impl Iterator<Item = ChunkText> {
-        self.homes.iter().copied().flatten()
+    pub(crate) fn files(&self) -> &[FileId] {
+        &self.files
     }
     /// An error makes the controller forget all labels.
     pub(crate) fn without_labels(&self) -> Carried {
-        let mut carry = self.carry.clone();
-        carry.forget_labels();
-        Carried { carry, homes: Box::default() }
+        Carried { carry: self.carry.clone(), ..Carried::default() }
     }
 }
 

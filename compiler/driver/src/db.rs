@@ -162,6 +162,8 @@ pub(crate) struct Shape {
     pub(crate) statements: Box<[gr_interp::Statement]>,
     /// The first line with a statement of control flow.
     pub(crate) first_control: Option<u32>,
+    /// The first line that ends with a carriage return alone.
+    pub(crate) lone_return: Option<u32>,
 }
 
 /// What a stretch of a chunk is.

@@ -57,7 +57,7 @@ impl Disk {
         if !path.is_file() {
             return None;
         }
-        let text = gr_text::decode(std::fs::read(path).ok()?).text;
+        let text = read_as(std::fs::read(path).ok()?, dialect);
         let file = Arc::new(file_of(&name, &text, CHUNK, dialect));
         // Another query may have read the file meanwhile.
         let mut files = self.lock();
@@ -74,6 +74,12 @@ impl Disk {
     pub(crate) fn forget(&self) {
         self.lock().iter_mut().for_each(|k| k.contents = None);
     }
+}
+
+/// The text of a file as its control reads it.
+pub(crate) fn read_as(bytes: Vec<u8>, dialect: &Dialect) -> String {
+    let linuxcnc = dialect.family == gr_spec::Family::Linuxcnc;
+    if linuxcnc { gr_text::decode_as_linuxcnc(bytes).text } else { gr_text::decode(bytes).text }
 }
 
 /// Scans a whole text.

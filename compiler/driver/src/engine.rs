@@ -297,9 +297,8 @@ pub(crate) struct Stretch<'a> {
 impl<'a> Stretch<'a> {
     /// The files it may need.
     pub(crate) fn library(&self) -> Library<'a> {
-        let chunks = self.carried.chunks().chain([self.chunk]);
         let starts = self.db.present().get(self.document.id(self.db));
-        Library::knowing(self.db, self.document, starts, chunks, self.carried.files())
+        Library::knowing(self.db, self.document, starts, self.chunk, self.carried)
     }
     /// State before it.
     pub(crate) fn modal(&self) -> &'a Modal {
@@ -313,16 +312,14 @@ impl<'a> Stretch<'a> {
         let main = FileId(self.document.id(self.db));
         let percent = self.entry.modal().percent != 0;
         let shift = if percent { first_percent(self.db, self.document).unwrap_or(0) } else { 0 };
-        let starts = library.starts();
-        let line = starts.of(self.chunk).unwrap_or(0);
-        let carry = self.carried.at(main, starts);
+        let line = library.starts().of(self.chunk).unwrap_or(0);
         let mut state = (*self.entry.state).clone();
         // From lines of the chunk to lines of the file.
         state.queue.count_lines_from(line.wrapping_neg());
         state.queue.move_to(main);
         let from = if self.entry.opening { line.max(shift + 1) } else { line };
         let setup = &self.document.run(self.db).options(self.db).setup;
-        let before = (state, self.env.params.clone(), &carry);
+        let before = (state, self.env.params.clone(), &self.carried.carry);
         Interp::carry_on(library, setup, sink, before, main, (from, shift as i32))
     }
 }
@@ -371,7 +368,7 @@ pub(crate) fn flow(stretch: &Stretch<'_>) -> FlowOutcome {
     let why = interp.run_until(&|l| l > line && starts.begins(l));
     let next = if why.is_none() { Some(interp.next_line()) } else { None };
     let (mut state, environment) = (interp.state(), Environment { params: interp.params().clone() });
-    let carried = Carried::of(interp.carry(), main, &starts);
+    let carried = stretch.carried.after(interp.carry(), interp.met(), main, &starts);
     let main_line = interp.main_line();
     let mut findings = interp.take_findings();
     let others: Vec<FileId> = interp.opened_files().iter().copied().filter(|f| *f != main).collect();
@@ -440,7 +437,18 @@ pub(crate) fn finish(context: &Finish<'_>) -> Vec<Found> {
         }
     }
     found.extend(layout.labels.iter().cloned());
+    if let Some(line) = layout.lone_return.filter(|_| joins_lines(options.setup.dialect))
+        && let Some(severity) = options.rules.severity(code::TEXT_LONE_RETURN)
+    {
+        let (code, place) = (code::TEXT_LONE_RETURN, place(line));
+        found.push(Found { code, severity, place, letter: None, span: None, args: Vec::new(), from: From::Lint });
+    }
     found
+}
+
+/// Whether the control reads on over a carriage return alone.
+pub(crate) fn joins_lines(dialect: &gr_spec::Dialect) -> bool {
+    dialect.family == gr_spec::Family::Linuxcnc
 }
 
 /// The file ended without M2, M30 or `%`. A file of subroutines needs none.

@@ -42,6 +42,8 @@ pub(crate) struct Layout {
     first_percent: Option<u32>,
     /// The first line with a statement of control flow.
     pub(crate) first_control: Option<u32>,
+    /// The first line that ends with a carriage return alone.
+    pub(crate) lone_return: Option<u32>,
     /// What is opened and never closed.
     pub(crate) unclosed: Box<[Found]>,
     /// What the labels tell about each other.
@@ -125,7 +127,7 @@ pub(crate) fn layout(db: &dyn Db, document: Document) -> Layout {
     let mut parts = Vec::with_capacity(chunks.len());
     let (mut stops, mut ends, mut statements) = (Vec::new(), Vec::new(), Vec::new());
     let mut first_line = 0;
-    let (mut percent, mut first_percent, mut first_control) = (None, None, None);
+    let (mut percent, mut first_percent, mut first_control, mut lone_return) = (None, None, None, None);
     for (chunk, s) in chunks.iter().zip(&shapes) {
         starts.push(first_line);
         parts.push(Part { chunk: *chunk, first_line, control: s.control, environment: s.environment });
@@ -135,6 +137,7 @@ pub(crate) fn layout(db: &dyn Db, document: Document) -> Layout {
         percent = percent.or(s.first_text);
         first_percent = first_percent.or(s.first_percent.map(|l| l + first_line));
         first_control = first_control.or(s.first_control.map(|l| l + first_line));
+        lone_return = lone_return.or(s.lone_return.map(|l| l + first_line));
         first_line += s.lines;
     }
     starts.push(first_line);
@@ -151,6 +154,7 @@ pub(crate) fn layout(db: &dyn Db, document: Document) -> Layout {
         percent: percent.unwrap_or(false),
         first_percent,
         first_control,
+        lone_return,
         unclosed: gr_interp::unclosed(statements, main, true).iter().filter_map(|f| engine::of_finding(f, options)).collect(),
         labels: labels.into(),
         only_subs: shapes.iter().flat_map(|s| s.outline.iter()).next() == Some(&Outline::Sub),
@@ -199,6 +203,12 @@ pub(crate) fn first_percent(db: &dyn Db, document: Document) -> Option<u32> {
     layout(db, document).first_percent
 }
 
+/// Byte of the first carriage return that ends a line by itself, with something behind it.
+pub(crate) fn lone_return(text: &str) -> Option<u32> {
+    let bytes = text.as_bytes();
+    memchr::memchr_iter(b'\r', bytes).find(|at| bytes.get(at + 1).is_some_and(|next| *next != b'\n')).map(|at| at as u32)
+}
+
 /// Fills in what [`layout`] wants to know of a chunk's lines.
 pub(crate) fn line_shapes(shape: &mut Shape, scan: &gr_gcode::Scan, text: &str) {
     let (mut stops, mut ends, mut statements) = (Vec::new(), Vec::new(), Vec::new());
@@ -220,5 +230,6 @@ pub(crate) fn line_shapes(shape: &mut Shape, scan: &gr_gcode::Scan, text: &str) 
             shape.first_control = Some(n);
         }
     }
+    shape.lone_return = lone_return(text).map(|at| scan.lines.partition_point(|l| l.start <= at).saturating_sub(1) as u32);
     (shape.stops, shape.ends, shape.statements) = (stops.into(), ends.into(), statements.into());
 }

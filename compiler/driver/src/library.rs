@@ -8,10 +8,11 @@ use std::sync::Arc;
 
 use gr_canon::FileId;
 use gr_gcode::{Chunk, File};
-use gr_interp::Files;
+use gr_interp::{Files, LabelAt, LabelName};
 use rustc_hash::FxHashSet;
 
 use crate::Options;
+use crate::carried::Carried;
 use crate::db::{ChunkText, Db, Document, OpenFiles, RunOptions, scanned};
 use crate::layout::{Starts, first_line, follows, layout, next_stop};
 
@@ -29,6 +30,7 @@ pub(crate) struct Library<'a> {
     /// Chunks that the run came to by themselves, wherever they stand: its first one, those of labels, those that
     /// skipping led to.
     granted: RefCell<FxHashSet<ChunkText>>,
+    carried: Option<&'a Carried>,
     /// Remapped codes can tell the program its own line.
     remaps: bool,
     visited: RefCell<BTreeMap<u32, Visited>>,
@@ -77,6 +79,7 @@ impl<'a> Library<'a> {
             main: FileId(document.id(db)),
             starts,
             granted: RefCell::default(),
+            carried: None,
             remaps: !options.setup.ini.all("rs274ngc", "remap").is_empty(),
             visited: RefCell::default(),
             whole: OnceCell::new(),
@@ -85,20 +88,20 @@ impl<'a> Library<'a> {
         }
     }
 
-    /// Files of a document for a run that knows some chunks and files already.
+    /// Files of a document for a run from a chunk on, behind other runs that left `carried`.
     pub(crate) fn knowing(
         db: &'a dyn Db,
         document: Document,
         starts: Arc<Starts>,
-        chunks: impl Iterator<Item = ChunkText>,
-        files: impl Iterator<Item = FileId>,
+        chunk: ChunkText,
+        carried: &'a Carried,
     ) -> Library<'a> {
-        let mut library = Library::new(db, document, starts);
-        library.granted.get_mut().extend(chunks);
+        let mut library = Library { carried: Some(carried), ..Library::new(db, document, starts) };
+        library.granted.get_mut().insert(chunk);
         let main = library.main;
-        for id in files.filter(|id| *id != main) {
-            if let Some(file) = sub_file(db, library.run, id) {
-                library.keep(id, file);
+        for id in carried.files().iter().filter(|id| **id != main) {
+            if let Some(file) = sub_file(db, library.run, *id) {
+                library.keep(*id, file);
             }
         }
         library
@@ -180,6 +183,12 @@ impl<'a> Library<'a> {
 }
 
 impl Files for Library<'_> {
+    fn earlier_label(&self, name: &LabelName) -> Option<LabelAt> {
+        let (at, home) = self.carried?.label(name)?;
+        let Some(chunk) = home else { return Some(at) };
+        self.granted.borrow_mut().insert(chunk);
+        Some(at.on_line(self.starts.of(chunk)? + at.line()))
+    }
     fn file(&self, id: FileId) -> &File {
         if id == self.main {
             return self.whole.get_or_init(|| whole(self.db, self.document, self.run));

@@ -58,7 +58,7 @@ impl Files for Loaded {
                 return Some(*id);
             }
             let Ok(bytes) = std::fs::read(&path) else { continue };
-            let text = gr_text::decode(bytes).text;
+            let text = crate::disk::read_as(bytes, self.setup.dialect);
             self.subs.push(crate::disk::file_of(&path.to_string_lossy(), &text, crate::disk::CHUNK, self.setup.dialect));
             let id = FileId(self.subs.len() as u32);
             self.known.insert(path, id);
@@ -131,6 +131,9 @@ fn says_nothing(lints: Lints<'_>, files: &Loaded, setup: &Setup, rules: &Rules) 
     let mut late = Late::default();
     late.take(&lints.summary, None, rules);
     if !lints.found.is_empty() || !late.found.is_empty() {
+        return false;
+    }
+    if crate::layout::lone_return(files.main.text()).is_some() && crate::engine::joins_lines(setup.dialect) {
         return false;
     }
     if files.main.is_plain() && setup.dialect.family != gr_spec::Family::Fanuc {

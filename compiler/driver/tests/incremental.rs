@@ -365,6 +365,17 @@ fn a_line_above_calls_leaves_them_alone() {
 }
 
 #[test]
+fn labels_do_not_add_up() {
+    // Labels are never forgotten; 20 000 of them, open at once, were once taken over from chunk to chunk.
+    let open: String = (0..20_000).map(|i| format!("o{i} if [1]\n")).collect();
+    let close: String = (0..20_000).rev().map(|i| format!("o{i} endif\n")).collect();
+    let text = format!("G21 F100\n{open}G1 X1\n{close}M2\n");
+    let mut session = Session::new();
+    let file = session.open("part.ngc", &text, Options::new(Setup::default()));
+    assert_eq!(session.check(file).diagnostics, vec![]);
+}
+
+#[test]
 fn findings_and_ways_below_move_with_their_lines() {
     // The fault is in a subroutine at the top; its way leads over a call far below.
     let mut text = calls_everywhere(1000).replace("G1 Z-1\n", "G1 Z-1\n#1=[1/[#2-1]]\n").replace("M5\n", "#2=1\no100 call [0] [1]\nM5\n");

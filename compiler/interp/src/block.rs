@@ -174,4 +174,8 @@ impl Block {
         self.done |= 1 << step;
         todo
     }
+    /// The step is to be done after all.
+    pub(crate) fn undo(&mut self, step: u32) {
+        self.done &= !(1 << step);
+    }
 }

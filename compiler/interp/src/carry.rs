@@ -1,18 +1,15 @@
-//! What control flow leaves behind in the main program, between two lines outside of calls and loops: labels that
-//! were met, and what the last call and the last condition gave. Together with [`State`] and [`Params`] it is all
-//! that a run needs to go on.
+//! What control flow leaves behind in the main program, between two lines outside of calls and loops: what the last
+//! call and the last condition gave, and the labels that were [met](Interp::met). Together with [`State`] and [`Params`]
+//! it is all that a run needs to go on.
 
 use gr_canon::{FileId, FrameId, Sink};
 
-use crate::control::{ARGS, Label, Offset};
+use crate::calls::ARGS;
 use crate::{End, Files, Interp, Params, Setup, State};
 
-/// The label table and what goes with it, as plain data.
+/// What goes on behind a call or a loop, labels aside.
 #[derive(Clone, PartialEq, Eq, Hash, Debug, Default)]
 pub struct Carry {
-    /// In the order of their scopes and names. The controller's line number counts from the label's line, so that
-    /// moving the label moves both.
-    labels: Vec<(u32, Box<str>, Box<str>, Offset)>,
     /// An `if` ran, a loop is being left by `break` or `continue`, the last call gave a value, a call has come back, an
     /// error inside a call was met.
     switches: [bool; 6],
@@ -22,24 +19,9 @@ pub struct Carry {
     kept: Option<Box<[u64; ARGS]>>,
 }
 
-impl Carry {
-    /// An error makes the controller forget all labels.
-    pub fn forget_labels(&mut self) {
-        self.labels.clear();
-    }
-    /// Files that labels point into.
-    pub fn files(&self) -> impl Iterator<Item = FileId> {
-        self.labels.iter().map(|l| l.3.file())
-    }
-    /// Lines of the labels in a file: for those who count lines from elsewhere than the file's start.
-    pub fn lines_mut(&mut self, file: FileId) -> impl Iterator<Item = &mut u32> {
-        self.labels.iter_mut().filter(move |l| l.3.file() == file).map(|l| l.3.line_mut())
-    }
-}
-
 impl<'a, S: Sink> Interp<'a, S> {
-    /// Goes on at a line of the main program, outside of calls and loops. `shift` is the line of the opening `%`,
-    /// 0 without one.
+    /// Goes on at a line of the main program, outside of calls and loops. Labels that were met before are asked of the
+    /// files. `shift` is the line of the opening `%`, 0 without one.
     pub fn carry_on(
         files: &'a mut dyn Files,
         setup: &'a Setup,
@@ -49,12 +31,7 @@ impl<'a, S: Sink> Interp<'a, S> {
         (line, shift): (u32, i32),
     ) -> Self {
         let mut run = Self::resume(files, setup, sink, (state, params), main, (line, shift));
-        for (scope, scope_name, name, at) in &carry.labels {
-            // The two scopes that are no subroutine keep their numbers.
-            let scope = if scope_name.is_empty() { *scope } else { run.symbols.of(scope_name) };
-            let name = run.symbols.of(name);
-            run.offsets.insert(Label { scope, name }, at.absolute());
-        }
+        run.labels.earlier = Some(rustc_hash::FxHashMap::default());
         [run.executed_if, run.doing_break, run.doing_continue, run.value_returned, run.came_back, run.main_unnamed] =
             carry.switches;
         [run.test_value, run.return_value] = carry.values.map(f64::from_bits);
@@ -62,20 +39,9 @@ impl<'a, S: Sink> Interp<'a, S> {
         run
     }
 
-    /// What control flow has left behind.
+    /// What control flow has left behind, beside [`Interp::met`].
     pub fn carry(&self) -> Carry {
-        let mut labels: Vec<_> = self
-            .offsets
-            .iter()
-            .map(|(label, at)| {
-                let scope = if label.is_subroutine_scope() { self.symbols.name(label.scope) } else { "" };
-                let fixed = if scope.is_empty() { label.scope } else { 0 };
-                (fixed, Box::from(scope), Box::from(self.symbols.name(label.name)), at.relative())
-            })
-            .collect();
-        labels.sort_by(|a, b| (a.0, &a.1, &a.2).cmp(&(b.0, &b.1, &b.2)));
         Carry {
-            labels,
             switches: [
                 self.executed_if,
                 self.doing_break,

@@ -62,6 +62,9 @@ impl<S: Sink> Interp<'_, S> {
         } else if text.eq_ignore_ascii_case("logclose") {
             self.emit(Call::LogClose);
         } else {
+            if ["py,", "pyrun,", "pyreload"].iter().any(|word| after(text, word).is_some()) {
+                self.warn(Fault::own(code::COMMENT_PYTHON).at(b'('));
+            }
             self.emit_queued(Call::Comment(text.into()));
         }
         Ok(())

@@ -9,7 +9,12 @@
 //! | `eval` | expressions |
 //! | `check` | which words go together |
 //! | `exec` | the order of execution in a block, modal groups |
-//! | `control` | O-words, calls, loops, M98/M99, macro statements |
+//! | `control` | O-words: loops, branches, skipping |
+//! | `calls` | calls and the way back: `o… call`, M98/M99, remaps |
+//! | `labels`, `statements` | labels that were met; lines that control flow can come to |
+//! | `macros` | macro statements of Fanuc controls |
+//! | `run`, `line`, `chunk` | line after line; one line; one chunk alone |
+//! | `findings` | what goes wrong, and what came of a run |
 //! | `motion`, `arc`, `comp`, `cycles`, `thread`, `rough`, `spline` | motion of one kind each |
 //! | `queue` | calls held back while cutter compensation looks ahead |
 //!
@@ -19,12 +24,18 @@
 mod angle;
 mod arc;
 mod block;
+mod calls;
 mod carry;
+mod chunk;
 mod comp;
 mod cycles;
 mod fanuc;
 mod fault;
 mod files;
+mod findings;
+mod labels;
+mod line;
+mod macros;
 mod params;
 mod queue;
 mod rough;
@@ -32,6 +43,7 @@ mod run;
 mod setup;
 mod spline;
 mod state;
+mod statements;
 mod thread;
 mod world;
 mod tools;
@@ -49,12 +61,15 @@ mod wide;
 
 pub use block::{Block, Group};
 pub use carry::Carry;
-pub use control::{Statement, is_stop, statement, unclosed};
+pub use chunk::{ChunkExit, run_chunk, run_lines};
 pub use fault::{Fault, Res};
 pub use files::*;
+pub use findings::{Finding, Outcome};
 pub use params::Params;
+pub use labels::{LabelAt, LabelName, Met};
 pub use remap::subroutine_paths;
-pub use run::{ChunkExit, End, Files, Finding, Interp, NoFiles, Outcome, Place, run_chunk, run_lines};
+pub use run::{End, Files, Interp, NoFiles, Place};
 pub use setup::{Budgets, Ini, Setup, Tool, ToolTable};
+pub use statements::{Statement, is_stop, statement, unclosed};
 pub use state::{Modal, SavedModes, Side, State};
 pub use world::World;

@@ -49,7 +49,17 @@ pub(crate) struct Remap {
     pub name: String,
     pub group: i32,
     pub words: String,
+    /// Empty: Python alone.
     pub sub: String,
+    /// Its Python parts, `prolog=…` and the like.
+    pub python: Vec<String>,
+}
+
+impl Remap {
+    /// The function of a part of this kind.
+    fn part(&self, key: &str) -> Option<&str> {
+        self.python.iter().find_map(|p| p.strip_prefix(key)?.strip_prefix('='))
+    }
 }
 
 /// What the INI file says, looked up once.
@@ -94,27 +104,28 @@ impl Config {
         };
         c.any_wrapped = c.wrapped.iter().any(|w| *w);
         for line in ini.all("rs274ngc", "remap") {
-            c.add_remap(line);
+            c.add_remap(line, setup.without_python);
         }
         c
     }
 
     /// `M400 modalgroup=10 argspec=Pq ngc=foo`
-    fn add_remap(&mut self, line: &str) {
+    fn add_remap(&mut self, line: &str, without_python: bool) {
         let line = line.split('#').next().unwrap_or("");
         let mut parts = line.split_whitespace();
         let Some(name) = parts.next() else { return };
-        let mut r = Remap { name: name.to_string(), group: -1, words: String::new(), sub: String::new() };
+        let mut r = Remap { name: name.to_string(), group: -1, words: String::new(), sub: String::new(), python: Vec::new() };
         for part in parts {
             let Some((key, value)) = part.split_once('=') else { return };
             match key.to_ascii_lowercase().as_str() {
                 "modalgroup" => r.group = value.parse().unwrap_or(-1),
                 "argspec" => r.words = value.to_string(),
                 "ngc" => r.sub = value.to_string(),
+                key @ ("python" | "py" | "prolog" | "epilog") if without_python => r.python.push(format!("{key}={value}")),
                 _ => return,
             }
         }
-        if r.sub.is_empty() {
+        if r.sub.is_empty() && r.python.is_empty() {
             return;
         }
         let letter = name.chars().next().unwrap_or(' ').to_ascii_lowercase();
@@ -175,6 +186,8 @@ pub(crate) struct Remapped {
     reading: crate::run::Reading,
     step: u32,
     name: String,
+    /// The code's own meaning follows behind the subroutine: an epilog would bring it about.
+    own_meaning: bool,
 }
 
 /// Files that an external subroutine may be in, in the order the controller tries them.
@@ -266,6 +279,7 @@ impl<S: Sink> Interp<'_, S> {
             reading: self.reading.clone(),
             step: 0,
             name: String::new(),
+            own_meaning: false,
         });
         self.execute_steps()
     }
@@ -281,11 +295,51 @@ impl<S: Sink> Interp<'_, S> {
         let Some(remap) = remap else { return Ok(()) };
         let by_position = remap.words.contains('@');
         let words = self.remap_words(remap)?;
+        let own_meaning = remap.part("epilog").is_some() && (letter != 'M' || matches!(number, 6 | 61)) && letter != 'G';
         if let Some(r) = self.remaps.last_mut() {
             r.block = self.block.clone();
             r.step = at;
             r.name = remap.name.clone();
+            r.own_meaning = own_meaning;
         }
+        if !remap.python.is_empty() {
+            self.warn(Fault::own(code::REMAP_PYTHON).arg(&remap.name).arg(remap.python.join(", ")));
+        }
+        if remap.sub.is_empty() {
+            return self.remap_finished();
+        }
+        let given = self.prolog_values(remap);
+        self.call_remap_sub(remap, words, by_position)?;
+        let level = self.level();
+        for (name, value) in given {
+            self.params.set_named(level, name, value);
+        }
+        Ok(())
+    }
+
+    /// The named parameters that the prologs of LinuxCNC's own `stdglue.py` hand to the subroutine.
+    fn prolog_values(&self, remap: &Remap) -> Vec<(&'static str, f64)> {
+        let pocket = |index: i32| f64::from(self.tool(index).pocket);
+        let of_tool = |number: f64| {
+            let index = self.tools.rows.iter().skip(1).position(|t| f64::from(t.number) == number);
+            vec![("tool", number), ("pocket", index.map_or(0.0, |i| pocket(i as i32 + 1)))]
+        };
+        match remap.part("prolog") {
+            Some("prepare_prolog") => of_tool(self.block.or_zero(b't')),
+            Some("settool_prolog") => of_tool(self.block.or_zero(b'q')),
+            Some("setspeed_prolog") => vec![("speed", self.block.or_zero(b's'))],
+            Some("setfeed_prolog") => vec![("feed", self.block.or_zero(b'f'))],
+            Some("change_prolog") => vec![
+                ("tool_in_spindle", self.params.get(5400)),
+                ("selected_tool", f64::from(self.m.selected_tool)),
+                ("current_pocket", f64::from(self.m.pocket)),
+                ("selected_pocket", f64::from(self.m.selected_pocket)),
+            ],
+            _ => Vec::new(),
+        }
+    }
+
+    fn call_remap_sub(&mut self, remap: &Remap, words: Vec<(char, f64)>, by_position: bool) -> Res {
         if by_position {
             // Arguments pass through a text with four decimals.
             let args: Vec<f64> = words.iter().map(|(_, v)| format!("{v:.4}").parse().unwrap_or(*v)).collect();
@@ -341,6 +395,9 @@ impl<S: Sink> Interp<'_, S> {
         let Some(r) = self.remaps.last_mut() else { return Ok(()) };
         let mut block = r.block.clone();
         block.remapped &= !(1 << r.step);
+        if r.own_meaning {
+            block.undo(r.step);
+        }
         r.name.clear();
         self.comment = r.comment;
         self.reading = r.reading.clone();

@@ -1,19 +1,22 @@
-//! The run: reading line after line, the two streams out, errors, limits.
+//! The run: files in, line after line, the two streams out.
 
 use std::sync::Arc;
 
 use gr_canon::{At, Call, CallFrame, FileId, FrameId, Mark, Sink};
-use gr_gcode::{Chunk, File, LineKind, Scan, Word};
-use gr_spec::{Rs274, code, rs274};
-use gr_text::Span;
+use gr_gcode::{Chunk, File, LineKind, Scan};
+use gr_spec::{code, rs274};
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::block::Block;
-use crate::control::{CallKind, FileIndex, Label, Level, Loop, Offset, Skip, Symbols};
+use crate::calls::{CallKind, Level};
+use crate::control::{Loop, Skip};
+use crate::findings::{Finding, Outcome, convert_fault};
 use crate::io::Comment;
+use crate::labels::{LabelAt, LabelName, LabelTable, Symbols};
 use crate::queue::Queue;
 use crate::remap::{Config, Remapped};
 use crate::state::State;
+use crate::statements::FileIndex;
 use crate::world::World;
 use crate::{Fault, Modal, Params, Res, Setup, ToolTable};
 
@@ -33,6 +36,10 @@ pub trait Files {
     /// The first line from `line` on that skipping must look at ([`is_stop`]), when it is known without the whole
     /// file; `u32::MAX` past the last one.
     fn next_control(&self, _id: FileId, _line: u32) -> Option<u32> {
+        None
+    }
+    /// Where a label was met in an earlier run of the same program that this one goes on behind.
+    fn earlier_label(&self, _name: &LabelName) -> Option<LabelAt> {
         None
     }
     /// Nothing read of this file so far holds control flow or damage.
@@ -65,23 +72,6 @@ pub struct Place {
     pub frame: FrameId,
 }
 
-/// A fault or doubt, with its place.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Finding {
-    /// File.
-    pub file: FileId,
-    /// Line from 0; relative to the chunk when a chunk was run alone.
-    pub line: u32,
-    /// How execution came there.
-    pub frame: FrameId,
-    /// What.
-    pub fault: Box<Fault>,
-    /// The narrowest place known, relative to the start of the line.
-    pub span: Option<Span>,
-    /// Text of the line that the controller read last, as the real `rs274` shows it.
-    pub text: Box<str>,
-}
-
 /// Why a run ended.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum End {
@@ -93,76 +83,6 @@ pub enum End {
     Fault,
     /// The chunk's last line.
     Chunk,
-}
-
-/// What came of a run.
-#[derive(Clone, Debug)]
-pub struct Outcome {
-    /// Why it ended.
-    pub end: End,
-    /// Faults and doubts in the order they were met.
-    pub findings: Vec<Finding>,
-    /// Damaged lines of the files read that were never executed.
-    pub damaged: Vec<(FileId, u32)>,
-    /// Blocks executed.
-    pub blocks: u64,
-    /// Canonical calls.
-    pub calls: u64,
-    /// Files that were opened, in order.
-    pub files: Vec<FileId>,
-}
-
-impl Outcome {
-    /// Whether the controller would have accepted the program.
-    pub fn ok(&self) -> bool {
-        self.end != End::Fault && self.findings.iter().all(|f| f.fault.rs.is_none())
-    }
-}
-
-/// What running one chunk gave.
-#[derive(Clone, Debug)]
-pub struct ChunkExit {
-    /// State after it.
-    pub state: State,
-    /// Parameters after it.
-    pub params: Params,
-    /// Numbered parameters that it read, with the values they had.
-    pub reads: Vec<(u32, f64)>,
-    /// Numbered parameters that it set, in order.
-    pub writes: Vec<(u32, f64)>,
-    /// It read or set named parameters, or did something else that the state does not hold.
-    pub open_ended: bool,
-    /// Faults and doubts.
-    pub findings: Vec<Finding>,
-    /// How it ended.
-    pub end: End,
-    /// Blocks executed.
-    pub blocks: u64,
-    /// Canonical calls.
-    pub calls: u64,
-}
-
-/// Which parameters were read and written.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Log {
-    reads: Vec<(u32, f64)>,
-    read: FxHashSet<u32>,
-    written: FxHashSet<u32>,
-    writes: Vec<(u32, f64)>,
-    pub named: bool,
-    before: Params,
-}
-
-impl Log {
-    pub fn read(&mut self, index: u32) {
-        if !self.written.contains(&index) && self.read.insert(index) {
-            self.reads.push((index, self.before.get(index)));
-        }
-    }
-    pub fn write(&mut self, index: u32, value: f64) {
-        self.written.insert(index);
-        self.writes.push((index, value));
-    }
 }
 
 /// The line read last; its text is what `At::now` shows.
@@ -233,7 +153,7 @@ pub struct Interp<'a, S: Sink> {
     pub(crate) test_value: f64,
     pub(crate) return_value: f64,
     pub(crate) value_returned: bool,
-    pub(crate) offsets: FxHashMap<Label, Offset>,
+    pub(crate) labels: LabelTable,
     pub(crate) levels: Vec<Level>,
     pub(crate) loops: Vec<Loop>,
     pub(crate) remaps: Vec<Remapped>,
@@ -251,7 +171,7 @@ pub struct Interp<'a, S: Sink> {
     /// Control flow of the main program was met on lines before this one only.
     pub(crate) frontier: u32,
     pub(crate) findings: Vec<Finding>,
-    pub(crate) log: Option<Box<Log>>,
+    pub(crate) log: Option<Box<crate::chunk::Log>>,
 }
 
 impl<'a, S: Sink> Interp<'a, S> {
@@ -284,7 +204,7 @@ impl<'a, S: Sink> Interp<'a, S> {
         run
     }
 
-    fn with(
+    pub(crate) fn with(
         files: &'a mut dyn Files,
         setup: &'a Setup,
         sink: S,
@@ -328,7 +248,7 @@ impl<'a, S: Sink> Interp<'a, S> {
             test_value: 0.0,
             return_value: 0.0,
             value_returned: false,
-            offsets: FxHashMap::default(),
+            labels: LabelTable::default(),
             levels: vec![main],
             loops: Vec::new(),
             remaps: Vec::new(),
@@ -477,7 +397,7 @@ impl<'a, S: Sink> Interp<'a, S> {
     }
 
     /// A line that is not executed becomes the line read last.
-    fn read_alone(&mut self, chunk: &Chunk, line: u32) {
+    pub(crate) fn read_alone(&mut self, chunk: &Chunk, line: u32) {
         let span = chunk.scan.line_span(&chunk.text, line);
         (self.reading.text, self.reading.scan) = (chunk.text.clone(), chunk.scan.clone());
         (self.reading.line, self.reading.begin) = (line, span.start);
@@ -558,238 +478,6 @@ impl<'a, S: Sink> Interp<'a, S> {
         None
     }
 
-    /// Handles a fault; whether the run ends.
-    pub(crate) fn fails(&mut self, fault: Box<Fault>) -> bool {
-        let own = fault.rs.is_none();
-        self.found(fault);
-        // What the block was about to set is not set.
-        self.settings.clear();
-        self.unwind();
-        own || !self.setup.keep_going || self.findings.len() >= 100
-    }
-
-    /// Takes down a finding of the present block.
-    pub(crate) fn found(&mut self, fault: Box<Fault>) {
-        let reading = &self.reading;
-        let start = reading.begin;
-        let known = (reading.line as usize) < reading.scan.lines.len();
-        let span = match (fault.span, fault.letter) {
-            (Some(span), _) => Some(span),
-            (None, Some(letter)) if known => reading
-                .scan
-                .words(reading.line)
-                .iter()
-                .find(|w| w.letter == letter)
-                .map(|w| reading.scan.word_span(&reading.text, reading.line, w)),
-            _ => None,
-        };
-        let span = span.map(|s| Span::new(s.start.saturating_sub(start), s.end.saturating_sub(start)));
-        let p = self.place;
-        let text = self.line_text();
-        let text = text.char_indices().nth(254).map_or(text, |(i, _)| &text[..i]);
-        let text = text.split('\0').next().unwrap_or(text);
-        // Blanks at the end of a line are not read; a call that the controller made up keeps its own, and a line that is
-        // too long is not looked at.
-        let whole = fault.code == code::REMAP_WORDS || fault.code == code::TEXT_LINE_TOO_LONG;
-        let text = if whole { text } else { text.trim_end() }.into();
-        self.findings.push(Finding { file: p.file, line: p.line, frame: p.frame, fault, span, text });
-    }
-
-    /// The file ends too early. Told to go on, the controller does so behind the call that it was in.
-    fn end_of_file(&mut self) -> Option<End> {
-        let fault = self.end_fault();
-        let called = self.level() > 0;
-        self.found(fault);
-        self.unwind();
-        let goes_on = called && self.setup.keep_going && self.findings.len() < 100;
-        (!goes_on).then_some(End::Fault)
-    }
-
-    /// What is wrong when a file ends.
-    pub(crate) fn end_fault(&mut self) -> Box<Fault> {
-        self.show_last_line();
-        match &self.skip {
-            Some(skip) if skip.to_sub => {
-                let name = self.symbols.name(skip.label.name).to_string();
-                let path = self.files.file(self.place.file).path.to_string();
-                let start = skip.start;
-                if let Some(place) = skip.from {
-                    self.place = place;
-                }
-                Fault::new(code::SUB_NOT_FOUND, rs274::RT_O_EOF_SEEKING).arg(path).arg(&name).arg(start).named(name)
-            }
-            _ if self.m.percent != 0 => Fault::new(code::PROGRAM_ENDS_EARLY, rs274::RT_NO_PERCENT),
-            _ => Fault::new(code::PROGRAM_ENDS_EARLY, rs274::RT_NO_PERCENT_OR_END),
-        }
-    }
-
-    /// The file's last line becomes the line read last.
-    fn show_last_line(&mut self) {
-        let file = self.files.file(self.place.file);
-        let count = file.line_count();
-        let Some((c, l)) = file.locate(count.wrapping_sub(1)) else { return };
-        let chunk = file.chunks[c].clone();
-        self.place.line = count - 1;
-        self.read_alone(&chunk, l);
-    }
-
-    /// Reads and executes one line.
-    #[inline]
-    fn line(&mut self, scan: &Scan, text: &str, line: u32) -> Res {
-        let at = scan.lines[line as usize];
-        let end = scan.lines.get(line as usize + 1).map_or(text.len() as u32, |l| l.start);
-        self.reading.line = line;
-        self.reading.begin = at.start;
-        self.reading.start = at.start;
-        self.reading.end = trim_end(text.as_bytes(), at.start, end);
-        if self.m.probed | self.m.tool_changed | self.m.input_wanted != 0 {
-            self.read_inputs();
-        }
-        let words = scan.words(line);
-        if self.skip.is_some() || at.faulty || at.kind != LineKind::Plain {
-            return self.special_line(scan, text, line, words);
-        }
-        if at.deleted && self.setup.block_delete {
-            return Ok(());
-        }
-        self.block.clear();
-        self.comment = None;
-        let first = if words.first().is_some_and(|w| w.letter == b'n') { words.get(1) } else { words.first() };
-        if first.is_some_and(|w| w.letter == b'm') {
-            if let Some(which) = self.fanuc_call(first) {
-                return self.fanuc_line(scan, words, which);
-            }
-        }
-        for w in words {
-            self.read_word(scan, text, w)?;
-        }
-        self.execute_line()
-    }
-
-    /// After the words are read: checks, settings, execution.
-    #[inline]
-    pub(crate) fn execute_line(&mut self) -> Res {
-        let fanuc = self.is_fanuc();
-        if fanuc {
-            self.fanuc_words()?;
-        }
-        self.enhance()?;
-        if fanuc && self.m.turned != 0 {
-            self.turn_words()?;
-        }
-        self.check()?;
-        self.note_remaps();
-        if !self.settings.is_empty() {
-            self.store_settings()?;
-        }
-        self.blocks += 1;
-        self.check_budgets()?;
-        self.begun = self.emitted;
-        self.execute_block()
-    }
-
-    /// Budgets end what goes around and around. A program that comes on line by line may be as long as it likes.
-    #[inline]
-    pub(crate) fn check_budgets(&mut self) -> Res {
-        let (blocks, calls) = (self.blocks - self.spent.0, self.emitted - self.spent.1);
-        if blocks > self.setup.budgets.blocks || calls > self.setup.budgets.calls {
-            return self.over_budget(blocks);
-        }
-        Ok(())
-    }
-
-    #[cold]
-    fn over_budget(&mut self, blocks: u64) -> Res {
-        if self.at_rest() && self.place.line >= self.frontier {
-            self.spent = (self.blocks, self.emitted);
-            return Ok(());
-        }
-        let what = if blocks > self.setup.budgets.blocks { "blocks" } else { "motions" };
-        Err(self.endless(&format!("the program has run more {what} than the limit allows")))
-    }
-
-    /// Counts a line with control flow. Budgets begin anew on each that the main program comes to for the first time
-    /// outside of calls and loops, so that it does not matter where a run began.
-    pub(crate) fn count_control(&mut self) -> Res {
-        if self.level() == 0 && self.place.line >= self.frontier {
-            if self.at_rest() {
-                self.spent = (self.blocks, self.emitted);
-            }
-            self.frontier = self.place.line + 1;
-        }
-        self.blocks += 1;
-        self.check_budgets()
-    }
-
-    /// Lines with structure, faults, `%`, or while skipping.
-    fn special_line(&mut self, scan: &Scan, text: &str, line: u32, words: &[Word]) -> Res {
-        let at = scan.lines[line as usize];
-        if at.faulty {
-            let fault = self.text_fault(scan, line);
-            let deleted = at.deleted && self.setup.block_delete;
-            if fault.is_some() || (self.skip.is_none() && !deleted) {
-                self.opened.damaged_met.insert((self.place.file, self.place.line));
-            }
-            if let Some(fault) = fault {
-                return Err(fault);
-            }
-        }
-        if at.kind == LineKind::Percent && self.m.percent != 0 && !at.deleted {
-            self.emit(Call::Finish);
-            if let Some(skip) = &self.skip {
-                let name = self.symbols.name(skip.label.name).to_string();
-                return Err(Fault::new(code::SUB_NOT_FOUND, rs274::RT_O_EOF_SUB).arg(name));
-            }
-            self.flow = Flow::End(End::Percent);
-            return Ok(());
-        }
-        if at.deleted && self.setup.block_delete {
-            return Ok(());
-        }
-        self.block.clear();
-        self.comment = None;
-        self.settings.clear();
-        let first = if words.first().is_some_and(|w| w.letter == b'n') { words.get(1) } else { words.first() };
-        match first {
-            Some(w) if w.letter == b'o' => return self.control_line(scan, text, line, words, w),
-            Some(w) if w.letter == b'm' => {
-                if let Some(which) = self.fanuc_call(first) {
-                    return self.fanuc_line(scan, words, which);
-                }
-            }
-            _ => {}
-        }
-        if self.skip.is_some() {
-            return Ok(());
-        }
-        if at.kind == LineKind::Percent {
-            return Err(self.first_fault(scan, line).unwrap_or_else(|| {
-                Fault::new(code::SYNTAX_BAD_CHARACTER, rs274::BAD_CHARACTER).arg("%").arg("%")
-            }));
-        }
-        self.read_words(scan, text, line, words)?;
-        if words.is_empty() && !at.faulty {
-            return Ok(());
-        }
-        self.execute_line()
-    }
-
-    /// A fault that the controller finds before it looks at any word.
-    fn text_fault(&self, scan: &Scan, line: u32) -> Option<Box<Fault>> {
-        scan.faults_of(line).iter().find(|f| before_words(f.rs)).map(convert_fault)
-    }
-
-    /// The first fault of a line.
-    pub(crate) fn first_fault(&self, scan: &Scan, line: u32) -> Option<Box<Fault>> {
-        scan.faults_of(line).first().map(convert_fault)
-    }
-
-    /// The fault behind a damaged piece of the present line.
-    pub(crate) fn parse_fault(&self, scan: &Scan) -> Box<Fault> {
-        self.first_fault(scan, self.reading.line)
-            .unwrap_or_else(|| Fault::new(code::NUMBER_MALFORMED, rs274::BAD_NUMBER_FORMAT).arg("").arg(""))
-    }
-
     /// Stands in for `rs274`: told to go on after an error, it does so with whatever the controller is left with.
     fn stands_in(&self) -> bool {
         self.setup.keep_going && !self.setup.startup_code
@@ -818,38 +506,9 @@ impl<'a, S: Sink> Interp<'a, S> {
         (self.sub_name, self.came_back) = (None, false);
         self.defining_sub = false;
         self.skip = None;
-        self.offsets.clear();
+        self.labels.forget();
         self.loops.clear();
         self.queue.clear();
-    }
-
-    fn outcome(&mut self, end: End) -> Outcome {
-        self.unclosed();
-        let mut damaged = Vec::new();
-        for id in &self.opened.order {
-            if self.files.is_plain(*id) {
-                continue;
-            }
-            let file = self.files.file(*id);
-            for (c, chunk) in file.chunks.iter().enumerate() {
-                let mut last = u32::MAX;
-                for fault in &chunk.scan.faults {
-                    let line = file.first_lines[c] + fault.line;
-                    if line != last && !self.opened.damaged_met.contains(&(*id, line)) {
-                        damaged.push((*id, line));
-                    }
-                    last = line;
-                }
-            }
-        }
-        Outcome {
-            end,
-            findings: std::mem::take(&mut self.findings),
-            damaged,
-            blocks: self.blocks,
-            calls: self.emitted,
-            files: self.opened.order.clone(),
-        }
     }
 
     /// The outcome so far, for callers that step.
@@ -907,71 +566,4 @@ impl<'a, S: Sink> Interp<'a, S> {
             _ => None,
         })
     }
-}
-
-/// Runs one chunk that holds no control flow from a given state. Lines of calls and findings are relative to
-/// the chunk. Budgets count within the chunk.
-pub fn run_chunk<S: Sink>(chunk: &Chunk, state: &State, params: &Params, setup: &Setup, sink: S) -> ChunkExit {
-    let lines = 0..chunk.scan.lines.len() as u32;
-    run_lines(chunk, lines, state, params, setup, sink)
-}
-
-/// Runs some lines of such a chunk.
-pub fn run_lines<S: Sink>(
-    chunk: &Chunk,
-    lines: std::ops::Range<u32>,
-    state: &State,
-    params: &Params,
-    setup: &Setup,
-    sink: S,
-) -> ChunkExit {
-    let mut files = NoFiles::default();
-    let tools = state.tools.clone().unwrap_or_else(|| Arc::new(setup.tools.clone()));
-    let mut run = Interp::with(&mut files, setup, sink, state.clone(), params.clone(), tools);
-    run.log = Some(Box::new(Log { before: params.clone(), ..Log::default() }));
-    run.reading.text = chunk.text.clone();
-    run.reading.scan = chunk.scan.clone();
-    let mut end = End::Chunk;
-    for line in lines.start..lines.end.min(chunk.scan.lines.len() as u32) {
-        run.next = line + 1;
-        run.place.line = line;
-        if let Err(fault) = run.line(&chunk.scan, &chunk.text, line) {
-            if run.fails(fault) {
-                end = End::Fault;
-                break;
-            }
-        }
-        if let Flow::End(why) = run.flow {
-            end = why;
-            break;
-        }
-    }
-    let log = run.log.take().unwrap_or_default();
-    ChunkExit {
-        end,
-        reads: log.reads,
-        writes: log.writes,
-        open_ended: log.named,
-        blocks: run.blocks,
-        calls: run.emitted,
-        findings: std::mem::take(&mut run.findings),
-        state: run.state(),
-        params: run.params,
-    }
-}
-
-fn trim_end(text: &[u8], start: u32, end: u32) -> u32 {
-    let mut end = end as usize;
-    while end > start as usize && matches!(text.get(end - 1), Some(b'\n' | b'\r')) {
-        end -= 1;
-    }
-    end as u32
-}
-
-fn before_words(rs: Rs274) -> bool {
-    rs == rs274::UNCLOSED_COMMENT || rs == rs274::NESTED_COMMENT || rs == rs274::COMMAND_TOO_LONG
-}
-
-pub(crate) fn convert_fault(f: &gr_gcode::Fault) -> Box<Fault> {
-    Box::new(Fault { code: f.code, rs: Some(f.rs), args: f.args.to_vec(), own_args: Vec::new(), letter: None, span: Some(f.span) })
 }

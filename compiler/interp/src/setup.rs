@@ -30,6 +30,9 @@ pub struct Setup {
     pub startup_code: bool,
     /// M99 in the main program begins it again, as on the machine; `rs274` ends.
     pub loop_on_main_m99: bool,
+    /// The Python parts of remapped codes are left out, with a warning. The real `rs274` without Python knows no such
+    /// codes.
+    pub without_python: bool,
     /// Go on after an error as `rs274 -n 0` does; `check` does too, to find more than one.
     pub keep_going: bool,
 }
@@ -49,6 +52,7 @@ impl Default for Setup {
             uvw: true,
             startup_code: true,
             loop_on_main_m99: false,
+            without_python: true,
             keep_going: false,
         }
     }

@@ -42,6 +42,22 @@ pub fn decode(bytes: Vec<u8>) -> Decoded {
     }
 }
 
+/// Turns bytes into the text that LinuxCNC reads: it knows neither byte order marks nor UTF-16 and takes them for
+/// characters of the program.
+pub fn decode_as_linuxcnc(bytes: Vec<u8>) -> Decoded {
+    if bytes.starts_with(&[0xFF, 0xFE]) || bytes.starts_with(&[0xFE, 0xFF]) {
+        return Decoded { text: bytes.iter().map(|b| *b as char).collect(), encoding: Encoding::Latin1 };
+    }
+    let mark = bytes.starts_with(&[0xEF, 0xBB, 0xBF]);
+    let mut decoded = decode(bytes);
+    if mark {
+        let latin1 = decoded.encoding == Encoding::Latin1;
+        decoded.text.insert_str(0, if latin1 { "\u{EF}\u{BB}\u{BF}" } else { "\u{FEFF}" });
+        decoded.encoding = if latin1 { Encoding::Latin1 } else { Encoding::Utf8 };
+    }
+    decoded
+}
+
 fn utf16(bytes: &[u8], unit: fn([u8; 2]) -> u16) -> String {
     let units = bytes.chunks_exact(2).map(|p| unit([p[0], p[1]]));
     char::decode_utf16(units).map(|c| c.unwrap_or(char::REPLACEMENT_CHARACTER)).collect()
@@ -49,7 +65,19 @@ fn utf16(bytes: &[u8], unit: fn([u8; 2]) -> u16) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{Encoding, decode};
+    use super::{Encoding, decode, decode_as_linuxcnc};
+
+    #[test]
+    fn linuxcnc_takes_marks_for_characters() {
+        for (bytes, text) in [
+            (b"G1".to_vec(), "G1"),
+            (b"\xEF\xBB\xBFG1".to_vec(), "\u{FEFF}G1"),
+            (b"\xEF\xBB\xBF(\xFC)".to_vec(), "\u{EF}\u{BB}\u{BF}(\u{FC})"),
+            (b"\xFF\xFEG\x00".to_vec(), "\u{FF}\u{FE}G\0"),
+        ] {
+            assert_eq!(decode_as_linuxcnc(bytes).text, text);
+        }
+    }
 
     #[test]
     fn marks_and_fallback() {

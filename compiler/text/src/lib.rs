@@ -8,7 +8,7 @@ mod diagnostic;
 mod findings;
 mod lines;
 
-pub use decode::{Decoded, Encoding, decode};
+pub use decode::{Decoded, Encoding, decode, decode_as_linuxcnc};
 pub use diagnostic::{Diagnostic, Fix, Frame, Label};
 pub use findings::Findings;
 pub use gr_spec::{Code, Severity, code};

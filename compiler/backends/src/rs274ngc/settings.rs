@@ -176,11 +176,10 @@ impl Emitter<'_> {
         };
         // Nothing is known of the lengths of a machine without a tool table; the program says which it wants.
         let unmeasured = zero && !off && named.is_none();
-        let said = if unmeasured { self.number_of('h', view.source) } else { None };
+        let wanted = words.is_some_and(|w| w.g(430));
+        let said = if unmeasured { self.length_asked(view) } else { None };
         let block = match (named, self.options.language) {
-            (None, Language::Linuxcnc | Language::FanucMill) if said.is_some() => {
-                format!("G43 H{}", said.unwrap_or_default())
-            }
+            (None, Language::Linuxcnc | Language::FanucMill) if wanted && said.is_some() => said.unwrap_or_default(),
             _ if off || (zero && named.is_none()) => "G49".to_string(),
             (Some(n), Language::Linuxcnc | Language::FanucMill) => format!("G43 H{n}"),
             (_, Language::Linuxcnc) => format!("G43.1 {}", self.changed_all(offset)),
@@ -200,6 +199,19 @@ impl Emitter<'_> {
     fn changed_all(&self, offset: &Axes) -> String {
         let words = self.changed(offset, &self.frame.tool_offset);
         if words.is_empty() { "Z0".into() } else { words.join(" ") }
+    }
+
+    /// The block that asks for the length of a tool of which the source knows no length.
+    fn length_asked(&self, view: &View<'_, '_>) -> Option<String> {
+        let line = self.sources.line(view.source.file, view.source.line)?;
+        let code = line.split(['(', ';']).next()?;
+        let tool = u32::try_from(view.state.tool).ok().filter(|t| *t > 0);
+        let has_h = code.contains(['h', 'H']);
+        match self.number_of('h', view.source).or(tool.filter(|_| has_h || self.options.language == Language::FanucMill)) {
+            Some(number) => Some(format!("G43 H{number}")),
+            // Without H it is the length of the tool in the spindle.
+            None => (!has_h && self.options.language == Language::Linuxcnc).then(|| "G43".to_string()),
+        }
     }
 
     /// The number behind a letter of a source line, where it is a plain one.

@@ -163,8 +163,8 @@ pub fn check(path: &Path, station: &Station) -> Checked {
     match read(path) {
         Ok(decoded) => {
             let mut checked = checked(&name, path, &decoded.text, station);
-            if decoded.encoding == gr_text::Encoding::Utf8Bom {
-                byte_order_mark(&mut checked, &name, decoded.text, station);
+            if !matches!(decoded.encoding, gr_text::Encoding::Utf8 | gr_text::Encoding::Latin1) && !exchange::is_exchange(path, &decoded.text) {
+                byte_order_mark(&mut checked, (&name, path), decoded.text, station);
             }
             checked
         }
@@ -173,14 +173,18 @@ pub fn check(path: &Path, station: &Station) -> Checked {
 }
 
 /// The mark is not part of the text, but the control reads it.
-fn byte_order_mark(checked: &mut Checked, name: &str, text: String, station: &Station) {
+fn byte_order_mark(checked: &mut Checked, (name, path): (&str, &Path), text: String, station: &Station) {
     if station.lints.allow.contains(&code::TEXT_BYTE_ORDER_MARK) {
         return;
     }
+    let refused = !station.undeclared(path, &text) && station.setup_for(path, &text).dialect.family == gr_spec::Family::Linuxcnc;
     if checked.sources.get(FileId(0)).is_none() {
         checked.sources.add(name, text);
     }
     let mut d = Diagnostic::new(code::TEXT_BYTE_ORDER_MARK, FileId(0), Span::default(), &[]);
+    if refused {
+        d.severity = Severity::Error;
+    }
     station.lints.harden(&mut d);
     checked.found.insert(0, d);
 }

@@ -12,7 +12,7 @@ use gr_driver::Loaded;
 use gr_gcode::Chunk;
 use gr_interp::{End, Finding, Interp, Setup, ToolTable};
 use gr_spec::{Dialect, Rs274, fill, rs274};
-use gr_text::{Decoded, Encoding, FileId, decode};
+use gr_text::{FileId, decode, decode_as_linuxcnc};
 
 use crate::sources::is_latin1;
 
@@ -353,18 +353,8 @@ fn program(choice: &Choice) -> Program {
     let name = path.display().to_string();
     match std::fs::read(path) {
         Ok(bytes) => {
-            // The real command takes a byte order mark for characters of the program.
-            let mark = bytes.starts_with("\u{FEFF}".as_bytes());
-            // Nor does it know UTF-16: the bytes are what they are.
-            let wide = bytes.starts_with(&[0xFF, 0xFE]) || bytes.starts_with(&[0xFE, 0xFF]);
-            let mut decoded = match wide {
-                true => Decoded { text: bytes.iter().map(|b| *b as char).collect(), encoding: Encoding::Latin1 },
-                false => decode(bytes),
-            };
+            let decoded = decode_as_linuxcnc(bytes);
             let latin1 = is_latin1(&decoded);
-            if mark {
-                decoded.text.insert_str(0, if latin1 { "\u{EF}\u{BB}\u{BF}" } else { "\u{FEFF}" });
-            }
             Program { name, text: without_lone_returns(decoded.text), latin1, open: Some(Ok(())) }
         }
         Err(_) => {
@@ -407,6 +397,7 @@ fn printer(choice: &Choice, latin1: bool) -> Result<Out, Quit> {
 
 fn setup(choice: &Choice, tools: ToolTable) -> Setup {
     let mut setup = Setup {
+        without_python: false,
         dialect: dialect(choice.version),
         version: choice.version,
         machine_units: Units::Inch,
