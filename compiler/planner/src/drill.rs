@@ -41,7 +41,7 @@ pub(crate) fn drill(e: &mut Emit<'_>, step: &Workingstep, d: &Drilling, feature:
     } else {
         [0.0; 2]
     };
-    checks(e, step, feature, depth);
+    checks(e, step, d, feature, depth);
     for frame in &feature.copies {
         let top = frame.origin[2].max(frame.point([0.0, 0.0, 0.0])[2]);
         let retract = step.operation.retract.unwrap_or(if frame.upright() { security - top } else { 5.0 }).max(0.0);
@@ -158,11 +158,17 @@ fn back(e: &mut Emit<'_>, job: &Job<'_>, aside: [f64; 2]) {
     e.turn(way);
 }
 
-fn checks(e: &mut Emit<'_>, step: &Workingstep, feature: &Feature, depth: f64) {
+fn checks(e: &mut Emit<'_>, step: &Workingstep, d: &Drilling, feature: &Feature, depth: f64) {
     let tool = &step.operation.tool;
     let name = format!("T{} '{}'", tool.number, tool.name);
     if let Some(l) = tool.cutting_length.filter(|l| depth > *l + 1e-6) {
         e.say(code::PLAN_DEEPER_THAN_EDGE, step.operation.origin, &[&step.operation.keyword, &depth.to_string(), &name, &l.to_string()]);
+    }
+    let through = matches!(feature.shape, Shape::Hole { bottom: HoleBottom::Through, .. });
+    let drills = matches!(step.operation.keyword.as_str(), "DRILLING" | "MULTISTEP_DRILLING");
+    if step.operation.overcut.is_some() && !(through && drills && d.depth.is_none()) {
+        let of = format!("#{} {}", step.operation.origin.id, step.operation.keyword);
+        e.say(code::PLAN_NO_EFFECT, step.operation.origin, &["overcut_length", &of, "the depth of the cut is given, or is that of the feature"]);
     }
     if let Shape::Hole { diameter, .. } = feature.shape {
         let whole = !matches!(step.operation.keyword.as_str(), "CENTER_DRILLING" | "COUNTER_SINKING");

@@ -130,6 +130,18 @@ impl<'m> Reader<'m> {
     pub fn no_effect(&mut self, node: Node<'_>, attribute: &str, why: &str) {
         self.say_at(code::PLAN_NO_EFFECT, node, attribute, &[attribute, &title(node), why]);
     }
+    /// Told to have no effect if it is given.
+    pub fn unused(&mut self, node: Node<'_>, attribute: &str, why: &str) {
+        if node.attr(attribute).is_some() {
+            self.no_effect(node, attribute, why);
+        }
+    }
+    /// Likewise where it is a flag that is set.
+    pub fn unused_flag(&mut self, node: Node<'_>, attribute: &str, why: &str) {
+        if node.attr(attribute).and_then(|v| v.boolean()) == Some(true) {
+            self.no_effect(node, attribute, why);
+        }
+    }
     pub fn failed(&self) -> bool {
         self.out.iter().any(|d| d.severity == Severity::Error)
     }
@@ -340,6 +352,9 @@ impl<'m> Reader<'m> {
             self.missing(node, "its_secplane", "rapids need a plane above which they are safe");
             return None;
         };
+        if security.normal[2] < 1.0 - 1e-9 {
+            self.no_effect(node, "its_secplane", "it is not level; only the height of its point counts");
+        }
         let op = self.operation(operation);
         let feature = self.feature(feature, setup, operation.id());
         let (operation, feature) = (op?, feature?);

@@ -92,6 +92,7 @@ pub(crate) fn mill(e: &mut Emit<'_>, step: &Workingstep, m: &Milling, feature: &
         }
     };
     job.check_approach(e, &moves);
+    job.unused(e, &moves);
     for frame in &feature.copies {
         write(e, step, frame, &moves, given.security);
     }
@@ -295,6 +296,42 @@ impl Job<'_> {
             other => to(other, false)?,
         };
         Ok(tp::Entry { approach: to(&self.m.approach, true)?, retract, by_level: true })
+    }
+    /// What is given and says nothing about this feature.
+    fn unused(&self, e: &mut Emit<'_>, moves: &Moves) {
+        let (o, shape) = (&self.step.operation, &self.feature.shape);
+        let say = |e: &mut Emit<'_>, origin: Origin, what: &str, of: &str, why: &str| {
+            e.say(code::PLAN_NO_EFFECT, origin, &[what, &format!("#{} {of}", origin.id), why]);
+        };
+        let face = matches!(shape, Shape::Face { .. });
+        if o.overcut.is_some() && self.bottom <= self.depth && !face {
+            say(e, o.origin, "overcut_length", &o.keyword, "it goes neither through nor over an edge");
+        }
+        if self.start().is_some() && (face || matches!(shape, Shape::Slot { .. })) {
+            say(e, o.origin, "start_point", &o.keyword, "where it begins follows from the feature");
+        }
+        if let Some(s) = &self.m.strategy {
+            if self.m.bottom && s.multiple == Some(false) {
+                say(e, s.origin, "allow_multiple_passes", &s.keyword, "as many passes are made as the area needs");
+            }
+            if !self.m.bottom {
+                let why = "a wall is followed in the direction of its cut mode";
+                if s.ccw.is_some() {
+                    say(e, s.origin, "rotation_direction", &s.keyword, why);
+                }
+            }
+        }
+        let out = |arc: bool| moves.iter().any(|m| m.tag == tp::Tag::Retract && matches!(m.kind, tp::Kind::Arc { .. }) == arc && m.kind != tp::Kind::Rapid);
+        let given = match self.m.retract {
+            Approach::Tangent(_) => out(true),
+            Approach::Angle(..) => out(false),
+            Approach::Ramp(_) | Approach::Helix(..) | Approach::Zigzag(..) => false,
+            _ => true,
+        };
+        if !given {
+            let why = "there is no room for it, or it is a way in";
+            e.say(code::PLAN_APPROACH_CHANGED, o.origin, &["the way out", "one along the tool axis", why]);
+        }
     }
     /// A helix or an arc that found no room was replaced by a slope or a plunge: that is said.
     fn check_approach(&self, e: &mut Emit<'_>, moves: &Moves) {

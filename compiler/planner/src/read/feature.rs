@@ -167,6 +167,9 @@ impl<'m> Reader<'m> {
             self.missing(node, "depth", "it says how deep the feature is");
             return None;
         };
+        if plane.normal[2].abs() < 1.0 - 1e-9 {
+            self.no_effect(node, "depth", "its plane is not square to the feature's axis; only how far below its point lies counts");
+        }
         let depth = -plane.point[2] + 0.0;
         if depth < 0.0 {
             self.say_at(code::PLAN_BAD_SIZE, node, "depth", &[&title(node), "depth", &format!("{depth} (above the feature)"), "at or below its placement"]);
@@ -211,6 +214,9 @@ impl<'m> Reader<'m> {
                     return None;
                 };
                 let wall = node.node("wall_boundary");
+                if let Some(w) = wall {
+                    self.unplaced(w, "its wall begins at its edge");
+                }
                 let radius = wall.and_then(|w| w.length("profile_radius")).unwrap_or(0.0);
                 // One side of the V is the floor, the other the wall.
                 let square = std::f64::consts::FRAC_PI_2;
@@ -329,6 +335,10 @@ impl<'m> Reader<'m> {
             y: around.inverse_vector(own.y),
             z: around.inverse_vector(own.z),
         };
+        if local.z[2] < 1.0 - 1e-9 {
+            self.not_lowered(node, ": its axis is not that of the feature it stands in");
+            return None;
+        }
         let profile = self.need(node, "its_boundary")?;
         let contour = self.closed_contour(profile, &own)?;
         let points = contour.points.iter().map(|p| {
@@ -345,7 +355,11 @@ impl<'m> Reader<'m> {
             self.not_lowered(course, " as the course of a planar face");
             return None;
         };
+        if course.node("placement").and_then(|p| self.placement(p)).is_some_and(|f| norm(f.origin) > 1e-9) {
+            self.no_effect(course, "placement", "a face begins at its own placement");
+        }
         let profile = self.need(node, "removal_boundary")?;
+        self.in_millimetres(profile, "profile_length");
         let width = self.positive(profile, "profile_length", "it says how wide the face is")?;
         let placed = profile.node("placement").and_then(|p| self.placement(p)).map(|f| [f.x[0], f.x[1]]);
         let square = [direction[1].abs(), direction[0].abs()];
@@ -358,6 +372,15 @@ impl<'m> Reader<'m> {
         let bosses = self.bosses(node, &placement)?;
         let across = across.unwrap_or(if direction[0] * direction[1] == 0.0 { square } else { [-direction[1], direction[0]] });
         Some(Shape::Face { length, direction, width, across, boundary, bosses })
+    }
+
+    /// Numbers with a unit of their own are read as millimeters.
+    fn in_millimetres(&mut self, node: Node<'m>, attribute: &str) {
+        let Some(number) = node.node(attribute).filter(|n| n.attr("its_parameter_unit").is_some()) else { return };
+        let unit = number.string("its_parameter_unit").trim().to_lowercase();
+        if !["", "mm", "millimetre", "millimeter"].contains(&unit.as_str()) {
+            self.no_effect(number, "its_parameter_unit", "lengths are millimeters");
+        }
     }
 
     fn hole(&mut self, node: Node<'m>) -> Option<Shape> {
@@ -445,7 +468,17 @@ impl<'m> Reader<'m> {
         }
     }
 
+    /// A placement of its own that is more than none.
+    fn unplaced(&mut self, node: Node<'m>, why: &str) {
+        if node.node("placement").and_then(|p| self.placement(p)).is_some_and(|f| norm(f.origin) > 1e-9 || f.z[2] < 1.0 - 1e-9) {
+            self.no_effect(node, "placement", why);
+        }
+    }
+
     fn section(&mut self, node: Node<'m>) -> Option<Section> {
+        if node.keyword() != "GENERAL_PROFILE" {
+            self.unplaced(node, "its section lies on the course of travel");
+        }
         let angle = |r: &Self, a: &str| node.real(a).map_or(0.0, |v| r.angle(v));
         Some(match node.keyword() {
             "SQUARE_U_PROFILE" => Section::SquareU {

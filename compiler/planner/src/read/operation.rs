@@ -31,12 +31,19 @@ impl<'m> Reader<'m> {
         }
         let direction = direction.map(|d| d.keyword().to_string());
         let kind = if node.is_a("drilling_type_operation") {
+            self.unused_in_drilling(node);
             OperationKind::Drill(self.drilling(node))
         } else if node.is_a("two5d_milling_operation") {
             OperationKind::Mill(self.milling(node))
         } else {
             OperationKind::Other
         };
+        if node.keyword() != "BACK_BORING"
+            && let Some(t) = node.node("its_tool")
+        {
+            self.unused(t, "direction_for_spindle_orientation", "only back boring stops the spindle in a direction");
+            self.unused(t, "tool_holder_diameter_for_spindle_orientation", "only back boring goes through a hole aside");
+        }
         Some(Operation {
             origin: origin(node),
             keyword: node.keyword().to_string(),
@@ -99,6 +106,21 @@ impl<'m> Reader<'m> {
         }
     }
 
+    /// What says nothing about holes of this kind.
+    fn unused_in_drilling(&mut self, node: Node<'m>) {
+        let k = node.keyword();
+        self.unused(node, "start_point", "a hole is made on its own axis");
+        if matches!(k, "MULTISTEP_DRILLING" | "TAPPING" | "BACK_BORING" | "THREAD_DRILLING") {
+            self.unused(node, "its_machining_strategy", "its feed and speed stay the same all the way");
+        }
+        if matches!(k, "TAPPING" | "BACK_BORING" | "THREAD_DRILLING") {
+            self.unused(node, "feed_on_retract", "it goes out as it went in");
+        }
+        if node.attr("depth_of_testcut").is_none() {
+            self.unused(node, "waiting_position", "there is no test cut");
+        }
+    }
+
     fn milling(&mut self, node: Node<'m>) -> Milling {
         let k = node.keyword();
         let number = |a: &str| node.real(a).filter(|v| v.is_finite());
@@ -122,6 +144,10 @@ impl<'m> Reader<'m> {
         let connection = choice("its_stroke_connection_strategy");
         if connection.as_deref().is_some_and(|c| c == "DEGOUGE" || c == "LOOP_BACK") {
             self.no_effect(node, "its_stroke_connection_strategy", "strokes are joined by the shortest way that stays inside");
+        }
+        let walls = matches!(node.keyword(), "BIDIRECTIONAL_CONTOUR" | "CONTOUR_BIDIRECTIONAL");
+        if walls && choice("rotation_direction").is_some() {
+            self.unused(node, "spiral_cutmode", "rotation_direction decides which way it goes round");
         }
         Strategy {
             origin: origin(node),
@@ -195,8 +221,33 @@ impl<'m> Reader<'m> {
             bar: node.real("tool_holder_diameter_for_spindle_orientation").filter(|d| *d > 0.0),
             number: 0,
         };
+        self.unused_of_tool(node, body, dimension, &tool);
         tool = self.numbered(tool);
         Some(tool)
+    }
+
+    /// Attributes of tools that no path depends on.
+    fn unused_of_tool(&mut self, node: Node<'m>, body: Node<'m>, dimension: Option<Node<'m>>, tool: &Tool) {
+        self.unused(body, "pilot_length", "depths count to the tip");
+        self.unused_flag(body, "coolant_through_tool", "the machine functions of the operation switch coolant");
+        if tool.length != node.real("overall_assembly_length") {
+            self.unused(node, "overall_assembly_length", "the length of its cutting edge counts");
+        }
+        let Some(d) = dimension else { return };
+        let pointed = ["DRILL", "COUNTERS", "SPOT", "REAMER", "TAP"].iter().any(|k| tool.kind.contains(k)) && !tool.kind.starts_with("TAPERED_END");
+        if !pointed && tool.tip_angle.is_some() {
+            self.unused(d, "tool_tip_half_angle", "its face is taken as flat");
+        }
+        if !tool.kind.starts_with("TAPERED") && d.real("tool_circumference_angle").is_some_and(|a| a != 0.0) {
+            self.unused(d, "tool_circumference_angle", "its side is taken as a cylinder");
+        }
+        let near = |a: &str, v: f64| d.real(a).is_none_or(|x| (x - v).abs() < 1e-6);
+        if !near("edge_center_vertical", tool.edge_radius) {
+            self.unused(d, "edge_center_vertical", "the rounding of its edge is taken as tangent to its face");
+        }
+        if !near("edge_center_horizontal", tool.diameter / 2.0 - tool.edge_radius) {
+            self.unused(d, "edge_center_horizontal", "the rounding of its edge is taken as tangent to its side");
+        }
     }
 
     /// The tool with its number in the table.
