@@ -56,6 +56,8 @@ pub struct Motion {
     pub files: Vec<Box<str>>,
     /// Sums.
     pub report: Report,
+    /// What times are predicted with.
+    pub rates: Rates,
     /// Raw part, mm.
     pub stock: Option<[[f64; 3]; 2]>,
 }
@@ -195,7 +197,6 @@ impl View {
         self.derived.motion.get_or_init(|| self.run().map(Arc::new)).clone()
     }
     fn run(&self) -> Option<Motion> {
-        let rates = Rates::default();
         match self.kind {
             Kind::Gcode(_, dialect) if dialect.family != Family::Ufmg2008 => {
                 let text: Arc<str> = self.text.to_string().into();
@@ -204,16 +205,18 @@ impl View {
                 setup.budgets.blocks = setup.budgets.blocks.min(MOST_BLOCKS);
                 setup.budgets.calls = setup.budgets.calls.min(MOST_BLOCKS);
                 let made = gr_driver::lower(&self.path.to_string_lossy(), text, &setup, None);
+                let rates = gr_driver::rates(&setup);
                 let report = report(&made.program, &rates);
                 let files = made.texts.into_iter().map(|(name, _)| name).collect();
-                Some(Motion { program: made.program, files, report, stock: None })
+                Some(Motion { program: made.program, files, report, rates, stock: None })
             }
             Kind::Exchange => {
                 let exchange = self.exchange();
                 let plan = self.host.plan(&self.path, &exchange.text, &self.station)?;
+                let rates = gr_driver::rates(&self.station.setup_for(Dialect::linuxcnc()));
                 let report = report(&plan.program, &rates);
                 let files = vec![self.path.to_string_lossy().into()];
-                Some(Motion { program: plan.program, files, report, stock: plan.stock })
+                Some(Motion { program: plan.program, files, report, rates, stock: plan.stock })
             }
             _ => None,
         }

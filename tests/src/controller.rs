@@ -50,11 +50,14 @@ impl Controller {
 
     fn furnish(&self, display: &str, part: &Path, program: &str) {
         let from = root().join("tests/linuxcnc");
-        for name in ["machine.hal", "drive.py", "watch.py"] {
+        for name in ["machine.hal", "drive.py", "times.py", "watch.py"] {
             std::fs::copy(from.join(name), self.path(name)).expect("the file is in the repository");
         }
-        let executable = std::os::unix::fs::PermissionsExt::from_mode(0o755);
-        std::fs::set_permissions(self.path("drive.py"), executable).expect("writable");
+        let executable: std::fs::Permissions = std::os::unix::fs::PermissionsExt::from_mode(0o755);
+        for name in ["drive.py", "times.py"] {
+            let executable = std::fs::Permissions::clone(&executable);
+            std::fs::set_permissions(self.path(name), executable).expect("writable");
+        }
         std::fs::copy(root().join("docs/linuxcnc/stepnc_viewer.py"), self.path("stepnc_viewer.py")).expect("the viewer");
         std::fs::copy(part, self.path("part.p21")).expect("the part");
         // The user may not be allowed to look into the folder that the program was built in.

@@ -2,7 +2,8 @@
 //! Both are written as they are read; nothing is held in memory.
 
 use gr_ir::geometry::flatten;
-use gr_ir::measure::{Rates, measure};
+use gr_ir::measure::Rates;
+use gr_ir::timing::Clock;
 use gr_ir::{Arc, ArcPlane, Axes, FeedMode, Note, Op, Override, PathMode, Program, Source, Stop, Turn, Units, View};
 use std::io::{Result, Write};
 
@@ -320,9 +321,10 @@ pub fn csv(program: &Program, options: &CsvOptions, out: &mut dyn Write) -> Resu
     )?;
     let mut buffer = String::new();
     let mut ns = 0;
+    let clock = Clock::new(program, &options.rates);
     let mut cursor = program.cursor();
     while let Some(view) = cursor.next() {
-        ns += measure(&view, &options.rates).ns();
+        ns += clock.measure(&view).ns();
         if !view.op.moves() && !matches!(view.op, Op::Dwell(_) | Op::RigidTap { .. }) {
             continue;
         }

@@ -11,6 +11,7 @@ mod svg;
 pub mod trace;
 
 use gr_ir::Program;
+use gr_ir::measure::Rates;
 pub use html::page as preview_page;
 pub use path::Class;
 pub use trace::Trace;
@@ -50,6 +51,8 @@ pub struct Options {
     pub text: String,
     /// Page: tools for the marks of their changes.
     pub tools: Vec<ToolRow>,
+    /// Rapid rates, and what the machine can do.
+    pub rates: Rates,
 }
 
 impl Default for Options {
@@ -62,13 +65,14 @@ impl Default for Options {
             rapids: true,
             text: String::new(),
             tools: Vec::new(),
+            rates: Rates::default(),
         }
     }
 }
 
 /// A PNG picture.
 pub fn png(program: &Program, options: &Options) -> Result<Vec<u8>, String> {
-    let path = path::Path::new(program, options.rapids);
+    let path = path::Path::new(program, options.rapids, &options.rates);
     let mut canvas = raster::Raster::new(limit(options.width), limit(options.height));
     chart::draw(&path, options, &mut canvas);
     canvas.encode()
@@ -76,7 +80,7 @@ pub fn png(program: &Program, options: &Options) -> Result<Vec<u8>, String> {
 
 /// An SVG picture.
 pub fn svg(program: &Program, options: &Options) -> String {
-    let path = path::Path::new(program, options.rapids);
+    let path = path::Path::new(program, options.rapids, &options.rates);
     let mut canvas = svg::Svg::new(limit(options.width), limit(options.height), &options.title);
     chart::draw(&path, options, &mut canvas);
     canvas.finish()
@@ -84,7 +88,7 @@ pub fn svg(program: &Program, options: &Options) -> String {
 
 /// A page of its own, with the path inside: turn, zoom, play, measure, hide; the program stands beside it.
 pub fn html(program: &Program, options: &Options) -> String {
-    let trace = Trace::new(program, &trace::TraceOptions { tools: options.tools.clone(), ..trace::TraceOptions::default() });
+    let trace = Trace::new(program, &trace::TraceOptions { tools: options.tools.clone(), rates: options.rates, ..trace::TraceOptions::default() });
     let text = (!options.text.is_empty()).then_some(options.text.as_str());
     html::page(&options.title, Some(trace.json(&options.title)), text)
 }

@@ -168,10 +168,12 @@ fn remarks(sheet: &Sheet) -> Vec<String> {
     if r.run_time {
         out.push("The program probes or waits for inputs: path and time depend on what the machine finds.".into());
     }
-    out.push(format!(
-        "Times are estimates without acceleration; rapids at {} mm/min.",
-        number(sheet.rates.rapid * 60.0)
-    ));
+    let known = sheet.rates.dynamics.filter(gr_ir::timing::Dynamics::has_speeds);
+    out.push(match known {
+        Some(d) if d.known() => "Times are those of the machine's speeds, accelerations and corners; nobody turns the feed down.".into(),
+        Some(_) => "Times are estimates without acceleration; rapids at the speeds of the machine's axes.".into(),
+        None => format!("Times are estimates without acceleration; rapids at {} mm/min.", number(sheet.rates.rapid * 60.0)),
+    });
     out
 }
 

@@ -324,10 +324,10 @@ fn of_motion(mut motion: Motion, unit: &Unit, goal: &Goal<'_>) -> Result<Built, 
         "joint-gcode" => joints(&motion, goal)?,
         "json" => dumped(|out| gr_backends::dump::json(&motion.program, out)),
         "csv" => {
-            let options = gr_backends::dump::CsvOptions { tolerance: goal.options.arc_tolerance, ..Default::default() };
+            let options = gr_backends::dump::CsvOptions { tolerance: goal.options.arc_tolerance, rates: gr_driver::rates(&unit.setup), ..Default::default() };
             dumped(|out| gr_backends::dump::csv(&motion.program, &options, out))
         }
-        "svg" | "png" | "html" => one_picture(&motion.program, goal.target, &name)?,
+        "svg" | "png" | "html" => one_picture(&motion.program, unit, goal.target, &name)?,
         "sheet" | "sheet-json" | "sheet-html" => Ok((one(sheet(&motion, unit, goal.target, &name)), Vec::new())),
         other => return Err(format!("the target {other} can't be made by this version")),
     };
@@ -361,8 +361,8 @@ fn restart(motion: &mut Motion, line: u32, safe_z: Option<f64>) {
     }
 }
 
-fn one_picture(program: &Program, kind: &str, name: &str) -> Result<Made, String> {
-    let options = gr_backends::plot::Options { title: name.to_string(), ..gr_backends::plot::Options::default() };
+fn one_picture(program: &Program, unit: &Unit, kind: &str, name: &str) -> Result<Made, String> {
+    let options = gr_backends::plot::Options { title: name.to_string(), rates: gr_driver::rates(&unit.setup), ..gr_backends::plot::Options::default() };
     Ok(Ok((one(picture(program, kind, &options)?), Vec::new())))
 }
 
@@ -399,7 +399,7 @@ fn sheet(motion: &Motion, unit: &Unit, kind: &str, name: &str) -> Vec<u8> {
     let options = gr_backends::sheet::Options {
         title: name.to_string(),
         tools: tool_rows(motion, unit),
-        ..gr_backends::sheet::Options::default()
+        rates: gr_driver::rates(&unit.setup),
     };
     let sheet = gr_backends::sheet::sheet(&motion.program, &options);
     let text = match kind {

@@ -322,7 +322,20 @@ pub fn setpoints(motion: &Motion, goal: &Goal<'_>, texts: &dyn Sources, name: &s
     let artifacts = vec![Artifact::new("", made.csv().into_bytes()), Artifact::new(".bin", made.bytes())];
     let seconds = made.rows.len().saturating_sub(1) as f64 * interval;
     let summary = format!("{}  {} set-points, {} s with acceleration\n", summary(&planned), made.rows.len(), short(seconds));
-    Ok(Ok(Made { artifacts, summary, notes: planned.warnings }))
+    let mut notes = planned.warnings;
+    notes.extend(corners_kept(&planned.program, texts));
+    Ok(Ok(Made { artifacts, summary, notes }))
+}
+
+/// Says, where the program begins to allow rounded corners, that there are none.
+fn corners_kept(program: &gr_robot::RobotProgram, texts: &dyn Sources) -> Option<Diagnostic> {
+    use gr_robot::{Action, Zone};
+    let rounded = program.steps.iter().find(|s| match s.action {
+        Action::Joint { zone, .. } | Action::Linear { zone, .. } | Action::Arc { zone, .. } => zone != Zone::Stop,
+        _ => false,
+    })?;
+    let (file, span) = texts.place(rounded.source?);
+    Some(Diagnostic::new(gr_text::code::SETPOINTS_CORNERS_KEPT, file, span, &[]))
 }
 
 /// How exactly the joint values of a program put the tool where it should be.

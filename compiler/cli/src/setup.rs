@@ -128,13 +128,22 @@ fn ini_path(setup: &Setup, section: &str, key: &str) -> Option<PathBuf> {
     path.is_file().then_some(path)
 }
 
-/// The travel of a machine, where the INI file does not say otherwise.
+/// Travel, speeds and accelerations of a machine, where the INI file does not say otherwise.
 fn limits(machine: &gr_machine::Machine, setup: &mut Setup) {
+    if machine.kind == gr_machine::Kind::Robot {
+        // The file then is that of the mill the program was made for: its axes are not the robot's.
+        let of_axes = |key: &str| ["min_limit", "max_limit", "max_velocity", "max_acceleration"].contains(&key);
+        setup.ini.values.retain(|(section, key), _| !(section.starts_with("axis_") && of_axes(key)));
+        return;
+    }
     // Limits of an INI file are in the unit that the file states.
     let scale = if setup.ini.machine_units() == Some(Units::Inch) { 25.4 } else { 1.0 };
-    for (i, (axis, (min, max))) in "xyzabcuvw".chars().zip(machine.travel().unwrap_or_default()).enumerate() {
+    let travel = machine.travel().unwrap_or_default().into_iter().zip(machine.speeds().unwrap_or_default());
+    let all = travel.zip(machine.accelerations().unwrap_or_default());
+    for (i, (axis, (((min, max), (_, speed)), acceleration))) in "xyzabcuvw".chars().zip(all).enumerate() {
         let shown = |v: f64| if (3..6).contains(&i) { v.to_degrees() } else { v / scale };
-        for (key, value) in [("min_limit", min), ("max_limit", max)] {
+        let rows = [("min_limit", min), ("max_limit", max), ("max_velocity", speed), ("max_acceleration", acceleration)];
+        for (key, value) in rows {
             if let Some(value) = value {
                 let entry = setup.ini.values.entry((format!("axis_{axis}"), key.into())).or_default();
                 if entry.is_empty() {

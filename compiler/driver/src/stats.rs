@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use gr_canon::{At, Call, CallFrame, FileId, FrameId, Mark, Sink};
 use gr_interp::Interp;
-use gr_ir::measure::{Rates, Report, report};
+use gr_ir::measure::{Report, report};
 use gr_ir::{Lowering, Program};
 
 use crate::db::{Db, Document};
@@ -15,7 +15,8 @@ use crate::library::Library;
 /// What a file adds up to, as far as it runs.
 #[salsa::tracked(returns(clone), no_eq)]
 pub(crate) fn stats(db: &dyn Db, document: Document) -> Arc<Report> {
-    Arc::new(report(&motion(db, document), &Rates::default()))
+    let rates = crate::rates(&document.run(db).options(db).setup);
+    Arc::new(report(&motion(db, document), &rates))
 }
 
 /// Motion of a file, as far as it runs; sources are numbered as in the session.

@@ -14,6 +14,7 @@ mod sources;
 mod state;
 mod store;
 pub mod text;
+pub mod timing;
 
 pub use gr_canon::{Axes, FrameId, Plane, Units};
 pub use gr_text::FileId;

@@ -1,7 +1,9 @@
-//! Time, length and extent of a program. An estimate without acceleration; sums are integers (ns, nm), so
-//! that the parts of a program add up to the whole in any order.
+//! Time, length and extent of a program. Times are without acceleration unless the machine's limits are known
+//! ([`Rates::dynamics`], [`Clock`]); sums are integers (ns, nm), so that the parts of a program add up to the whole in
+//! any order.
 
 use crate::geometry::{Extent, Length, length};
+use crate::timing::{Clock, Dynamics};
 use crate::{FeedMode, Marker, Op, Program, Source, State, Turn, View};
 
 /// What the program does not say.
@@ -13,12 +15,14 @@ pub struct Rates {
     pub rapid_angular: f64,
     /// A tool change, s.
     pub tool_change: f64,
+    /// What the machine can do, where it is known: rapids and feeds then take the time that the machine takes.
+    pub dynamics: Option<Dynamics>,
 }
 
 impl Default for Rates {
     /// 6 m/min, 60°/s, tool change in no time.
     fn default() -> Rates {
-        Rates { rapid: 100.0, rapid_angular: std::f64::consts::FRAC_PI_3, tool_change: 0.0 }
+        Rates { rapid: 100.0, rapid_angular: std::f64::consts::FRAC_PI_3, tool_change: 0.0, dynamics: None }
     }
 }
 
@@ -66,13 +70,13 @@ impl Totals {
 }
 
 /// A value in units of 1e-9, rounded; what is no number or negative counts 0.
-fn nano(value: f64) -> u64 {
+pub(crate) fn nano(value: f64) -> u64 {
     // Casts from f64 saturate, and NaN gives 0.
     libm::round(value * 1e9) as u64
 }
 
 /// Speed of a feed move, mm/s (or rad/s).
-fn speed(state: &State, view: &View<'_, '_>, angular: bool) -> f64 {
+pub(crate) fn speed(state: &State, view: &View<'_, '_>, angular: bool) -> f64 {
     if let Some(sync) = state.sync.filter(|s| !s.velocity) {
         return sync.per_rev * rpm(state, sync.spindle, view) / 60.0;
     }
@@ -94,7 +98,7 @@ fn rpm(state: &State, spindle: i32, view: &View<'_, '_>) -> f64 {
     }
 }
 
-/// What one operation adds.
+/// What one operation adds, taken alone: without acceleration. Programs are timed by a [`Clock`].
 pub fn measure(view: &View<'_, '_>, rates: &Rates) -> Totals {
     let mut t = Totals { operations: 1, ..Totals::default() };
     match view.op {
@@ -238,9 +242,10 @@ pub fn report(program: &Program, rates: &Rates) -> Report {
     let mut run =
         Run { known: Known::default(), out: Report::default(), tool: 0, open: Vec::new(), cycle: None, offset: None };
     run.select(program.start_state().tool, Source::default());
+    let clock = Clock::new(program, rates);
     let mut cursor = program.cursor();
     while let Some(view) = cursor.next() {
-        run.step(&view, rates);
+        run.step(&view, &clock);
     }
     let mut out = run.out;
     out.tools.retain(|t| t.tool >= 0 || t.totals.moves > 0);
@@ -293,7 +298,7 @@ struct Run {
 }
 
 impl Run {
-    fn step(&mut self, view: &View<'_, '_>, rates: &Rates) {
+    fn step(&mut self, view: &View<'_, '_>, clock: &Clock) {
         match view.op {
             Op::ToolChange(_) | Op::ToolNumber(_) => {
                 self.select(view.state.tool, view.source);
@@ -308,7 +313,7 @@ impl Run {
             Op::RunTime(_) | Op::InputWait { .. } | Op::Probe(_) => self.out.run_time = true,
             _ => {}
         }
-        let t = measure(view, rates);
+        let t = clock.measure(view);
         self.out.totals.add(&t);
         self.out.tools[self.tool].totals.add(&t);
         for i in &self.open {

@@ -295,6 +295,15 @@ impl Machine {
         }
         Some(out)
     }
+    /// Greatest accelerations of the axes, for a machine whose joints are its axes.
+    pub fn accelerations(&self) -> Option<[Option<f64>; 9]> {
+        let Chain::Cartesian = self.chain else { return None };
+        let mut out = [None; 9];
+        for (slot, joint) in out.iter_mut().zip(&self.joints) {
+            *slot = joint.acceleration;
+        }
+        Some(out)
+    }
     /// The machine as a table for people (`machine show`).
     pub fn describe(&self) -> String {
         let mut out = format!("{}\n{}\n", self.id, self.title);

@@ -145,8 +145,10 @@ impl Writer {
         let all: Vec<String> = (1..=6).map(|i| format!("$VEL_AXIS[{i}]={percent:.0}")).collect();
         self.put(2, all.join("\r\n"));
         let degrees = cx.degrees(to);
-        // Next to zero the turn bit of a joint could be read as a whole turn.
-        let text = if degrees.iter().any(|v| v.abs() < 0.01) {
+        // Next to zero the turn bit of a joint could be read as a whole turn. Home is joints, at the end as at the start;
+        // a part of a long program does not see the start's XHOME.
+        let home = to.joints == cx.program.home.joints;
+        let text = if home || degrees.iter().any(|v| v.abs() < 0.01) {
             Self::axes(cx, to)
         } else {
             if degrees.iter().any(|v| v.abs() >= 360.0) || degrees[4].abs() >= 180.0 {

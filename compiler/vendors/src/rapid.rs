@@ -225,15 +225,9 @@ impl Body for Writer {
                 let text = cx.ascii(text);
                 self.line(&format!("! {number}: {text}"));
             }
-            Op::Home(t) => {
-                let speed = self.joint_speed(cx, 1.0);
-                let mut text = format!("MoveAbsJ [{},", list(&cx.degrees(t), 5));
-                external(&mut text, cx, t);
-                self.parts.text.push_str("    ");
-                self.parts.text.push_str(&text);
-                self.parts.text.push_str("]\\NoEOffs");
-                self.finish(cx, &speed, "fine");
-            }
+            Op::Home(t) => self.home(cx, t, 1.0),
+            // Back to the joints themselves: as a pose they could be reached with other turns.
+            Op::Joint { to, share, zone: None } if to.joints == cx.program.home.joints => self.home(cx, to, share),
             Op::Joint { to, share, zone } => {
                 let (speed, zone) = (self.joint_speed(cx, share), self.zone(zone));
                 self.motion(cx, "MoveJ", &[to], &speed, &zone);
@@ -285,6 +279,15 @@ impl Body for Writer {
 }
 
 impl Writer {
+    fn home(&mut self, cx: &Cx, t: &Target, share: f64) {
+        let speed = self.joint_speed(cx, share);
+        let mut text = format!("    MoveAbsJ [{},", list(&cx.degrees(t), 5));
+        external(&mut text, cx, t);
+        self.parts.text.push_str(&text);
+        self.parts.text.push_str("]\\NoEOffs");
+        self.finish(cx, &speed, "fine");
+    }
+
     /// Joint moves are told a speed of the tool too; a full one is that of the fastest predefined data.
     fn joint_speed(&mut self, cx: &Cx, share: f64) -> String {
         let full = cx.machine.cell.rapid_speed.unwrap_or(1000.0);

@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use gr_ide::gcode::modes::{codes, moves};
 use gr_ir::geometry::{Extent, flatten};
-use gr_ir::measure::{Known, Rates, measure};
+use gr_ir::measure::Known;
+use gr_ir::timing::Clock;
 use gr_ir::{FileId, Op, Pose, Source, State};
 use tower_lsp::ls_types as lsp;
 
@@ -100,11 +101,11 @@ impl Points {
         let mut out = Points::default();
         let (mut known, mut frame) = (Known::default(), Common::default());
         let (mut ns, mut fresh) = (0u64, true);
-        let rates = Rates::default();
+        let clock = Clock::new(&motion.program, &motion.rates);
         let lines = Lines { motion };
         let mut cursor = motion.program.cursor();
         while let Some(view) = cursor.next() {
-            let t = measure(&view, &rates);
+            let t = clock.measure(&view);
             let start = known.start(&view);
             if let Op::ToolChange(_) | Op::ToolNumber(_) = view.op {
                 let tool = PreviewTool {

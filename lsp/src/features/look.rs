@@ -310,7 +310,7 @@ pub fn lenses(mut view: View) -> Answer<Vec<lsp::CodeLens>> {
             let elsewhere = if subs.is_empty() { Vec::new() } else { calls_elsewhere(&view) };
             let count = |label: &str| elsewhere.iter().filter(|l| *l == label).count();
             let motion = view.motion();
-            gcode::lenses::lenses(doc, motion.as_ref().map(|m| (&m.program, &m.report)), &count)
+            gcode::lenses::lenses(doc, motion.as_ref().map(|m| (&m.program, &m.report, &m.rates)), &count)
         }
         Kind::Exchange => {
             let exchange = view.exchange();

@@ -51,7 +51,7 @@ pub struct Preview {
     pub kinds: String,
     /// u32 per point: line of the block (from 0) in `files[0]`; for blocks of other files the calling line.
     pub lines: String,
-    /// f32 per point: seconds since the beginning, an estimate without acceleration.
+    /// f32 per point: seconds since the beginning, as predicted.
     pub times: String,
     /// f32 per point: feed in mm/min; 0 for rapids.
     pub feeds: String,

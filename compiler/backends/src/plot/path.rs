@@ -1,7 +1,8 @@
 //! The path as points, in one frame for the whole program.
 
 use gr_ir::geometry::{Extent, flatten};
-use gr_ir::measure::{Known, Rates, Totals, measure};
+use gr_ir::measure::{Known, Rates, Totals};
+use gr_ir::timing::Clock;
 use gr_ir::{Op, Pose, Program, State, View};
 
 /// What a stretch of path is drawn as.
@@ -100,16 +101,16 @@ impl Common {
 
 impl Path {
     /// Takes the points of a program.
-    pub fn new(program: &Program, rapids: bool) -> Path {
+    pub fn new(program: &Program, rapids: bool, rates: &Rates) -> Path {
         let mut path =
             Path { runs: Vec::new(), points: Vec::new(), extent: Extent::default(), totals: Totals::default() };
         let tolerance = rough_size(program) / 4000.0;
         let mut common = Common::new();
         let (mut fresh, mut known) = (true, Known::default());
-        let rates = Rates::default();
+        let clock = Clock::new(program, rates);
         let mut cursor = program.cursor();
         while let Some(view) = cursor.next() {
-            path.totals.add(&measure(&view, &rates));
+            path.totals.add(&clock.measure(&view));
             let start = known.start(&view);
             match Class::of(&view.op) {
                 Some(class) => {

@@ -3,7 +3,8 @@
 //! `gccRobot/preview` (`docs/editor-features.md`).
 
 use gr_ir::geometry::{Extent, flatten};
-use gr_ir::measure::{Known, Rates, Totals, measure};
+use gr_ir::measure::{Known, Rates, Totals};
+use gr_ir::timing::Clock;
 use gr_ir::{FileId, Op, Pose, Program, Source, View};
 use serde_json::{Value, json};
 
@@ -24,11 +25,13 @@ pub struct TraceOptions {
     pub document: FileId,
     /// Diameters and comments of tools.
     pub tools: Vec<ToolRow>,
+    /// Rapid rates, and what the machine can do.
+    pub rates: Rates,
 }
 
 impl Default for TraceOptions {
     fn default() -> TraceOptions {
-        TraceOptions { tolerance: None, most_points: 4_000_000, document: FileId(0), tools: Vec::new() }
+        TraceOptions { tolerance: None, most_points: 4_000_000, document: FileId(0), tools: Vec::new(), rates: Rates::default() }
     }
 }
 
@@ -56,7 +59,7 @@ pub struct Trace {
     pub kinds: Vec<u8>,
     /// Line of each point's block, from 0.
     pub lines: Vec<u32>,
-    /// Seconds since the beginning, without acceleration.
+    /// Seconds since the beginning.
     pub times: Vec<f32>,
     /// mm/min; 0 for rapids.
     pub feeds: Vec<f32>,
@@ -102,11 +105,11 @@ impl Trace {
         };
         run.line.1 = run.find_line(Source::default());
         let (mut fresh, mut known) = (true, Known::default());
-        let rates = Rates::default();
+        let clock = Clock::new(program, &options.rates);
         let mut cursor = program.cursor();
         while let Some(view) = cursor.next() {
             let before = run.trace.totals.ns();
-            let measured = measure(&view, &rates);
+            let measured = clock.measure(&view);
             run.trace.totals.add(&measured);
             let start = known.start(&view);
             match Class::of(&view.op) {

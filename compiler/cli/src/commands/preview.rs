@@ -38,7 +38,7 @@ pub fn run(global: &Global, args: &PreviewArgs) -> Exit {
     };
     let bad = motion.found.iter().any(|d| d.severity == Severity::Error);
     let kind = goal.extension().map_or(String::new(), |e| e.to_string_lossy().to_ascii_lowercase());
-    let plot = Options { text: unit.text.to_string(), tools: tool_rows(&motion, &unit), ..options(args) };
+    let plot = Options { text: unit.text.to_string(), tools: tool_rows(&motion, &unit), rates: gr_driver::rates(&unit.setup), ..options(args) };
     let made = picture(&motion.program, &kind, &plot);
     drop(progress);
     show(&mut renderer, &Checked { sources: motion.sources, found: motion.found, more: 0, unreadable: false });

@@ -213,7 +213,7 @@ impl Drawing {
         let said = match motion(&unit, self.station.machine.as_ref()) {
             Ok((motion, checked)) => {
                 let tools = crate::emit::tool_rows(&motion, &unit);
-                let trace = Trace::new(&motion.program, &TraceOptions { tools, ..TraceOptions::default() });
+                let trace = Trace::new(&motion.program, &TraceOptions { tools, rates: gr_driver::rates(&unit.setup), ..TraceOptions::default() });
                 self.path = Some(trace.json(&self.shared.title).to_string());
                 self.files = std::iter::once(self.file.clone()).chain(motion.subs).collect();
                 let bad = motion.found.iter().any(|d| d.severity == Severity::Error);

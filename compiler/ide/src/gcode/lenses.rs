@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 use std::rc::Rc;
 
 use gr_ir::geometry::Extent;
-use gr_ir::measure::{Rates, Report, Totals, measure};
+use gr_ir::measure::{Rates, Report, Totals};
+use gr_ir::timing::Clock;
 use gr_ir::{FileId, FrameId, Program};
 
 use super::doc::{Doc, duration, number};
@@ -12,9 +13,9 @@ use super::names::{self, label_text};
 use crate::Lens;
 
 /// Lenses of a program that was run. `calls_elsewhere`: calls of a label in other files.
-pub fn lenses(doc: Doc<'_>, program: Option<(&Program, &Report)>, calls_elsewhere: &dyn Fn(&str) -> usize) -> Vec<Lens> {
+pub fn lenses(doc: Doc<'_>, program: Option<(&Program, &Report, &Rates)>, calls_elsewhere: &dyn Fn(&str) -> usize) -> Vec<Lens> {
     let mut found = Vec::new();
-    if let Some((program, report)) = program {
+    if let Some((program, report, rates)) = program {
         if report.totals.moves > 0 {
             found.push(Lens { line: 0, text: format!("program: {}", sums(&report.totals, &report.cut)) });
         }
@@ -22,7 +23,7 @@ pub fn lenses(doc: Doc<'_>, program: Option<(&Program, &Report)>, calls_elsewher
             let changes = if t.changes > 1 { format!(", {} times", t.changes) } else { String::new() };
             found.push(Lens { line: t.first.line, text: format!("T{}: {}{changes}", t.tool, sums(&t.totals, &t.cut)) });
         }
-        let by_sub = per_sub(program);
+        let by_sub = per_sub(program, rates);
         for s in names::subs(doc) {
             let name = label_text(&s.label);
             if let Some((runs, totals, cut)) = by_sub.get(&name) {
@@ -60,7 +61,7 @@ fn sums(t: &Totals, cut: &Extent) -> String {
 }
 
 /// What each subroutine comes to, all its runs together, called ones inside it included.
-fn per_sub(program: &Program) -> BTreeMap<String, (usize, Totals, Extent)> {
+fn per_sub(program: &Program, rates: &Rates) -> BTreeMap<String, (usize, Totals, Extent)> {
     let mut out: BTreeMap<String, (usize, Totals, Extent)> = BTreeMap::new();
     // Names of the subroutines on the way to a frame.
     let mut chains: BTreeMap<FrameId, Rc<Vec<String>>> = BTreeMap::new();
@@ -78,10 +79,11 @@ fn per_sub(program: &Program) -> BTreeMap<String, (usize, Totals, Extent)> {
     if chains.is_empty() {
         return out;
     }
+    let clock = Clock::new(program, rates);
     let mut cursor = program.cursor();
     while let Some(view) = cursor.next() {
         let Some(chain) = chains.get(&view.source.frame).filter(|c| !c.is_empty()) else { continue };
-        let t = measure(&view, &Rates::default());
+        let t = clock.measure(&view);
         for name in chain.iter() {
             if let Some((_, totals, cut)) = out.get_mut(name) {
                 totals.add(&t);

@@ -1,0 +1,162 @@
+//! Predicted times: closed forms, figures measured on LinuxCNC 2.9, and no nonsense on any program. The comparison with
+//! the controller itself is in the tests of the workspace.
+
+use gr_ir::measure::{Rates, report};
+use gr_ir::timing::Dynamics;
+use gr_ir::*;
+use proptest::prelude::*;
+
+fn at(x: f64, y: f64) -> Pose {
+    Pose::at([x, y, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+}
+
+/// 100 mm/s and 500 mm/s² on every axis, one millisecond.
+fn machine() -> Dynamics {
+    Dynamics { velocity: [100.0; 9], acceleration: [500.0; 9], overrides: 1.2, ..Dynamics::default() }
+}
+
+struct Made(Builder);
+
+impl Made {
+    fn new(path: PathMode, merge: f64) -> Made {
+        let mut b = Builder::new();
+        b.push(Op::Feed { linear: 50.0, angular: 1.0 }, Source::default());
+        b.push(Op::PathMode(path), Source::default());
+        b.push(Op::MergeTolerance(merge), Source::default());
+        Made(b)
+    }
+    fn line(mut self, x: f64, y: f64) -> Made {
+        self.0.push_to(Op::Linear, &at(x, y), Source::default());
+        self
+    }
+    fn rapid(mut self, x: f64, y: f64) -> Made {
+        self.0.push_to(Op::Rapid, &at(x, y), Source::default());
+        self
+    }
+    fn circle(mut self, radius: f64) -> Made {
+        let here = *self.0.pose();
+        let center = [here.axes[0] + radius, here.axes[1], 0.0];
+        self.0.push_to(Op::Arc(Arc { plane: ArcPlane::Work(Plane::Xy), center, turns: -1 }), &here, Source::default());
+        self
+    }
+    fn seconds(self, dynamics: Dynamics) -> f64 {
+        let rates = Rates { dynamics: Some(dynamics), ..Rates::default() };
+        report(&self.0.finish(), &rates).totals.seconds()
+    }
+}
+
+const STOP: PathMode = PathMode::ExactStop;
+const EXACT: PathMode = PathMode::ExactPath;
+
+fn blend(tolerance: f64) -> PathMode {
+    PathMode::Blend(tolerance)
+}
+
+/// Seconds that the controller took (v = 50 mm/s), by servo cycles.
+#[test]
+fn figures_of_the_controller() {
+    let corner = |path| Made::new(path, 0.0).line(50.0, 0.0).line(50.0, 50.0).seconds(machine());
+    let line = |path| Made::new(path, 0.0).line(100.0, 0.0).seconds(machine());
+    let circle = |path| Made::new(path, 0.0).circle(10.0).seconds(machine());
+    let train = |path, merge| {
+        let tenths = (1..=500).fold(Made::new(path, merge), |m, i| m.line(f64::from(i) * 0.1, 0.0));
+        tenths.seconds(machine())
+    };
+    let rows = [
+        ("line G61", line(EXACT), 2.102),
+        ("line G64 P0.01", line(blend(0.01)), 2.202),
+        ("circle G61", circle(EXACT), 1.459),
+        ("circle G64", circle(blend(0.0)), 1.659),
+        ("corner G61", corner(EXACT), 2.225),
+        ("corner G64", corner(blend(0.0)), 2.074),
+        ("corner G64 P0.01", corner(blend(0.01)), 2.295),
+        ("corner G64 P0.1", corner(blend(0.1)), 2.275),
+        ("corner G64 P1", corner(blend(1.0)), 2.192),
+        ("tenths G64", train(blend(0.0), 0.0), 1.120),
+        ("tenths G64 P0.01", train(blend(0.01), 0.01), 1.153),
+    ];
+    for (name, ours, theirs) in rows {
+        assert!((ours - theirs).abs() < 0.005, "{name}: {ours:.4} s, the controller {theirs} s");
+    }
+}
+
+#[test]
+fn stops_cost_half_a_cycle_and_the_end_two() {
+    let one = Made::new(STOP, 0.0).line(20.0, 0.0).seconds(machine());
+    assert!((one - (20.0 / 50.0 + 50.0 / 500.0 + 0.002)).abs() < 1e-6, "{one}");
+    let two = Made::new(STOP, 0.0).line(20.0, 0.0).line(20.0, 20.0).seconds(machine());
+    assert!((two - (2.0 * one - 0.0015)).abs() < 1e-6, "{two}");
+}
+
+#[test]
+fn every_axis_counts() {
+    let mut d = machine();
+    (d.velocity[1], d.acceleration[1]) = (10.0, 100.0);
+    let rapid = Made::new(EXACT, 0.0).rapid(30.0, 40.0).seconds(d);
+    // 40 mm of Y at 10 mm/s, reached with 100 mm/s².
+    assert!((rapid - (4.0 + 0.1 + 0.002)).abs() < 1e-6, "{rapid}");
+    // Speeds alone: no ramp.
+    d.acceleration = [f64::INFINITY; 9];
+    let rapid = Made::new(EXACT, 0.0).rapid(30.0, 40.0).seconds(d);
+    assert!((rapid - 4.0).abs() < 1e-9, "{rapid}");
+    let feed = Made::new(EXACT, 0.0).line(0.0, 40.0).seconds(d);
+    assert!((feed - 4.0).abs() < 1e-9, "a feed beyond the axis takes the axis' time: {feed}");
+}
+
+#[test]
+fn merged_lines_share_the_time() {
+    let made = Made::new(blend(0.01), 0.01).line(10.0, 0.001).line(20.0, 0.0).line(30.0, 0.0);
+    let program = made.0.finish();
+    let rates = Rates { dynamics: Some(machine()), ..Rates::default() };
+    let clock = timing::Clock::new(&program, &rates);
+    let mut cursor = program.cursor();
+    let mut times = Vec::new();
+    while let Some(view) = cursor.next() {
+        times.extend(view.op.moves().then(|| clock.measure(&view).feed_ns));
+    }
+    assert!(times.iter().all(|t| t.abs_diff(times[0]) < 1000), "one line of 30 mm in three equal parts: {times:?}");
+}
+
+#[test]
+fn without_limits_nothing_changes() {
+    let made = || Made::new(blend(0.1), 0.0).line(10.0, 0.0).rapid(20.0, 5.0).line(0.0, 0.0);
+    let plain = report(&made().0.finish(), &Rates::default()).totals;
+    let unknown = Rates { dynamics: Some(Dynamics::default()), ..Rates::default() };
+    assert_eq!(report(&made().0.finish(), &unknown).totals, plain);
+}
+
+/// A move of one of several sorts.
+fn step() -> impl Strategy<Value = (u8, f64, f64)> {
+    let number = prop_oneof![4 => -50.0..50.0f64, 1 => Just(0.0), 1 => -1e-6..1e-6f64, 1 => -1e9..1e9f64];
+    (0u8..6, number.clone(), number)
+}
+
+fn path() -> impl Strategy<Value = PathMode> {
+    prop_oneof![Just(STOP), Just(EXACT), Just(blend(0.0)), (1e-6..10.0f64).prop_map(blend)]
+}
+
+proptest! {
+    /// No move is faster than its feed, and no time is missing or infinite.
+    #[test]
+    fn never_faster_than_asked(steps in prop::collection::vec(step(), 1..40), path in path(), merge in prop_oneof![Just(0.0), 1e-4..0.5f64]) {
+        let mut m = Made::new(path, merge);
+        let mut least = 0.0;
+        for (kind, x, y) in steps {
+            let from = m.0.pose().xyz();
+            let way = ((x - from[0]).powi(2) + (y - from[1]).powi(2)).sqrt();
+            m = match kind {
+                0 => m.rapid(x, y),
+                1 => { m.0.push(Op::Dwell(0.5), Source::default()); m }
+                2 => m.circle(x.abs().max(1e-3)),
+                _ => m.line(x, y),
+            };
+            // Corners may be cut by half of each move, and merged lines by what they leave out.
+            least += match kind { 1 => 0.5, 0 | 2 => 0.0, _ if path == STOP => way / 50.0, _ => 0.0 };
+        }
+        let program = m.0.finish();
+        let rates = Rates { dynamics: Some(machine()), ..Rates::default() };
+        let totals = report(&program, &rates).totals;
+        prop_assert!(totals.seconds().is_finite() && totals.ns() < u64::MAX / 4);
+        prop_assert!(totals.seconds() >= least * (1.0 - 1e-9) - 1e-3, "{} s, at least {least} s", totals.seconds());
+    }
+}
