@@ -354,6 +354,10 @@ impl<S: Sink> Interp<'_, S> {
                 self.emit(Call::Finish);
                 self.count_main_pass()?;
             }
+            99 => {
+                self.warn(Fault::own(code::PROGRAM_REPEATS).at(b'm'));
+                self.end_program(m);
+            }
             _ => self.end_program(m),
         }
         Ok(())
