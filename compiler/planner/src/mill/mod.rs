@@ -305,7 +305,9 @@ impl Job<'_> {
         };
         let face = matches!(shape, Shape::Face { .. });
         if o.overcut.is_some() && self.bottom <= self.depth && !face {
-            say(e, o.origin, "overcut_length", &o.keyword, "it goes neither through nor over an edge");
+            let open = matches!(shape, Shape::Slot { .. } | Shape::OpenPocket { .. } | Shape::Step { .. } | Shape::Outside { .. });
+            let why = if open { "the tool passes open sides by its radius and 1 mm" } else { "it goes neither through nor over an edge" };
+            say(e, o.origin, "overcut_length", &o.keyword, why);
         }
         if self.start().is_some() && (face || matches!(shape, Shape::Slot { .. })) {
             say(e, o.origin, "start_point", &o.keyword, "where it begins follows from the feature");

@@ -3,6 +3,7 @@
 #![allow(dead_code)]
 
 pub mod cases;
+pub mod cells;
 pub mod part;
 
 use std::collections::BTreeMap;

@@ -1,0 +1,45 @@
+//! Writes what is made of the tests' features: `cells pictures` the pictures of docs/images/stepnc, `cells seeds` the
+//! seeds of the planner's fuzz target.
+
+#[path = "../tests/judge/mod.rs"]
+mod judge;
+
+use std::path::Path;
+
+use gr_backends::plot;
+use gr_planner::{Options, plan};
+use gr_text::FileId;
+use judge::cases::{APPROACHES, STRATEGIES};
+use judge::cells::features;
+
+/// One picture per feature.
+fn pictures(folder: &Path) -> Result<(), Box<dyn std::error::Error>> {
+    for (name, _, make) in features() {
+        let strategy = if name.contains("face") { STRATEGIES[2] } else { "$" };
+        let Some(planned) = plan(make(strategy, "$").part.text().as_bytes(), FileId(0), &Options::default()).0 else { continue };
+        let file: String = name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).collect();
+        let options = plot::Options { width: 700, height: 450, title: name.into(), ..plot::Options::default() };
+        std::fs::write(folder.join(file + ".png"), plot::png(&planned.program, &options)?)?;
+    }
+    Ok(())
+}
+
+/// One file per feature.
+fn seeds(folder: &Path) -> Result<(), Box<dyn std::error::Error>> {
+    for (k, (_, _, make)) in features().iter().enumerate() {
+        let c = make(STRATEGIES[k % STRATEGIES.len()], APPROACHES[k % APPROACHES.len()]);
+        std::fs::write(folder.join(format!("cell-{k:02}.p21")), c.part.text())?;
+    }
+    Ok(())
+}
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let (folder, write): (_, fn(&Path) -> _) = match std::env::args().nth(1).as_deref() {
+        Some("pictures") => (root.join("docs/images/stepnc"), pictures),
+        Some("seeds") => (root.join("tests/fuzz/seeds/planner"), seeds),
+        _ => return Err("say `pictures` or `seeds`".into()),
+    };
+    std::fs::create_dir_all(&folder)?;
+    write(&folder)
+}
