@@ -252,3 +252,98 @@ fn odd_file_names() {
     std::fs::write(dir.path().join("-x.ngc"), GOOD).expect("writable");
     assert_eq!(robot(dir.path(), &["check", "--", "-x.ngc"]).status, Some(0));
 }
+
+/// Every command that reads a program, on files that are none or are damaged: one clear error or a result, never a
+/// crash, and nothing written beside an error.
+#[test]
+fn every_command_on_every_mistaken_file() {
+    let dir = tempfile::tempdir().expect("a temporary folder");
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let read = |name: &str| std::fs::read(root.join("docs/examples").join(name)).expect("a shipped example");
+    let plan = read("stepnc/case-study.p21");
+    let cad = "ISO-10303-21;\nHEADER;\nFILE_DESCRIPTION((''),'2;1');\nFILE_NAME('x','',(''),(''),'','','');\n\
+        FILE_SCHEMA(('AUTOMOTIVE_DESIGN { 1 0 10303 214 1 1 1 1 }'));\nENDSEC;\nDATA;\n\
+        #1=CARTESIAN_POINT('',(0.,0.,0.));\nENDSEC;\nEND-ISO-10303-21;\n";
+    // With what the commands that run the program must say; none: they may succeed.
+    let files: [(&str, Vec<u8>, Option<&str>); 15] = [
+        ("good.ngc", GOOD.into(), None),
+        ("empty.ngc", vec![], Some("E0252")),
+        ("nul.ngc", b"G21\nG0 X1\0Y2\nM2\n".to_vec(), None),
+        ("latin.ngc", b"G21 (Schr\xE4g)\nG0 X1\nM2\n".to_vec(), None),
+        ("cr.ngc", GOOD.replace('\n', "\r").into(), None),
+        ("line.ngc", format!("G1 X{}\nM2\n", "1".repeat(10_000_000)).into(), Some("E0102")),
+        ("recursive.ngc", b"o1 sub\no1 call\no1 endsub\no1 call\nM2\n".to_vec(), Some("E0251")),
+        ("nosub.ngc", b"o<nowhere> call\nM2\n".to_vec(), Some("E0250")),
+        ("empty.p21", vec![], Some("E0319")),
+        ("cut.p21", plan[..plan.len() / 2].to_vec(), Some("E03")),
+        ("plan.ngc", plan, None),
+        ("gcode.p21", GOOD.into(), Some("E0319")),
+        ("shape.step", cad.into(), Some("E0418")),
+        ("project.ngc", read("gcc-robot.toml"), Some("E0845")),
+        ("cell.toml", read("irb2400-cell.toml"), Some("E0845")),
+    ];
+    for (name, bytes, _) in &files {
+        std::fs::write(dir.path().join(name), bytes).expect("writable");
+    }
+    let listing = || {
+        let entries = std::fs::read_dir(dir.path()).expect("readable");
+        entries.filter_map(|e| Some(e.ok()?.file_name())).collect::<std::collections::BTreeSet<_>>()
+    };
+    let before = listing();
+    for (name, bytes, wanted) in &files {
+        let running = [
+            vec!["check", name],
+            vec!["build", name, "-o", "out.ngc"],
+            vec!["build", name, "--target", "canon", "-o", "out.ngc"],
+            vec!["preview", name, "-o", "out.svg"],
+            vec!["filter", name],
+            vec!["diff", name, "good.ngc"],
+            vec!["diff", "good.ngc", name],
+            vec!["verify", name],
+        ];
+        let only_text = [vec!["fmt", "--check", name], vec!["renumber", name, "-o", "out.ngc"]];
+        for (args, runs) in running.iter().map(|a| (a, true)).chain(only_text.iter().map(|a| (a, false))) {
+            let out = robot(dir.path(), args);
+            let said = out.errors() + &out.output();
+            if let (true, Some(wanted)) = (runs, wanted) {
+                assert!(matches!(out.status, Some(1 | 3)), "{args:?}: {said}");
+                assert!(said.contains(wanted), "{args:?} does not say {wanted}: {said}");
+            }
+            if out.status != Some(0) {
+                assert_eq!(listing(), before, "{args:?} left something");
+                assert!(!said.trim().is_empty(), "{args:?} says nothing");
+            }
+            for made in ["out.ngc", "out.tbl", "out.svg"] {
+                let _ = std::fs::remove_file(dir.path().join(made));
+            }
+            assert_eq!(&std::fs::read(dir.path().join(name)).expect("still there"), bytes, "{args:?} changed its source");
+        }
+    }
+}
+
+/// A file of another kind behind an option.
+#[test]
+fn options_with_the_wrong_file() {
+    let dir = tempfile::tempdir().expect("a temporary folder");
+    std::fs::write(dir.path().join("part.ngc"), GOOD).expect("writable");
+    std::fs::create_dir(dir.path().join("folder")).expect("writable");
+    let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/examples");
+    std::fs::copy(examples.join("irb2400-cell.toml"), dir.path().join("cell.toml")).expect("writable");
+    for option in ["--tools", "--vars", "--ini", "--machine"] {
+        for file in ["part.ngc", "folder", "nothing", "cell.toml"] {
+            if (option, file) == ("--machine", "cell.toml") {
+                continue;
+            }
+            let out = robot(dir.path(), &["build", "part.ngc", option, file, "-o", "out.ngc"]);
+            let said = out.errors() + &out.output();
+            assert!(out.status == Some(0) || said.contains("[E"), "{option} {file}: {said}");
+            assert_eq!(dir.path().join("out.ngc").exists(), out.status == Some(0), "{option} {file}: {said}");
+            let _ = std::fs::remove_file(dir.path().join("out.ngc"));
+        }
+    }
+    for job in ["cell.toml", "part.ngc", "folder", "nothing"] {
+        let out = robot(dir.path(), &["build", "part.ngc", "--machine", "cell.toml", "--target", "rapid", "--job", job, "-o", "out.mod"]);
+        assert!(out.status != Some(0) && out.errors().contains(job), "{job}: {}", out.errors());
+        assert!(!dir.path().join("out.mod").exists());
+    }
+}

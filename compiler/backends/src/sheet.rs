@@ -98,9 +98,7 @@ fn offset_name(number: u8) -> String {
 }
 
 fn number(v: f64) -> String {
-    let text = format!("{v:.3}");
-    let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
-    if text == "-0" { "0".into() } else { text.to_owned() }
+    gr_text::figures::number(v, 3)
 }
 
 fn range(r: &Range, factor: f64) -> String {
@@ -354,21 +352,24 @@ fn seconds(t: &gr_ir::measure::Totals) -> serde_json::Value {
     })
 }
 
+/// Without the last bits of a conversion: 1200, not 1199.9999999999998.
+fn rounded(v: f64) -> f64 {
+    libm::round(v * 1e9) / 1e9 + 0.0
+}
+
 fn extent_json(e: &Extent) -> serde_json::Value {
-    if e.is_empty() { serde_json::Value::Null } else { serde_json::json!({"min": e.min, "max": e.max}) }
+    if e.is_empty() { serde_json::Value::Null } else { serde_json::json!({"min": e.min.map(rounded), "max": e.max.map(rounded)}) }
 }
 
 fn range_json(r: &Range, factor: f64) -> serde_json::Value {
-    // Without the last bits of a conversion: 1200, not 1199.9999999999998.
-    let round = |v: f64| libm::round(v * factor * 1e9) / 1e9;
-    r.0.map_or(serde_json::Value::Null, |(a, b)| serde_json::json!([round(a), round(b)]))
+    r.0.map_or(serde_json::Value::Null, |(a, b)| serde_json::json!([rounded(a * factor), rounded(b * factor)]))
 }
 
 fn tool_json(t: &ToolUse) -> serde_json::Value {
     let work: Vec<String> = (1..=9).filter(|n| t.work >> n & 1 == 1).map(offset_name).collect();
     serde_json::json!({
         "tool": if t.tool < 0 { serde_json::Value::Null } else { t.tool.into() },
-        "note": t.note, "changes": t.changes, "line": u64::from(t.first.line) + 1, "diameter_mm": t.diameter,
+        "note": t.note, "changes": t.changes, "line": u64::from(t.first.line) + 1, "diameter_mm": t.diameter.map(rounded),
         "offset_z_mm": range_json(&t.offset_z, 1.0), "rpm": range_json(&t.rpm, 1.0),
         "surface_m_min": range_json(&t.surface, 0.06), "feed_mm_min": range_json(&t.feed, 60.0),
         "feed_mm_rev": range_json(&t.feed_per_rev, 1.0),

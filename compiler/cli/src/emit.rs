@@ -211,8 +211,54 @@ pub fn build(unit: &Unit, goal: &Goal<'_>) -> Result<Result<(Built, Checked), St
     Ok(of_motion(motion, unit, goal).map(|built| (built, checked)))
 }
 
+/// Options of targets that were given, by name.
+pub fn given(o: &TargetOptions) -> Vec<&'static str> {
+    let r = &o.robot;
+    let all = [
+        ("--to", o.to.is_some()),
+        ("--units", o.units.is_some()),
+        ("--decimals", o.decimals.is_some()),
+        ("--arcs", o.arcs.is_some()),
+        ("--plane", o.plane.is_some()),
+        ("--arc-tolerance", o.arc_tolerance.is_some()),
+        ("--line-numbers", o.line_numbers.is_some()),
+        ("--repeat-words", o.repeat_words),
+        ("--no-comments", o.no_comments),
+        ("--cycles", o.cycles),
+        ("--tool-change-at", o.tool_change_at.is_some()),
+        ("--lossy", o.lossy),
+        ("--interval", o.interval.is_some()),
+        ("--decimal-comma", o.decimal_comma),
+        ("--round", o.round.is_some()),
+        ("--joint-speed", o.joint_speed.is_some()),
+        ("--reference", o.reference.is_some()),
+        ("--reference-config", o.reference_config.is_some()),
+        ("--approach", r.approach.is_some()),
+        ("--reconfigure", r.reconfigure.is_some()),
+        ("--allow-unverified", r.allow_unverified),
+        ("--job", r.job.is_some()),
+        ("--compensate", r.compensate),
+        ("--smoothing", r.smoothing.is_some()),
+    ];
+    all.into_iter().filter(|(_, given)| *given).map(|(name, _)| name).collect()
+}
+
+/// An option that was given and does nothing for the target. Reference modes are looked at in [`mismatch`].
+fn idle(unit: &Unit, goal: &Goal<'_>) -> Option<String> {
+    // Canonical calls of a STEP-NC file are those of the program that is written.
+    let id = if unit.exchange && goal.target == "canon" { "rs274ngc" } else { goal.target };
+    let heeded = gr_spec::TargetDef::find(id)?.options;
+    let reference = |o: &&str| !o.starts_with("--reference");
+    let planned = id == "joint-gcode" && crate::robot::plans_joints(goal);
+    let option = given(goal.options).into_iter().filter(reference).find(|o| !heeded.contains(o) || (planned && *o == "--round"))?;
+    Some(format!("{option} does nothing for the target {}; `gcc-robot target show {}` says what it heeds", goal.target, goal.target))
+}
+
 /// What does not go together.
 fn mismatch(unit: &Unit, goal: &Goal<'_>) -> Option<String> {
+    if let Some(text) = idle(unit, goal) {
+        return Some(text);
+    }
     let name = unit.name();
     if goal.target.starts_with("plan") && !unit.exchange {
         return Some(format!("--target {} lists the workingsteps of a STEP-NC file; {name} is G-code", goal.target));

@@ -308,17 +308,17 @@ pub struct PreviewArgs {
     /// With --serve: follow an editor by JSON lines on standard input, answer on standard output
     #[arg(long, requires = "serve")]
     pub editor: bool,
-    /// What is shown
-    #[arg(long, value_enum, default_value = "all")]
+    /// What is shown (.svg, .png)
+    #[arg(long, value_enum, default_value = "all", conflicts_with = "serve")]
     pub view: ViewArg,
-    /// Width in pixels
-    #[arg(long, default_value_t = 1400)]
+    /// Width in pixels (.svg, .png)
+    #[arg(long, default_value_t = 1400, conflicts_with = "serve")]
     pub width: u32,
-    /// Height in pixels
-    #[arg(long, default_value_t = 900)]
+    /// Height in pixels (.svg, .png)
+    #[arg(long, default_value_t = 900, conflicts_with = "serve")]
     pub height: u32,
-    /// Leave out rapids
-    #[arg(long)]
+    /// Leave out rapids (.svg, .png)
+    #[arg(long, conflicts_with = "serve")]
     pub no_rapids: bool,
     #[command(flatten)]
     pub setup: SetupArgs,
@@ -380,7 +380,7 @@ pub struct ExplainArgs {
     #[arg(long, value_name = "NAME", default_value = "linuxcnc")]
     pub dialect: String,
     /// List all diagnostics
-    #[arg(long)]
+    #[arg(long, conflicts_with = "name")]
     pub list: bool,
 }
 

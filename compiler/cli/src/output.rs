@@ -8,6 +8,20 @@ pub struct Pending {
     goal: PathBuf,
     beside: PathBuf,
     file: Option<std::fs::File>,
+    /// The goal is no file and is written to directly.
+    device: bool,
+    /// Folders that were made for it, the innermost first.
+    folders: Vec<PathBuf>,
+}
+
+/// Makes the folders of a file that are missing, and tells which.
+fn make_folders(goal: &Path) -> std::io::Result<Vec<PathBuf>> {
+    let missing = |f: &&Path| !f.as_os_str().is_empty() && !f.exists();
+    let made: Vec<PathBuf> = goal.ancestors().skip(1).take_while(missing).map(Path::to_path_buf).collect();
+    if let Some(folder) = made.first() {
+        std::fs::create_dir_all(folder)?;
+    }
+    Ok(made)
 }
 
 impl Pending {
@@ -16,6 +30,15 @@ impl Pending {
         if goal.is_dir() {
             return Err(std::io::Error::new(std::io::ErrorKind::IsADirectory, "is a folder"));
         }
+        let there = std::fs::metadata(goal).ok();
+        if there.as_ref().is_some_and(|m| !m.is_file()) {
+            // A device or a pipe (/dev/null) is written to, never replaced.
+            let file = std::fs::OpenOptions::new().write(true).open(goal)?;
+            return Ok(Pending { goal: goal.to_path_buf(), beside: goal.to_path_buf(), file: Some(file), device: true, folders: Vec::new() });
+        }
+        // What a link names is replaced, not the link.
+        let goal = &if there.is_some() { goal.canonicalize()? } else { goal.to_path_buf() };
+        let folders = make_folders(goal)?;
         let name = goal.file_name().ok_or_else(|| std::io::Error::other("is not a file name"))?;
         // Never a file that is there already: in a folder of everybody's it could lead elsewhere.
         for n in 0..100 {
@@ -23,10 +46,15 @@ impl Pending {
             hidden.push(name);
             hidden.push(format!(".{}.{n}.part", std::process::id()));
             let beside = goal.with_file_name(hidden);
-            match std::fs::File::create_new(&beside) {
-                Err(e) if e.kind() == std::io::ErrorKind::AlreadyExists => {}
-                made => return Ok(Pending { goal: goal.to_path_buf(), beside, file: Some(made?) }),
+            let file = match std::fs::File::create_new(&beside) {
+                Err(e) if e.kind() == std::io::ErrorKind::AlreadyExists => continue,
+                made => made?,
+            };
+            let pending = Pending { goal: goal.to_path_buf(), beside, file: Some(file), device: false, folders };
+            if let (Some(old), Some(file)) = (there, &pending.file) {
+                file.set_permissions(old.permissions())?;
             }
+            return Ok(pending);
         }
         Err(std::io::Error::other("its folder is full of unfinished files of ours (.part)"))
     }
@@ -40,7 +68,9 @@ impl Pending {
     }
     /// The result is complete: puts it in its place.
     pub fn commit(mut self) -> std::io::Result<()> {
-        std::fs::rename(&self.beside, &self.goal)?;
+        if !self.device {
+            std::fs::rename(&self.beside, &self.goal)?;
+        }
         self.file.take();
         Ok(())
     }
@@ -57,11 +87,17 @@ impl Write for Pending {
 
 impl Drop for Pending {
     fn drop(&mut self) {
-        if self.file.take().is_some() {
+        if self.file.take().is_some() && !self.device {
             // Nothing more can be done about it.
             let _ = std::fs::remove_file(&self.beside);
+            self.folders.iter().for_each(|f| _ = std::fs::remove_dir(f));
         }
     }
+}
+
+/// Whether two paths lead to one file.
+pub fn same_file(a: &Path, b: &Path) -> bool {
+    a == b || matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
 }
 
 /// Writes several files so that all of them appear or none: all beside their goals first, then renamed.
@@ -148,9 +184,29 @@ mod tests {
     #[test]
     fn all_or_none() {
         let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("no"), "a file").unwrap();
         let files = [(folder.path().join("a"), vec![1]), (folder.path().join("no/b"), vec![2])];
         assert!(write_all(&files).is_err());
-        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+        assert!(write_all(&[(folder.path().join("new/folder/b"), vec![2])]).is_ok());
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn devices_and_links_stay_what_they_are() {
+        use std::os::unix::fs::{FileTypeExt as _, PermissionsExt as _};
+        let null = Path::new("/dev/null");
+        assert!(write_all(&[(null.to_path_buf(), vec![1])]).is_ok());
+        assert!(std::fs::metadata(null).unwrap().file_type().is_char_device());
+        let folder = tempfile::tempdir().unwrap();
+        let (file, link) = (folder.path().join("file"), folder.path().join("link"));
+        std::fs::write(&file, "old").unwrap();
+        std::fs::set_permissions(&file, std::fs::Permissions::from_mode(0o600)).unwrap();
+        std::os::unix::fs::symlink(&file, &link).unwrap();
+        write_all(&[(link.clone(), b"new".to_vec())]).unwrap();
+        assert_eq!(std::fs::read_to_string(&file).unwrap(), "new");
+        assert!(std::fs::symlink_metadata(&link).unwrap().is_symlink());
+        assert_eq!(std::fs::metadata(&file).unwrap().permissions().mode() & 0o777, 0o600);
     }
 
     #[test]

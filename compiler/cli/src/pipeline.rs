@@ -13,7 +13,7 @@ use gr_text::{Diagnostic, Encoding, FileId, Severity, code};
 use crate::commands::check::{Checked, session_sources, unreadable};
 use crate::exchange::Plan;
 use crate::setup::{Levels, Station, is_for_a_printer};
-use crate::sources::{Sources, read};
+use crate::sources::{Sources, read_program};
 
 /// A source file.
 pub struct Unit {
@@ -81,7 +81,7 @@ impl Unit {
 /// Reads a file.
 pub fn load(path: &Path, station: &Station) -> Result<Unit, Checked> {
     let name = path.display().to_string();
-    let decoded = read(path).map_err(|(code, args)| unreadable(&name, code, &args))?;
+    let decoded = read_program(path).map_err(|(code, args)| unreadable(&name, code, &args))?;
     let unit = Unit::new(path, decoded.text.into(), decoded.encoding, station);
     if !unit.exchange && station.undeclared(path, &unit.text) {
         let why = if is_for_a_printer(&unit.text) { ": it looks like a program for a 3D printer" } else { "" };

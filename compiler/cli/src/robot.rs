@@ -5,6 +5,7 @@ use gr_ir::Sources;
 use gr_machine::{Kind, Machine};
 use gr_robot::{Options, Planned, plan};
 use gr_text::Diagnostic;
+use gr_text::figures::{duration, number};
 
 use crate::emit::{Artifact, Goal};
 use crate::pipeline::Motion;
@@ -195,14 +196,14 @@ pub fn summary(planned: &Planned) -> String {
     let line = |source: Option<gr_ir::Source>| source.map_or(String::new(), |s| format!(" (line {})", s.line + 1));
     let joint = |i: usize| planned.program.machine.joints.get(i).map_or(String::new(), |j| j.name.clone());
     let mut out = format!(
-        "{}: {} cuts ({} arcs), {} rapids; {} s at feed, {} s rapid, {} s waiting, without acceleration\n",
+        "{}: {} cuts ({} arcs), {} rapids; {} at feed, {} rapid, {} waiting, without acceleration\n",
         planned.program.machine.id,
         s.cuts,
         s.arcs,
         s.rapids,
-        short(s.cut_seconds),
-        short(s.rapid_seconds),
-        short(s.wait_seconds)
+        duration(s.cut_seconds),
+        duration(s.rapid_seconds),
+        duration(s.wait_seconds)
     );
     let mut more = Vec::new();
     if let Some((mm, at)) = s.reach_margin {
@@ -222,8 +223,7 @@ pub fn summary(planned: &Planned) -> String {
 }
 
 fn short(v: f64) -> String {
-    let text = format!("{v:.1}");
-    text.strip_suffix(".0").unwrap_or(&text).to_string()
+    number(v, 1)
 }
 
 /// Adds to the findings of a program what the robot has to say, when the program itself is good.
@@ -321,7 +321,7 @@ pub fn setpoints(motion: &Motion, goal: &Goal<'_>, texts: &dyn Sources, name: &s
     };
     let artifacts = vec![Artifact::new("", made.csv().into_bytes()), Artifact::new(".bin", made.bytes())];
     let seconds = made.rows.len().saturating_sub(1) as f64 * interval;
-    let summary = format!("{}  {} set-points, {} s with acceleration\n", summary(&planned), made.rows.len(), short(seconds));
+    let summary = format!("{}  {} set-points, {} with acceleration\n", summary(&planned), made.rows.len(), duration(seconds));
     let mut notes = planned.warnings;
     notes.extend(corners_kept(&planned.program, texts));
     Ok(Ok(Made { artifacts, summary, notes }))

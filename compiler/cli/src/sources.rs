@@ -97,6 +97,37 @@ pub fn read(path: &Path) -> Result<Decoded, (gr_text::Code, Vec<String>)> {
     Ok(decode(bytes))
 }
 
+/// Reads a program; what is plainly something else, a settings file for example, is refused by name.
+pub fn read_program(path: &Path) -> Result<Decoded, (gr_text::Code, Vec<String>)> {
+    let decoded = read(path)?;
+    match foreign(&decoded.text).filter(|_| !crate::exchange::is_exchange(path, &decoded.text)) {
+        Some(kind) => Err((code::FILE_NOT_A_PROGRAM, vec![path.display().to_string(), kind.to_string()])),
+        None => Ok(decoded),
+    }
+}
+
+/// What a text is that no control reads: told by its first line that is no remark.
+fn foreign(text: &str) -> Option<&'static str> {
+    // `# remark` of a settings file; `#1=…` and `#<x>=…` are G-code.
+    let remark = |l: &str| l.strip_prefix('#').is_some_and(|r| r.trim_start().starts_with(|c: char| c.is_ascii_alphabetic()));
+    let first = text.lines().take(200).map(str::trim).find(|l| !l.is_empty() && !remark(l))?;
+    let lower: String = first.chars().take(200).collect::<String>().to_ascii_lowercase();
+    let is_key = |k: &str| {
+        let plain = |c: char| c.is_ascii_alphanumeric() || "_.-".contains(c);
+        k.len() > 1 && k.starts_with(|c: char| c.is_ascii_alphabetic()) && k.chars().all(plain)
+    };
+    let section = lower.strip_prefix('[').map(|l| l.trim_start_matches('[').trim_end_matches(']'));
+    if ["<?xml", "<!doctype", "<html", "<svg"].iter().any(|s| lower.starts_with(s)) {
+        return Some("an XML or HTML document");
+    }
+    if lower.starts_with('{') {
+        return Some("JSON");
+    }
+    let setting = lower.split_once('=').is_some_and(|(key, _)| is_key(key.trim()));
+    let section = section.is_some_and(is_key) && lower.ends_with(']');
+    (setting || section).then_some("a settings file (TOML or INI)")
+}
+
 /// Bytes that are looked at to tell a text from another kind of file.
 const HEAD: usize = 8192;
 

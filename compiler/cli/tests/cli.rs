@@ -60,6 +60,9 @@ fn check_for_machines() {
         assert!(rules.contains(&&result["ruleId"]));
         assert!(result["locations"][0]["physicalLocation"]["region"]["startLine"].as_u64().unwrap() > 0);
     }
+    for rule in run["tool"]["driver"]["rules"].as_array().unwrap() {
+        assert!(!rule["shortDescription"]["text"].as_str().unwrap().contains('{'), "{rule}");
+    }
 }
 
 #[test]
@@ -284,4 +287,98 @@ fn folders_without_programs() {
         assert_eq!(code(&o), 1, "{}", whole(&o));
         assert!(whole(&o).contains("E0836"), "{}", whole(&o));
     }
+}
+
+/// An option that would do nothing is refused, not ignored.
+#[test]
+fn options_that_would_do_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    std::fs::copy(fixtures().join("part.ngc"), at.join("part.ngc")).unwrap();
+    assert_eq!(code(&in_folder(at, &["init"])), 0);
+    for (line, said) in [
+        ("build part.ngc --target motion --arcs r", "--arcs does nothing for the target motion"),
+        ("build part.ngc --interval 1", "--interval does nothing for the target rs274ngc"),
+        ("build part.ngc --target json --job x.toml", "--job does nothing"),
+        ("build -o out/", "[[targets]]"),
+        ("build --decimals 3", "[[targets]]"),
+        ("build --from-line 3", "--from-line"),
+        ("build --target krl", "no [[targets]] entry for krl"),
+        ("build --target nothing", "there is no target nothing"),
+        ("build part.ngc --depfile x.d", "-o FILE"),
+        ("build - --watch", "standard input"),
+        ("filter part.ngc --interval 1", "--interval does nothing"),
+        ("verify part.ngc -o out", "-o goes with --machine"),
+        ("verify part.ngc --lossy", "--lossy does nothing"),
+        ("preview part.ngc --serve --width 9", "cannot be used with"),
+        ("explain E0203 --list", "cannot be used with"),
+    ] {
+        let o = in_folder(at, &line.split(' ').collect::<Vec<_>>());
+        assert_eq!(code(&o), 2, "{line}: {}", text(&o.stderr));
+        assert!(text(&o.stderr).contains(said), "{line}: {}", text(&o.stderr));
+    }
+    assert_eq!(std::fs::read_dir(at).unwrap().count(), 2, "nothing was written");
+}
+
+#[test]
+fn results_have_names_of_their_own() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    for name in ["a", "b"] {
+        std::fs::create_dir(at.join(name)).unwrap();
+        std::fs::copy(fixtures().join("part.ngc"), at.join(name).join("part.ngc")).unwrap();
+    }
+    let o = in_folder(at, &["build", "a/part.ngc", "b/part.ngc", "-o", "out/"]);
+    assert_eq!(code(&o), 2, "{}", text(&o.stderr));
+    assert!(text(&o.stderr).contains("out/part.ngc: give them different names") && !at.join("out").exists());
+    for line in ["build a/part.ngc -o x.ngc --depfile a/part.ngc", "build a/part.ngc -o x.ngc --depfile x.ngc"] {
+        assert_ne!(code(&in_folder(at, &line.split(' ').collect::<Vec<_>>())), 0, "{line}");
+        assert!(!at.join("x.ngc").exists(), "{line}");
+    }
+    let before = std::fs::read(at.join("a/part.ngc")).unwrap();
+    let o = in_folder(at, &["accuracy", "a/part.ngc", "--machine", "generic/mill3", "-o", "a/part.ngc"]);
+    assert_ne!(code(&o), 0);
+    assert_eq!(std::fs::read(at.join("a/part.ngc")).unwrap(), before);
+    for target in ["canon", "rs274ngc", "svg"] {
+        let goal = format!("new/{target}/x");
+        assert_eq!(code(&in_folder(at, &["build", "a/part.ngc", "--target", target, "-o", &goal])), 0, "{target}");
+        assert!(at.join(goal).is_file());
+    }
+    assert_eq!(code(&in_folder(at, &["preview", "a/part.ngc", "-o", "pictures/x.svg"])), 0);
+    assert_eq!(code(&in_folder(at, &["map", "--machine", "usp/2ups-prp", "--resolution", "5", "-o", "maps/x.csv"])), 0);
+    assert!(at.join("maps/x.csv").is_file() && at.join("pictures/x.svg").is_file());
+}
+
+#[test]
+fn machines_are_answered() {
+    let o = run(&["machine", "show", "irb140"]);
+    assert_eq!(code(&o), 1);
+    insta::assert_snapshot!(text(&o.stderr));
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("mill.toml");
+    std::fs::write(&file, text(&run(&["machine", "show", "generic/mill3", "--toml"]).stdout)).unwrap();
+    let o = in_folder(folder.path(), &["machine", "check", "mill.toml"]);
+    assert_eq!(code(&o), 0, "{}", text(&o.stderr));
+    assert!(text(&o.stdout).starts_with("mill.toml: ") && text(&o.stdout).ends_with("no errors\n"), "{}", text(&o.stdout));
+    assert!(in_folder(folder.path(), &["machine", "check", "mill.toml", "-q"]).stdout.is_empty());
+}
+
+#[test]
+fn two_codes_of_a_group_are_both_shown() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("a.ngc"), "G21 G90\nF100 G1 X1 G0\nM2\n").unwrap();
+    insta::assert_snapshot!(text(&in_folder(folder.path(), &["check", "a.ngc"]).stderr));
+}
+
+#[test]
+fn another_dialects_words_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let program = "O1000 (gcc-robot: dialect=fanuc-mill)\nG21 G90\n#<x>=1\nO100 while [#1 LT 3]\nG38.2 Z-5. F100.\nM30\n";
+    let mut told = String::new();
+    for line in program.lines().skip(2).take(3) {
+        let text_of = format!("O1000 (gcc-robot: dialect=fanuc-mill)\nG21 G90\n{line}\nM30\n");
+        std::fs::write(folder.path().join("a.ngc"), text_of).unwrap();
+        told += &text(&in_folder(folder.path(), &["check", "a.ngc", "-q"]).stderr);
+    }
+    insta::assert_snapshot!(told);
 }

@@ -7,7 +7,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use gr_canon::{CallFrame, FrameId};
-use gr_gcode::{Chunk, File, Scan};
+use gr_gcode::{Chunk, File, Form, Scan};
 use gr_spec::{Code, Severity, code};
 use gr_text::{Diagnostic, FileId, Frame, Span};
 
@@ -269,7 +269,28 @@ impl Source {
         let blank = (text.len() - text.trim_end().len()) as u32;
         Some(Span::new(span.start, span.end - blank).shifted(self.start))
     }
+    /// The word of a code such as `G2`, when it is written as a plain number.
+    fn code_word(&self, name: &str) -> Option<Span> {
+        let letter = name.bytes().next()?.to_ascii_lowercase();
+        let value: f64 = name.get(1..)?.parse().ok()?;
+        let words = self.scan().words(self.line);
+        let word = words.iter().find(|w| w.letter == letter && w.form == Form::Literal && (w.value - value).abs() < 1e-4)?;
+        Some(self.scan().word_span(&self.chunk.text, self.line, word).shifted(self.start))
+    }
+    /// Two codes that exclude each other: the second is one too many, and both are shown.
+    fn two_codes(&self, found: &Found, file: FileId) -> Option<Diagnostic> {
+        let [_, first, second] = found.args.as_slice() else { return None };
+        let places = [self.code_word(first)?, self.code_word(second)?];
+        let mut d = Diagnostic::new(found.code, file, places[1], &found.args);
+        d.labels.first_mut()?.text = second.clone();
+        Some(d.label(file, places[0], format!("{first} is of the same group")))
+    }
     fn diagnostic(&self, found: &Found, file: FileId) -> Diagnostic {
+        if found.code == code::CODE_SAME_GROUP
+            && let Some(d) = self.two_codes(found, file)
+        {
+            return d;
+        }
         let exact = found.span.map(|s| s.shifted(self.line_start()));
         let block = self.line_span();
         let narrow = exact.or_else(|| self.word(found.letter?)).filter(|s| *s != block);

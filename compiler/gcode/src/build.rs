@@ -5,6 +5,7 @@ use std::collections::HashMap;
 use gr_spec::{Family, code, rs274};
 use gr_text::Span;
 
+use crate::alien::{self, Alien};
 use crate::fast::{ABSOLUTE_LIMIT, Rules, once_bit};
 use crate::grammar::{self, Block, Expr, Flaw, Item, Kind, Name, Problem};
 use crate::lex::{self, CommentFault, Token};
@@ -123,7 +124,7 @@ impl Tables {
         }
         if rules.family == Family::Grbl && line.closed.starts_with('$') {
             self.word(whole, b'?', Form::Bad, 0.0);
-            self.fault(whole, code::SYNTAX_NOT_IN_DIALECT, rs274::SILENT, &["`$` commands in programs".to_string()]);
+            self.not_in_dialect(whole, rules, &alien::DOLLAR);
             return;
         }
         let (block, flaws) = grammar::parse(&line.tokens, &line.gaps(), rules.family);
@@ -136,8 +137,12 @@ impl Tables {
         for flaw in &flaws {
             let span = line.span(flaw.at.start, flaw.at.end);
             // Within a word that may not stand here at all, its value does not matter.
-            if !silenced.iter().any(|s| s.start < span.start && span.end <= s.end) {
-                self.flaw(line, text, flaw, span);
+            if silenced.iter().any(|s| s.start < span.start && span.end <= s.end) {
+                continue;
+            }
+            match alien::flaw(flaw.what, rules.family) {
+                Some(what) => self.not_in_dialect(span, rules, &what),
+                None => self.flaw(line, text, &Flaw { what: alien::plainly(flaw.what, rules.family), ..flaw.clone() }, span),
             }
         }
         self.faults[own..].sort_by_key(|f| (f.span.start, f.code == code::WORD_REPEATED));
@@ -166,6 +171,15 @@ impl Tables {
 
     fn item(&mut self, line: &lex::Line, text: &str, item: &Item, rules: &Rules) {
         let span = |at: &grammar::Range| line.span(at.start, at.end);
+        if let Some((what, at)) = alien::item(item, rules.family) {
+            let letter = if matches!(item, Item::Setting { .. }) { b'#' } else { b'o' };
+            let whole = match item {
+                Item::Setting { at, .. } | Item::Control { at, .. } => at,
+                _ => &at,
+            };
+            self.word(span(whole), letter, Form::Bad, 0.0);
+            return self.not_in_dialect(span(&at), rules, &what);
+        }
         match item {
             Item::Comment { at } => {
                 let first = text.as_bytes()[span(at).start as usize];
@@ -177,12 +191,6 @@ impl Tables {
             Item::BadComment { at } => self.word(span(at), b'(', Form::Bad, 0.0),
             Item::Bad { letter, at } => self.word(span(at), *letter, Form::Bad, 0.0),
             Item::Word { letter, value, at } => self.letter_word(line, *letter, value, span(at), rules),
-            Item::Setting { at, .. } | Item::Control { at, .. } if plain_only(rules.family) => {
-                let what = if matches!(item, Item::Setting { .. }) { "parameters" } else { "control statements" };
-                let letter = if matches!(item, Item::Setting { .. }) { b'#' } else { b'o' };
-                self.word(span(at), letter, Form::Bad, 0.0);
-                self.not_in_dialect(span(at), what);
-            }
             Item::Setting { target, value, at } => {
                 let target = match target {
                     Name::Number(number) => Target::Number(self.expr(line, number)),
@@ -233,20 +241,21 @@ impl Tables {
                 self.word(span, letter, Form::Literal, number);
             }
             Kind::Bad => self.word(span, letter, Form::Bad, 0.0),
-            _ if plain_only(rules.family) => {
-                let what = if line.text(value.at.start, value.at.end).contains('#') { "parameters" } else { "expressions" };
-                self.word(span, letter, Form::Bad, 0.0);
-                self.not_in_dialect(span, what);
-            }
             _ => {
+                if let Some((what, at)) = alien::value(value, rules.family) {
+                    self.word(span, letter, Form::Bad, 0.0);
+                    let at = if alien::plain_only(rules.family) { span } else { line.span(at.start, at.end) };
+                    return self.not_in_dialect(at, rules, &what);
+                }
                 let id = self.expr(line, value);
                 self.word(span, letter, Form::Expr, Word::pack(id.0 as usize));
             }
         }
     }
 
-    fn not_in_dialect(&mut self, span: Span, what: &str) {
-        self.fault(span, code::SYNTAX_NOT_IN_DIALECT, rs274::SILENT, &[what.to_string()]);
+    fn not_in_dialect(&mut self, span: Span, rules: &Rules, what: &Alien) {
+        let args = [what.what, rules.dialect, what.instead].map(str::to_string);
+        self.fault(span, code::SYNTAX_NOT_IN_DIALECT, rs274::SILENT, &args);
     }
 
     fn name(&mut self, line: &lex::Line, token: usize) -> u32 {
@@ -352,11 +361,6 @@ impl Tables {
         };
         self.fault(span, code, rs, &args);
     }
-}
-
-/// Dialects without parameters and expressions.
-fn plain_only(family: Family) -> bool {
-    matches!(family, Family::Grbl | Family::Ufmg2008)
 }
 
 fn is_line_number(item: &Item) -> bool {

@@ -30,6 +30,8 @@ pub(crate) struct Rules {
     pub longest: usize,
     pub comma: bool,
     pub family: Family,
+    /// Name of the dialect, for findings.
+    pub dialect: &'static str,
     pub limit: u32,
 }
 
@@ -69,6 +71,7 @@ impl Rules {
             longest: longest.min(ABSOLUTE_LIMIT),
             comma: dialect.decimal_comma,
             family: dialect.family,
+            dialect: dialect.id,
             limit: dialect.line_limit,
         }
     }

@@ -501,7 +501,8 @@ fn no_value<'t>(ctx: Ctx<'t>) -> impl Parser<'t, Tokens<'t>, Kind, Extra> + Clon
             None => fail(inp, 0, Problem::NoValue),
             // These begin a value and have told their fault already.
             Some(Token::Mark(b'[' | b'#')) => unexpected(inp),
-            Some(Token::Letter(b'a'..=b'z')) if let Some(name) = known => {
+            Some(Token::Letter(b'a'..=b'z')) if known.is_some() => {
+                let name = known.unwrap_or_default();
                 if ahead(inp, name.len()) == Some(Token::Mark(b'[')) {
                     unexpected(inp)
                 } else {

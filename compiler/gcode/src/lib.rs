@@ -5,6 +5,7 @@
 //! path; lines with structure go through a chumsky grammar over logos tokens. Both give the same tables, and
 //! a test demands it. Every byte of the text is covered by a word's span or is blank.
 
+mod alien;
 mod build;
 mod chunks;
 mod fast;

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use gr_spec::Dialect;
+use gr_spec::{Dialect, code};
 use proptest::prelude::*;
 
 use crate::*;
@@ -119,6 +119,20 @@ fn plain_dialects() {
         "grbl"
     ));
     insta::assert_snapshot!(dump("G01 X1,5 Y-2.25 F10\nG0 X1,5,2\nG0 X#1\n", "ufmg2008"));
+}
+
+/// A Fanuc control has none of LinuxCNC's own statements, names and functions.
+#[test]
+fn fanuc_is_a_closed_language() {
+    let text = "O100 sub\nO100 endsub\nO100 call [1]\nO1 while [#1 LT 3]\nO1 repeat [3]\nO1 if [#1]\nO1 while\nO1 break\nO<x>\n\
+        O1 nothing\nG0 X#<x>\n#<x>=1\n#1=EXISTS[#2]\nG0 X[2+3**2]\n#1=#<_x>*2\nWHILE[#<x> LT 1]DO1\nO1000 (title)\n";
+    insta::assert_snapshot!(dump(text, "fanuc-mill"));
+    for line in &text.lines().collect::<Vec<_>>()[..16] {
+        let scan = scan(&format!("{line}\n"), dialect("fanuc-mill"));
+        let codes: Vec<_> = scan.faults.iter().map(|f| f.code).collect();
+        assert_eq!(codes, [code::SYNTAX_NOT_IN_DIALECT], "{line}");
+        assert!(scan.faults[0].args[2].len() > 10, "{line}");
+    }
 }
 
 #[test]

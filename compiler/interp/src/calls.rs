@@ -23,6 +23,8 @@ pub(crate) enum CallKind {
     Oword,
     M98,
     Remap,
+    /// G65: ends like M98, with variables of its own.
+    Macro,
 }
 
 /// Where a call comes back to.
@@ -46,6 +48,8 @@ pub(crate) struct Level {
     /// #1 … #30 before the last call with arguments from this level. They stay: after an error the controller takes
     /// them back even when they are not those of the call that failed.
     pub kept: Option<Box<[f64; ARGS]>>,
+    /// Fanuc: the local variables while a macro that this level called has its own.
+    pub locals: Option<Box<crate::macro_call::Locals>>,
     pub m98_left: i32,
     pub saved: Option<Box<SavedModes>>,
     pub saved_valid: bool,
@@ -54,7 +58,7 @@ pub(crate) struct Level {
 
 impl Level {
     pub fn new(sub: u32) -> Level {
-        Level { sub, kind: CallKind::None, ret: None, kept: None, m98_left: -1, saved: None, saved_valid: false, restore: false }
+        Level { sub, kind: CallKind::None, ret: None, kept: None, locals: None, m98_left: -1, saved: None, saved_valid: false, restore: false }
     }
 }
 
@@ -110,7 +114,9 @@ impl<S: Sink> Interp<'_, S> {
             if self.skip.as_ref().is_some_and(|s| s.to_sub) {
                 return Ok(());
             }
-            return self.convert_return(Keyword::MacroEnd, true);
+            let target = self.return_target(scan, &rest)?;
+            self.convert_return(Keyword::MacroEnd, true)?;
+            return target.map_or(Ok(()), |n| self.go_to_number(n));
         }
         if self.config.no_fanuc_subs {
             return Err(structure(rs274::RT_M98_DISABLED, "M98 is switched off in the INI file"));
@@ -138,9 +144,18 @@ impl<S: Sink> Interp<'_, S> {
         self.call(label, CallKind::M98, [0.0; ARGS], 0, repeats)
     }
 
+    /// Fanuc: M99 P goes back to the block with that number.
+    fn return_target(&mut self, scan: &Scan, words: &[Word]) -> Res<Option<f64>> {
+        let Some(p) = words.iter().find(|w| w.letter == b'p').filter(|_| self.is_fanuc()) else { return Ok(None) };
+        Ok(Some(match p.form {
+            Form::Expr => self.eval(scan, gr_gcode::ExprId(p.index() as u32))?,
+            _ => p.value,
+        }))
+    }
+
     pub(crate) fn convert_sub(&mut self, keyword: Keyword, label: Label) -> Res {
         let kind = self.levels[self.level()].kind;
-        if keyword == Keyword::Program && !matches!(kind, CallKind::M98 | CallKind::None) {
+        if keyword == Keyword::Program && !matches!(kind, CallKind::M98 | CallKind::Macro | CallKind::None) {
             return Err(structure(rs274::RT_O_FANUC_CALL, "a subroutine that begins with O and its number is called with M98"));
         }
         if keyword == Keyword::Sub && kind == CallKind::M98 {
@@ -208,6 +223,7 @@ impl<S: Sink> Interp<'_, S> {
         if ret.params {
             self.take_back_params(level - 1);
         }
+        self.take_back_variables(level - 1);
         self.place = ret.place;
         self.next = ret.next;
         self.shift = ret.shift;
@@ -245,7 +261,7 @@ impl<S: Sink> Interp<'_, S> {
             return self.call_nothing(label);
         }
         let mut next = self.next;
-        if let (CallKind::M98, Some(repeats)) = (kind, repeats) {
+        if let (CallKind::M98 | CallKind::Macro, Some(repeats)) = (kind, repeats) {
             let here = &mut self.levels[level];
             if here.m98_left == -1 {
                 here.m98_left = repeats;
@@ -257,7 +273,7 @@ impl<S: Sink> Interp<'_, S> {
                 here.m98_left = -1;
             }
         }
-        let params = kind != CallKind::M98;
+        let params = !matches!(kind, CallKind::M98 | CallKind::Macro);
         if params {
             self.levels[level].kept = Some(Box::new(std::array::from_fn(|i| self.params.get(i as u32 + 1))));
             for (i, v) in args.iter().enumerate() {

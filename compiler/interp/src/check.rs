@@ -295,8 +295,11 @@ impl<S: Sink> Interp<'_, S> {
         if b.has(b'k') && !matches!(motion, 20 | 30 | 62 | 330 | 331 | 760 | 870) && !repeats {
             return unused(if new { rs274::RT_K_UNUSED_NEW } else { rs274::RT_K_UNUSED }, b'k');
         }
+        if b.has(b'l') && repeats {
+            return Err(self.not_in_dialect("L as the number of repeats of a cycle", "write K").at(b'l'));
+        }
         if b.has(b'l')
-            && !(eighties || repeats || matches!(motion, 760 | 52 | 62 | 730) || special == 100 || comp_on || m5 == 66 || self.m98)
+            && !(eighties || matches!(motion, 760 | 52 | 62 | 730) || special == 100 || comp_on || m5 == 66 || self.m98)
         {
             return unused(rs274::RT_L_UNUSED, b'l');
         }
@@ -331,6 +334,7 @@ impl<S: Sink> Interp<'_, S> {
             let used = matches!(motion, 20 | 30 | 62 | 760 | 730 | 740)
                 || rough
                 || eighties
+                || crate::turning::is_turning(motion)
                 || matches!(comp, 411 | 421)
                 || special == 100
                 || m7 == 19;

@@ -64,8 +64,8 @@ impl<S: Sink> Interp<'_, S> {
             None if again => self.m.cycle_r,
             None => return Err(word_missing("R", rs274::CYCLE_NO_R)),
         };
-        // Fanuc controls repeat K times; older ones L times.
-        let letter = if self.is_fanuc() && self.block.has(b'k') { b'k' } else { b'l' };
+        // Fanuc controls repeat K times.
+        let letter = if self.is_fanuc() { b'k' } else { b'l' };
         let repeats = self.block.get(letter).map_or(1, |l| l as i32);
         if self.is_fanuc() {
             if !crate::check::is_cycle(self.m.motion as i16) {

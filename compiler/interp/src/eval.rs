@@ -6,7 +6,7 @@ use gr_gcode::{Binary, ExprId, Node, Scan, Unary};
 use gr_spec::{Rs274, code, rs274};
 
 use crate::angle::sin_cos2;
-use crate::{Fault, Interp, Res};
+use crate::{Fault, Interp, Res, vacant};
 
 /// Deeper nesting than any line of a controller allows; keeps the stack small on hostile input.
 const MAX_DEPTH: u32 = 600;
@@ -190,6 +190,11 @@ fn binary(op: Binary, a: f64, b: f64, tolerance: f64) -> Res<f64> {
 impl<S: Sink> Interp<'_, S> {
     /// Value of an expression.
     pub(crate) fn eval(&mut self, scan: &Scan, id: ExprId) -> Res<f64> {
+        self.eval_or_vacant(scan, id).map(vacant::number)
+    }
+
+    /// Value of an expression; [`vacant::VACANT`] where a Fanuc control has none.
+    pub(crate) fn eval_or_vacant(&mut self, scan: &Scan, id: ExprId) -> Res<f64> {
         let value = self.eval_node(scan, id, 0).map_err(|f| blame(f, scan, id))?;
         finite(value).map_err(|f| blame(f, scan, id))
     }
@@ -221,6 +226,11 @@ impl<S: Sink> Interp<'_, S> {
         let Some(node) = scan.nodes.get(id.0 as usize) else { return Err(self.parse_fault(scan)) };
         match *node {
             Node::Number(x) => Ok(x),
+            Node::Param(index) if self.is_fanuc() => {
+                let index = vacant::number(self.eval_node(scan, index, depth + 1)?);
+                let index = whole(index).ok_or_else(|| not_whole(index)).and_then(|i| self.variable_index(i));
+                Ok(self.read_variable(index.map_err(|f| blame(f, scan, id))?))
+            }
             Node::Param(index) => {
                 let index = self.eval_node(scan, index, depth + 1)?;
                 let index = self.param_index(index).map_err(|f| blame(f, scan, id))?;
@@ -235,6 +245,11 @@ impl<S: Sink> Interp<'_, S> {
             }
             Node::Unary(op, x) => {
                 let x = self.eval_node(scan, x, depth + 1)?;
+                if self.is_fanuc()
+                    && let Some(value) = vacant::function(op, x)
+                {
+                    return Ok(value);
+                }
                 unary(op, x).and_then(finite).map_err(|f| blame(f, scan, id))
             }
             Node::Atan(y, x) => {
@@ -254,6 +269,10 @@ impl<S: Sink> Interp<'_, S> {
             Node::Binary(op, a, b) => {
                 let a = self.eval_node(scan, a, depth + 1)?;
                 let b = self.eval_node(scan, b, depth + 1)?;
+                if let Some(value) = vacant::compared(op, a, b) {
+                    return Ok(value);
+                }
+                let (a, b) = (vacant::number(a), vacant::number(b));
                 let tolerance = if self.setup.version == Version::V2_9 { 1e-4 } else { 1e-6 };
                 let value = binary(op, a, b, tolerance).map_err(|f| blame(f, scan, id))?;
                 // The controller looks at the value of a bracket, not at what is worked out inside.
@@ -297,6 +316,10 @@ impl<S: Sink> Interp<'_, S> {
     /// Index of a parameter that is to be set.
     pub(crate) fn target_index(&mut self, scan: &Scan, id: ExprId) -> Res<i32> {
         let value = self.eval(scan, id)?;
+        if self.is_fanuc() {
+            let index = whole(value).ok_or_else(|| not_whole(value));
+            return index.and_then(|i| self.variable_target(i)).map_err(|f| blame(f, scan, id));
+        }
         let index = self.param_index(value).map_err(|f| blame(f, scan, id))?;
         if (5400..=5413).contains(&index) || (5420..=5428).contains(&index) {
             let fault = Fault::new(code::PARAMETER_READ_ONLY, rs274::RT_PARAMETER_READONLY).arg(format!("#{index}"));

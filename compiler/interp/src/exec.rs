@@ -333,6 +333,7 @@ impl<S: Sink> Interp<'_, S> {
             50..=52 | 60..=63 => self.convert_spline(motion),
             700 | 710 | 711 | 712 | 720 | 721 | 722 => self.convert_roughing(motion),
             g if crate::check::is_cycle(g) => self.convert_cycle(g),
+            g if crate::turning::is_turning(g) => self.convert_turning(g),
             _ => Err(Fault::new(code::CODE_UNKNOWN, rs274::RT_BUG_MOTION).named("this motion".into())),
         }
     }

@@ -4,6 +4,7 @@ use gr_canon::{Call, Sink};
 use gr_gcode::{LineKind, Scan, Word};
 use gr_spec::{code, rs274};
 
+use crate::macro_call::is_macro_call;
 use crate::run::Flow;
 use crate::{End, Fault, Interp, Res};
 
@@ -34,6 +35,9 @@ impl<S: Sink> Interp<'_, S> {
             if let Some(which) = self.fanuc_call(first) {
                 return self.fanuc_line(scan, words, which);
             }
+        }
+        if self.is_fanuc() && is_macro_call(words) {
+            return self.macro_call(scan, text, line, words);
         }
         for w in words {
             self.read_word(scan, text, w)?;
@@ -141,6 +145,9 @@ impl<S: Sink> Interp<'_, S> {
             return Err(self.first_fault(scan, line).unwrap_or_else(|| {
                 Fault::new(code::SYNTAX_BAD_CHARACTER, rs274::BAD_CHARACTER).arg("%").arg("%")
             }));
+        }
+        if self.is_fanuc() && is_macro_call(words) {
+            return self.macro_call(scan, text, line, words);
         }
         self.read_words(scan, text, line, words)?;
         if words.is_empty() && !at.faulty {

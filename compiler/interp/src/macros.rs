@@ -77,7 +77,7 @@ impl<S: Sink> Interp<'_, S> {
         self.local(name)
     }
 
-    fn go_to_number(&mut self, target: f64) -> Res {
+    pub(crate) fn go_to_number(&mut self, target: f64) -> Res {
         let index = self.index(self.place.file);
         let Some(line) = index.numbers.get(&(target as i64)).copied() else {
             let name = self.symbols.of(&format!("N{target}"));

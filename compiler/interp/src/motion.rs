@@ -202,7 +202,7 @@ impl<S: Sink> Interp<'_, S> {
         Ok(())
     }
 
-    fn check_feed(&self) -> Res {
+    pub(crate) fn check_feed(&self) -> Res {
         let fault = |rs, what: &str| Err(Fault::new(code::FEED_MISSING, rs).arg(what));
         match self.m.feed_mode {
             1 if !self.block.has(b'f') => fault(rs274::RT_INVERSE_F_MISSING, "with G93 every feed move needs its own F"),

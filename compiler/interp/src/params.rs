@@ -200,6 +200,10 @@ impl<S: Sink> Interp<'_, S> {
     /// Value of a parameter as the next block would read it: for editors that look into a run.
     pub fn peek(&mut self, parameter: &gr_gcode::Parameter) -> Option<f64> {
         match parameter {
+            gr_gcode::Parameter::Number(n) if self.is_fanuc() => {
+                let index = self.variable_index(i32::try_from(*n).ok()?).ok()?;
+                Some(self.read_variable(index)).filter(|v| !crate::vacant::is_vacant(*v))
+            }
             gr_gcode::Parameter::Number(n) => self.read_param(i32::try_from(*n).ok()?).ok(),
             gr_gcode::Parameter::Named(name) => self.find_named(name),
         }

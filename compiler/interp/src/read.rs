@@ -5,6 +5,7 @@ use gr_gcode::{Form, Scan, Target, Word};
 use gr_spec::{code, rs274};
 
 use crate::block::slot;
+use crate::check::code_name;
 use crate::fanuc::is_lathe;
 use crate::eval::{not_whole, to_int, whole};
 use crate::io::Comment;
@@ -138,7 +139,10 @@ impl<S: Sink> Interp<'_, S> {
 
     fn read_structured(&mut self, scan: &Scan, w: &Word) -> Res<Option<f64>> {
         match w.form {
-            Form::Expr => Ok(Some(self.eval(scan, gr_gcode::ExprId(w.index() as u32))?)),
+            Form::Expr => {
+                let value = self.eval_or_vacant(scan, gr_gcode::ExprId(w.index() as u32))?;
+                Ok(Some(value).filter(|v| !crate::vacant::is_vacant(*v)))
+            }
             Form::Setting => {
                 self.read_setting(scan, w.index())?;
                 Ok(None)
@@ -162,7 +166,7 @@ impl<S: Sink> Interp<'_, S> {
                 Slot::Named(name)
             }
         };
-        let value = self.eval(scan, setting.value)?;
+        let value = self.eval_or_vacant(scan, setting.value)?;
         self.settings.push((slot, value));
         Ok(())
     }
@@ -172,7 +176,10 @@ impl<S: Sink> Interp<'_, S> {
         let settings = std::mem::take(&mut self.settings);
         for (slot, value) in &settings {
             if let Slot::Number(index) = slot {
-                self.write_param(*index, *value);
+                match self.is_fanuc() {
+                    true => self.write_variable(*index, *value),
+                    false => self.write_param(*index, *value),
+                }
             }
         }
         let scan = self.reading.scan.clone();
@@ -289,12 +296,15 @@ impl<S: Sink> Interp<'_, S> {
         if n < 0 {
             return Err(Fault::new(code::WORD_NEGATIVE, rs274::RT_NEGATIVE_G).arg("G").at(b'g'));
         }
+        if self.closed.is_some() {
+            self.check_listed_g(n)?;
+        }
         if is_lathe(self.setup.dialect) {
-            // G-code system A: feed per minute and per revolution.
+            // G-code system A: turning and facing cycles, feed per minute and per revolution.
             n = match n {
+                900 | 940 => return self.take_turning_cycle(n as i16),
                 980 => 940,
                 990 => 950,
-                940 => return Err(self.not_carried_out(rs274::RT_UNKNOWN_G, "G94".into()).at(b'g')),
                 _ => n,
             };
         }
@@ -318,7 +328,7 @@ impl<S: Sink> Interp<'_, S> {
             return Ok(());
         }
         if old != -1 && (old != 800 || remapped.is_some()) {
-            return Err(Fault::new(code::CODE_SAME_GROUP, rs274::RT_TWO_G).arg("G").at(b'g'));
+            return Err(self.same_group('G', code_name(old), code_name(n as i16)));
         }
         self.block.set_g(group, n as i16);
         Ok(())
@@ -328,6 +338,9 @@ impl<S: Sink> Interp<'_, S> {
         let n = whole(value).ok_or_else(|| not_whole(value).at(b'm'))?;
         if n < 0 {
             return Err(Fault::new(code::WORD_NEGATIVE, rs274::RT_NEGATIVE_M).arg("M").at(b'm'));
+        }
+        if self.closed.is_some() {
+            self.check_listed_m(n)?;
         }
         let remapped = self.config.m_remap(n).map(|r| r.group);
         let group = match remapped {
@@ -343,10 +356,11 @@ impl<S: Sink> Interp<'_, S> {
         if group < 0 {
             return Err(Fault::new(code::CODE_UNKNOWN, rs274::RT_UNKNOWN_M).arg(n).at(b'm').named(format!("M{n}")));
         }
-        let b = &mut self.block;
-        if b.m[group as usize] != -1 {
-            return Err(Fault::new(code::CODE_SAME_GROUP, rs274::RT_TWO_M).arg("M").at(b'm'));
+        let old = self.block.m[group as usize];
+        if old != -1 {
+            return Err(self.same_group('M', format!("M{old}"), format!("M{n}")));
         }
+        let b = &mut self.block;
         b.m[group as usize] = n as i16;
         b.m_count += 1;
         if (100..200).contains(&n) && remapped.is_none() {
@@ -358,14 +372,22 @@ impl<S: Sink> Interp<'_, S> {
     /// Codes that a Fanuc control knows with another meaning than ours: better refused than done wrongly.
     fn means_otherwise(&self, n: i32) -> bool {
         if is_lathe(self.setup.dialect) {
-            matches!(n, 100 | 700 | 710 | 720 | 730 | 740 | 750 | 760 | 830..=890 | 900 | 920)
+            matches!(n, 100 | 700 | 710 | 720 | 730 | 740 | 750 | 760 | 830..=890 | 920)
         } else {
             matches!(n, 760 | 870)
         }
     }
 
-    fn not_carried_out(&self, rs: gr_spec::Rs274, name: String) -> Box<Fault> {
-        let what = self.setup.dialect.code(&name).map_or("", |c| c.title);
+    /// Two codes that exclude each other, in the order in which they stand.
+    pub(crate) fn same_group(&self, letter: char, first: String, second: String) -> Box<Fault> {
+        let rs = if letter == 'M' { rs274::RT_TWO_M } else { rs274::RT_TWO_G };
+        let fault = Fault::new(code::CODE_SAME_GROUP, rs).arg(letter).at(letter.to_ascii_lowercase() as u8);
+        fault.own_args(&[&letter.to_string(), &first, &second])
+    }
+
+    pub(crate) fn not_carried_out(&self, rs: gr_spec::Rs274, name: String) -> Box<Fault> {
+        let code = name.split(' ').next().unwrap_or_default();
+        let what = self.setup.dialect.code(code).map_or("", |c| c.title);
         Fault::new(code::CODE_NOT_CARRIED_OUT, rs).arg(&name).arg(what)
     }
 

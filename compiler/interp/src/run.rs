@@ -128,6 +128,8 @@ pub struct Interp<'a, S: Sink> {
     /// The machine's own table; the interpreter's follows after a tool change.
     pub(crate) world_tools: Arc<ToolTable>,
     pub(crate) config: Arc<Config>,
+    /// The codes that the dialect has, when it is a closed list.
+    pub(crate) closed: Option<&'static crate::closed::Closed>,
     pub(crate) place: Place,
     pub(crate) reading: Reading,
     pub(crate) files: &'a mut dyn Files,
@@ -227,6 +229,7 @@ impl<'a, S: Sink> Interp<'a, S> {
             world,
             world_tools: world_tools.unwrap_or(tools),
             config: Arc::new(Config::new(setup)),
+            closed: crate::closed::list_of(setup.dialect),
             place: Place::default(),
             reading: Reading::default(),
             files,
@@ -492,6 +495,7 @@ impl<'a, S: Sink> Interp<'a, S> {
             self.params.leave_level(level + 1);
             let ret = self.levels[level].ret.take();
             if let Some(ret) = ret {
+                self.take_back_variables(level);
                 if ret.params || (self.levels[level].kind != CallKind::M98 && self.stands_in()) {
                     self.take_back_params(level);
                 }

@@ -253,7 +253,7 @@ fn every_code_of_the_fanuc_lists_is_known() {
         }
     }
     // What the control does not have either stays unknown.
-    for (id, text) in [("fanuc-turn", "G86 X1.\nM30\n"), ("fanuc-mill", "G21 M777\nM30\n"), ("fanuc-mill", "G77\nM30\n")] {
+    for (id, text) in [("fanuc-turn", "G86.1 X1.\nM30\n"), ("fanuc-mill", "G21 M777\nM30\n"), ("fanuc-mill", "G77\nM30\n")] {
         let (_, outcome) = run_fanuc(id, text);
         assert_eq!(outcome.findings[0].fault.code, code::CODE_UNKNOWN, "{text}");
     }
@@ -278,8 +278,9 @@ fn a_fanuc_mill_wakes_up_in_g0_and_repeats_with_k() {
     assert!(outcome.ok(), "{:?}", outcome.findings);
     assert!(calls.iter().any(|c| c.starts_with("STRAIGHT_TRAVERSE(0.0000, 0.0000, 50.0000")), "{calls:?}");
     assert_eq!(calls.iter().filter(|c| c.starts_with("STRAIGHT_FEED")).count(), 3);
-    let (old, _) = run_fanuc("fanuc-mill", &text.replace("K3", "L3"));
-    assert_eq!(calls, old);
+    let (_, outcome) = run_fanuc("fanuc-mill", &text.replace("K3", "L3"));
+    assert_eq!(outcome.findings[0].fault.code, code::SYNTAX_NOT_IN_DIALECT);
+    assert_eq!(outcome.findings[0].fault.args[1..], ["fanuc-mill", "write K"]);
 }
 
 fn moves_of(calls: &[String]) -> Vec<String> {
@@ -358,6 +359,144 @@ fn fanuc_dwells_are_milliseconds_or_seconds() {
     assert!(outcome.ok(), "{:?}", outcome.findings);
     let dwells: Vec<_> = calls.iter().filter(|c| c.starts_with("DWELL")).collect();
     assert_eq!(dwells, ["DWELL(0.5000)", "DWELL(1.5000)", "DWELL(0.2500)"]);
+}
+
+/// What LinuxCNC has and the control has not is refused, not carried out with LinuxCNC's meaning.
+#[test]
+fn dialects_are_closed_lists() {
+    for (id, line) in [
+        ("fanuc-mill", "G38.2 Z-5. F100."),
+        ("fanuc-mill", "G5.1 X1. I1. J1."),
+        ("fanuc-mill", "M66 P0"),
+        ("fanuc-turn", "G7"),
+        ("fanuc-turn", "G64"),
+        ("grbl", "G81 X1 Z-1 R1"),
+        ("grbl", "G33 Z-1 K1"),
+        ("grbl", "M6"),
+    ] {
+        let (_, outcome) = run_fanuc(id, &format!("{line}\nM30\n"));
+        let fault = &outcome.findings[0].fault;
+        assert_eq!((fault.code, fault.args[1].as_str()), (code::SYNTAX_NOT_IN_DIALECT, id), "{line}: {fault:?}");
+    }
+}
+
+/// Fanuc Series 16i/18i (B-63684) and 0i/30i (B-64484), custom macro: undefined variable, FIX, FUP.
+#[test]
+fn fanuc_variables_are_vacant_until_set() {
+    let text = "\
+G21 G90
+G0 X1. Y2.
+#1=#0
+G0 X5. Y#1
+#2=[#1*5.]
+#3=#1
+IF[#1 EQ #0] THEN #101=1.
+IF[#1 EQ 0] THEN #102=1.
+IF[#2 EQ #0] THEN #103=1.
+IF[#1 NE 0] THEN #104=1.
+IF[#3 EQ #0] THEN #105=1.
+IF[#1 GE 0] THEN #106=1.
+G0 X#101 Y#102 Z#103
+G0 X[#104+#105+#106+#1] Y-#1 Z[FIX[-1.2]+FUP[-1.2]+FUP[1.2]]
+G0 X#2
+M30
+";
+    let (calls, outcome) = run_fanuc("fanuc-mill", text);
+    assert!(outcome.ok(), "{:?}", outcome.findings);
+    assert_eq!(moves_of(&calls), ["rapid 1 2 0", "rapid 5 2 0", "rapid 1 2 0", "rapid 3 2 -1", "rapid 0 2 -1"]);
+    for (text, wanted) in [
+        ("#0=1\n", code::PARAMETER_READ_ONLY),
+        ("#50=1\n", code::SYNTAX_NOT_IN_DIALECT),
+        ("#1=#4001\n", code::CODE_NOT_CARRIED_OUT),
+        ("#3000=1\n", code::CODE_NOT_CARRIED_OUT),
+    ] {
+        let (_, outcome) = run_fanuc("fanuc-mill", text);
+        assert_eq!(outcome.findings[0].fault.code, wanted, "{text}");
+    }
+}
+
+/// The same manuals: simple call (G65), local variable levels, M99 P.
+#[test]
+fn fanuc_macros_have_variables_of_their_own() {
+    let text = "\
+O1
+G21 G90
+#1=7.
+#24=9.
+#100=0
+G65 P9010 L2 A1. X[#1+1.] I2. I3.
+G0 X#1 Y#24
+M98 P9020
+G0 X#1
+M98 P9030
+G0 X999.
+N50
+G0 Z3.
+M30
+O9010
+#100=#100+#1
+G0 X#24 Y#4 Z#7
+#1=100.
+IF[#26 EQ #0] THEN #24=50.
+G65 P9020 A4.
+G0 X#1 Y#24
+M99
+O9020
+G0 X#1
+#1=[#1+1.]
+M99
+O9030
+M99 P50
+";
+    let (calls, outcome) = run_fanuc("fanuc-mill", text);
+    assert!(outcome.ok(), "{:?}", outcome.findings);
+    let macro_moves = ["rapid 8 2 3", "rapid 4 2 3", "rapid 100 50 3"];
+    let again = ["rapid 8 2 3", "rapid 4 2 3", "rapid 100 50 3"];
+    let after = ["rapid 7 9 3", "rapid 7 9 3", "rapid 8 9 3", "rapid 8 9 3"];
+    assert_eq!(moves_of(&calls), [&macro_moves[..], &again[..], &after[..]].concat());
+    for (text, wanted) in [
+        ("G65 A1.\nM30\n", code::WORD_MISSING),
+        ("G0 G65 P1\nM30\n", code::MACRO_MALFORMED),
+        ("G65 P1 G1\nM30\n", code::MACRO_MALFORMED),
+        ("G65 P1 L0\nM30\n", code::WORD_MISSING),
+        ("G65 P8\nM30\n", code::SUB_NOT_FOUND),
+        ("O1\nM98 P2\nM30\nO2\nG65 P2\nM99\n", code::SUB_LIMIT),
+        ("G66 P1\nM30\n", code::CODE_NOT_CARRIED_OUT),
+    ] {
+        let (_, outcome) = run_fanuc("fanuc-mill", text);
+        assert_eq!(outcome.findings[0].fault.code, wanted, "{text}: {:?}", outcome.findings);
+    }
+}
+
+/// Fanuc lathe manual, G-code system A: G90 cuts along Z, G94 along X; both come back to where they began.
+#[test]
+fn a_fanuc_lathe_turns_and_faces_in_cycles() {
+    let text = "\
+G21 G97 S500 M3
+G0 X60. Z2.
+G90 X50. Z-20. F0.2
+X40.
+U-30. W-12. R-1.
+G0 X60. Z2.
+G94 X20. Z-3. F0.1
+Z-6. R-1.
+G1 X61.
+M30
+";
+    let (calls, outcome) = run_fanuc("fanuc-turn", text);
+    assert!(outcome.ok(), "{:?}", outcome.findings);
+    assert_eq!(
+        moves_of(&calls),
+        [
+            "rapid 30 0 2", "rapid 25 0 2", "feed 25 0 -20", "feed 30 0 -20", "rapid 30 0 2", // G90
+            "rapid 20 0 2", "feed 20 0 -20", "feed 30 0 -20", "rapid 30 0 2", // X alone
+            "rapid 14 0 2", "feed 15 0 -10", "feed 30 0 -10", "rapid 30 0 2", // increments and a taper
+            "rapid 30 0 2", "rapid 30 0 -3", "feed 10 0 -3", "feed 10 0 2", "rapid 30 0 2", // G94
+            "rapid 30 0 -7", "feed 10 0 -6", "feed 10 0 2", "rapid 30 0 2", "feed 30.5 0 2",
+        ]
+    );
+    let (_, outcome) = run_fanuc("fanuc-turn", "G0 G90 X1. Z1.\nM30\n");
+    assert_eq!(outcome.findings[0].fault.code, code::CODE_SAME_GROUP);
 }
 
 #[test]

@@ -17,7 +17,7 @@ pub fn text(process: &Process, tools: &[Tool]) -> String {
             let _ = write!(out, "  material {}", quoted(&w.material));
         }
         if let Some(t) = w.tolerance {
-            let _ = write!(out, "  tolerance {t}");
+            let _ = write!(out, "  tolerance {}", number(t));
         }
         out.push('\n');
     }
@@ -47,7 +47,7 @@ fn elements(all: &[Element], depth: usize, number: &mut usize, out: &mut String)
                         let _ = write!(out, " at {}", list(&f.origin));
                     }
                     if let Some(z) = s.security {
-                        let _ = write!(out, "  security plane {z}");
+                        let _ = write!(out, "  security plane {}", self::number(z));
                     }
                 }
                 out.push('\n');
@@ -116,7 +116,7 @@ fn depth(s: &Workingstep) -> String {
     let own = s.feature.depth;
     match &s.operation.kind {
         OperationKind::Drill(d) => match d.depth.filter(|d| *d != own) {
-            Some(cut) => format!("{own}, cut {cut}"),
+            Some(cut) => format!("{}, cut {}", number(own), number(cut)),
             None => number(own),
         },
         _ => number(own),
@@ -125,7 +125,7 @@ fn depth(s: &Workingstep) -> String {
 
 fn shape(shape: &Shape) -> String {
     match shape {
-        Shape::Face { length, direction, width, .. } => format!("face length {length} along {} width {width}", list(direction)),
+        Shape::Face { length, direction, width, .. } => format!("face length {} along {} width {}", number(*length), list(direction), number(*width)),
         Shape::Pocket { boundary, bosses, slope, bottom, planar_radius, orthogonal_radius } => {
             let mut out = closed(boundary);
             pocket(&mut out, bosses.len(), *slope, *bottom, *planar_radius, *orthogonal_radius);
@@ -140,7 +140,7 @@ fn shape(shape: &Shape) -> String {
             let mut out = section_text(section);
             match path {
                 Travel::Line { direction, length, .. } => {
-                    let _ = write!(out, ", length {length} along {}", list(direction));
+                    let _ = write!(out, ", length {} along {}", number(*length), list(direction));
                 }
                 Travel::Curve(c) => {
                     let _ = write!(out, ", along a curve of {} points", c.points.len());
@@ -152,9 +152,9 @@ fn shape(shape: &Shape) -> String {
             }
             out
         }
-        Shape::Step { length, direction, .. } => format!("step length {length} along {}", list(direction)),
+        Shape::Step { length, direction, .. } => format!("step length {} along {}", number(*length), list(direction)),
         Shape::Hole { diameter, final_diameter, bottom } => {
-            let mut out = format!("diameter {diameter}");
+            let mut out = format!("diameter {}", number(*diameter));
             if let Some(f) = final_diameter {
                 let _ = write!(out, " to {f}");
             }
@@ -162,7 +162,7 @@ fn shape(shape: &Shape) -> String {
             out
         }
         Shape::Outside { boundary, .. } => format!("outside of {} points", boundary.points.len()),
-        Shape::Thread { major, pitch, .. } => format!("thread {major}{}", pitch.map_or(String::new(), |p| format!(" pitch {p}"))),
+        Shape::Thread { major, pitch, .. } => format!("thread {}{}", number(*major), pitch.map_or(String::new(), |p| format!(" pitch {}", number(p)))),
         Shape::Compound(all) => {
             let inner: Vec<String> = all.iter().map(|f| format!("#{} {}", f.origin.id, self::shape(&f.shape))).collect();
             inner.join("; ")
@@ -176,13 +176,13 @@ fn pocket(out: &mut String, bosses: usize, slope: f64, bottom: PocketBottom, pla
         let _ = write!(out, ", bosses {bosses}");
     }
     if slope != 0.0 {
-        let _ = write!(out, ", slope {}", slope.to_degrees());
+        let _ = write!(out, ", slope {}", number(slope.to_degrees()));
     }
     if let Some(r) = planar {
-        let _ = write!(out, ", planar radius {r}");
+        let _ = write!(out, ", planar radius {}", number(r));
     }
     if let Some(r) = orthogonal {
-        let _ = write!(out, ", orthogonal radius {r}");
+        let _ = write!(out, ", orthogonal radius {}", number(r));
     }
     match bottom {
         PocketBottom::Through => out.push_str(", through"),
@@ -198,10 +198,10 @@ fn pocket(out: &mut String, bosses: usize, slope: f64, bottom: PocketBottom, pla
 
 fn closed(c: &Closed) -> String {
     match c {
-        Closed::Rectangle { length, width, .. } => format!("rectangle {length} x {width}"),
-        Closed::Circle { diameter, .. } => format!("circle {diameter}"),
+        Closed::Rectangle { length, width, .. } => format!("rectangle {} x {}", number(*length), number(*width)),
+        Closed::Circle { diameter, .. } => format!("circle {}", number(*diameter)),
         Closed::Ngon { diameter, sides, across_flats, .. } => {
-            format!("{sides} sides, {} {diameter}", if *across_flats { "across flats" } else { "across corners" })
+            format!("{sides} sides, {} {}", if *across_flats { "across flats" } else { "across corners" }, number(*diameter))
         }
         Closed::General(c) => format!("closed curve of {} points", c.points.len()),
     }
@@ -209,11 +209,11 @@ fn closed(c: &Closed) -> String {
 
 fn section_text(s: &Section) -> String {
     match s {
-        Section::SquareU { width, radius, .. } => format!("square U width {width} radius {}", radius[0]),
-        Section::RoundedU { width } => format!("rounded U width {width}"),
-        Section::Vee { radius, angle, .. } => format!("V {} degrees radius {radius}", angle.to_degrees()),
-        Section::Tee { width, bar_width, bar_depth, .. } => format!("T width {width} bar {bar_width} x {bar_depth}"),
-        Section::Circular { radius, .. } => format!("circular radius {radius}"),
+        Section::SquareU { width, radius, .. } => format!("square U width {} radius {}", number(*width), number(radius[0])),
+        Section::RoundedU { width } => format!("rounded U width {}", number(*width)),
+        Section::Vee { radius, angle, .. } => format!("V {} degrees radius {}", number(angle.to_degrees()), number(*radius)),
+        Section::Tee { width, bar_width, bar_depth, .. } => format!("T width {} bar {} x {}", number(*width), number(*bar_width), number(*bar_depth)),
+        Section::Circular { radius, .. } => format!("circular radius {}", number(*radius)),
         Section::General(_) => "general section".into(),
     }
 }
@@ -232,9 +232,9 @@ fn bottom_name(b: &HoleBottom) -> String {
     match b {
         HoleBottom::Through => "through".into(),
         HoleBottom::Flat => "flat bottom".into(),
-        HoleBottom::Radiused(r) => format!("flat bottom with radius {r}"),
-        HoleBottom::Spherical(r) => format!("spherical bottom {r}"),
-        HoleBottom::Conical(a, _) => format!("conical bottom {} degrees", a.to_degrees()),
+        HoleBottom::Radiused(r) => format!("flat bottom with radius {}", number(*r)),
+        HoleBottom::Spherical(r) => format!("spherical bottom {}", number(*r)),
+        HoleBottom::Conical(a, _) => format!("conical bottom {} degrees", number(a.to_degrees())),
     }
 }
 
@@ -242,13 +242,13 @@ fn operation(o: &Operation) -> String {
     let mut out = String::new();
     if let OperationKind::Mill(m) = &o.kind {
         if let Some(a) = m.axial {
-            let _ = write!(out, "  axial {a}");
+            let _ = write!(out, "  axial {}", number(a));
         }
         if let Some(r) = m.radial {
-            let _ = write!(out, "  radial {r}");
+            let _ = write!(out, "  radial {}", number(r));
         }
         if m.allowance_side != 0.0 || m.allowance_bottom != 0.0 {
-            let _ = write!(out, "  allowance side {} bottom {}", m.allowance_side, m.allowance_bottom);
+            let _ = write!(out, "  allowance side {} bottom {}", number(m.allowance_side), number(m.allowance_bottom));
         }
         if let Some(s) = &m.strategy {
             let _ = write!(out, "  {}", s.keyword.to_lowercase());
@@ -261,18 +261,18 @@ fn operation(o: &Operation) -> String {
 }
 
 fn tool_line(t: &Tool) -> String {
-    let mut out = format!("T{} {} {} diameter {}", t.number, t.kind, quoted(&t.name), t.diameter);
+    let mut out = format!("T{} {} {} diameter {}", t.number, t.kind, quoted(&t.name), number(t.diameter));
     if t.edge_radius != 0.0 {
-        let _ = write!(out, " edge radius {}", t.edge_radius);
+        let _ = write!(out, " edge radius {}", number(t.edge_radius));
     }
     if let Some(l) = t.cutting_length {
-        let _ = write!(out, " cutting length {l}");
+        let _ = write!(out, " cutting length {}", number(l));
     }
     if let Some(a) = t.tip_angle {
-        let _ = write!(out, " tip angle {}", a.to_degrees());
+        let _ = write!(out, " tip angle {}", number(a.to_degrees()));
     }
     if let Some(l) = t.length {
-        let _ = write!(out, " length {l}");
+        let _ = write!(out, " length {}", number(l));
     }
     out
 }
@@ -281,10 +281,10 @@ fn technology(o: &Operation) -> String {
     let t = &o.technology;
     let mut out = String::new();
     if let Some(f) = t.feed {
-        let _ = write!(out, "F{} ", rounded(f * 60.0));
+        let _ = write!(out, "F{} ", number(f * 60.0));
     }
     if let Some(s) = t.speed {
-        let _ = write!(out, "S{} {} ", rounded(s), if t.clockwise { "clockwise" } else { "counter-clockwise" });
+        let _ = write!(out, "S{} {} ", number(s), if t.clockwise { "clockwise" } else { "counter-clockwise" });
     }
     if o.functions.flood {
         out.push_str("flood ");
@@ -295,17 +295,12 @@ fn technology(o: &Operation) -> String {
     out.trim_end().to_string()
 }
 
-/// Numbers made by conversion, without their last noise.
-fn rounded(v: f64) -> f64 {
-    (v * 1e4).round() / 1e4
-}
-
 fn number(v: f64) -> String {
-    v.to_string()
+    gr_text::figures::number(v, 4)
 }
 
 fn list(v: &[f64]) -> String {
-    let all: Vec<String> = v.iter().map(|c| (c + 0.0).to_string()).collect();
+    let all: Vec<String> = v.iter().map(|c| number(*c)).collect();
     all.join(",")
 }
 
@@ -313,7 +308,7 @@ fn quoted(s: &str) -> String {
     format!("'{s}'")
 }
 
-/// The plan as JSON: the same facts, numbers unrounded.
+/// The plan as JSON: the same facts, numbers to nine decimals.
 pub fn json(process: &Process, tools: &[Tool]) -> String {
     let steps: Vec<String> = process.steps().into_iter().map(step_json).collect();
     let tools: Vec<String> = tools.iter().map(tool_json).collect();
@@ -359,7 +354,7 @@ fn tool_json(t: &Tool) -> String {
 }
 
 fn real(v: f64) -> String {
-    if v.is_finite() { (v + 0.0).to_string() } else { "null".into() }
+    if v.is_finite() { (libm::round(v * 1e9) / 1e9 + 0.0).to_string() } else { "null".into() }
 }
 fn option(v: Option<f64>) -> String {
     v.map_or("null".into(), real)

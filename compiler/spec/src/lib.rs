@@ -103,6 +103,11 @@ pub fn fill(template: &str, args: &[String]) -> String {
     out
 }
 
+/// A template as people read it before anything has happened: `…` where the arguments go.
+pub fn open(template: &str) -> String {
+    fill(template, &[const { "…" }; 9].map(str::to_string))
+}
+
 /// One row of `spec/targets`: something `--target` takes.
 #[derive(Debug, PartialEq, Eq)]
 pub struct TargetDef {

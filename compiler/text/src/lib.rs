@@ -5,6 +5,7 @@
 
 mod decode;
 mod diagnostic;
+pub mod figures;
 mod findings;
 mod lines;
 

@@ -65,7 +65,7 @@ impl Lower {
     fn has_feed(&mut self, c: &Command, word: &str) -> bool {
         let good = self.feed.is_some_and(|f| f > 0.0);
         if !good {
-            self.fault(code::UFMG_NO_FEED, c, &[word.into()]);
+            self.fault(code::FEED_MISSING, c, &[format!("{word} needs F, the feed in mm/s, and none was programmed before")]);
         }
         good
     }
@@ -100,7 +100,7 @@ impl Lower {
             None => {
                 let text = "start, end and centre of this arc lie on one line, and not in a main plane: \
                             its plane is not determined";
-                self.fault(code::UFMG_ARC_PLANE, c, &[text.into()]);
+                self.fault(code::UFMG_COMMAND, c, &[text.into()]);
             }
         }
     }

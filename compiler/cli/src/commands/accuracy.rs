@@ -17,11 +17,10 @@ use super::check::{Checked, show};
 use crate::emit::tool_rows;
 use crate::exit::Exit;
 use crate::options::{AccuracyArgs, AccuracyReference, Global, LintArgs, TableFormat};
-use crate::output::write_all;
 use crate::pipeline::{Motion, Unit, load, motion};
 use crate::progress::Progress;
 use crate::setup::station;
-use crate::sources::{Sources, reason};
+use crate::sources::Sources;
 
 /// Three numbers with commas between them.
 pub fn triple(text: &str) -> Option<[f64; 3]> {
@@ -85,14 +84,8 @@ pub fn run(global: &Global, args: &AccuracyArgs) -> Exit {
     if let Some(text) = made {
         exit = match &args.output {
             None => super::print(&text),
-            Some(goal) => match write_all(&[(goal.clone(), text.into_bytes())]) {
-                Ok(()) => Exit::Ok,
-                Err((path, e)) => {
-                    let name = path.display().to_string();
-                    super::complain(&mut renderer, &mut sources, &name, code::FILE_UNWRITABLE, &[name.clone(), reason(&e)]);
-                    Exit::Io
-                }
-            },
+            Some(goal) if goal == Path::new("-") => super::print(&text),
+            Some(goal) => super::write(&mut renderer, &mut sources, &args.file, &[(goal.clone(), text.into_bytes())]),
         };
     }
     renderer.finish(false);

@@ -13,7 +13,7 @@ use super::complain;
 use crate::emit::{Artifact, Built, Goal, TargetOptions, build, stem};
 use crate::exit::Exit;
 use crate::options::{BuildArgs, Global};
-use crate::output::{Pending, depfile, to_stdout, write_with};
+use crate::output::{Pending, depfile, same_file, to_stdout, write_with};
 use crate::pipeline::load;
 use crate::progress::Progress;
 use crate::project::Project;
@@ -26,7 +26,8 @@ const POLL: Duration = Duration::from_millis(250);
 
 pub fn run(global: &Global, args: &BuildArgs) -> Exit {
     let mut round = Round::new(global, args).run();
-    if !args.watch {
+    // A wrong command line stays wrong.
+    if !args.watch || round.exit == Exit::Usage {
         return round.exit;
     }
     loop {
@@ -135,7 +136,35 @@ impl<'a> Round<'a> {
         self.exit = self.exit.max(exit);
     }
 
+    /// What the options can't do together.
+    fn misused(&self) -> Option<&'static str> {
+        let a = self.args;
+        if a.files.is_empty() {
+            let target_options = !crate::emit::given(&a.options).is_empty();
+            return if a.output.is_some() {
+                Some("-o goes with programs named on the command line; in a project the [[targets]] say where results go")
+            } else if target_options {
+                Some("options of targets go with programs named on the command line; in a project they stand in its [[targets]]")
+            } else if a.from_line.is_some() {
+                Some("--from-line goes with one program named on the command line")
+            } else {
+                None
+            };
+        }
+        let to_stdout = a.output.as_deref().is_none_or(|o| o == Path::new("-"));
+        if a.depfile.is_some() && to_stdout {
+            return Some("--depfile names the file that is made: it goes with -o FILE");
+        }
+        if a.watch && a.files.iter().any(|f| f == Path::new("-")) {
+            return Some("--watch can't watch standard input");
+        }
+        (a.from_line.is_some() && a.files.len() > 1).then_some("--from-line goes with one program")
+    }
+
     fn jobs(&mut self, station: &Station) -> Result<Vec<Job>, String> {
+        if let Some(why) = self.misused() {
+            return Err(why.into());
+        }
         if self.args.files.is_empty() {
             let Some(project) = &station.project else {
                 return Err(format!("name the programs to build, or add them to {}", crate::project::NAME));
@@ -163,6 +192,10 @@ impl<'a> Round<'a> {
         let mut jobs = Vec::new();
         if project.file.targets.is_empty() {
             return Err(format!("{} has no [[targets]]", project.path.display()));
+        }
+        if let Some(id) = self.args.target.as_ref().filter(|id| !project.file.targets.iter().any(|t| t.target == **id)) {
+            target(id)?;
+            return Err(format!("{} has no [[targets]] entry for {id}", project.path.display()));
         }
         for row in project.file.targets.iter().filter(|t| self.args.target.as_ref().is_none_or(|id| *id == t.target)) {
             let target = target(&row.target)?;
@@ -256,7 +289,13 @@ impl<'a> Round<'a> {
         if built.written.is_some() {
             goals.insert(0, goal.clone());
         }
-        if let Some(same) = read.iter().find(|r| goals.iter().any(|g| same_file(r, g))) {
+        let taken = |g: &&PathBuf| self.args.depfile.as_ref() == Some(*g) || self.results.iter().map(|(p, _)| p).chain(self.written.iter().map(|(p, _)| p)).any(|p| p == *g);
+        if let Some(twice) = goals.iter().find(taken) {
+            eprintln!("two results would both be written to {}: give them different names or folders", twice.display());
+            return self.fail(Exit::Usage);
+        }
+        let all = goals.iter().chain(&self.args.depfile);
+        if let Some(same) = read.iter().find(|r| all.clone().any(|g| same_file(r, g))) {
             let name = same.display().to_string();
             complain(&mut self.renderer, &mut self.sources, &name, code::FILE_OVERWRITES_SOURCE, std::slice::from_ref(&name));
             return self.fail(Exit::Findings);
@@ -279,11 +318,7 @@ impl<'a> Round<'a> {
         let (spooled, beside): (Vec<_>, Vec<_>) = written.into_iter().partition(|(p, _)| p == Path::new("-"));
         let names: Vec<PathBuf> = files.iter().map(|(p, _)| p.clone()).chain(beside.iter().map(|(p, _)| p.clone())).collect();
         let beside = beside.into_iter().map(|(_, p)| p).collect();
-        let folders = files.iter().filter_map(|(p, _)| p.parent()).filter(|p| !p.as_os_str().is_empty());
-        let written = folders
-            .map(|f| std::fs::create_dir_all(f).map_err(|e| (f.to_path_buf(), e)))
-            .collect::<Result<Vec<()>, _>>()
-            .and_then(|_| write_with(&files, beside))
+        let written = write_with(&files, beside)
             .and_then(|()| stdout.iter().try_for_each(|(p, b)| to_stdout(b).map_err(|e| (p.clone(), e))))
             .and_then(|()| spooled.into_iter().try_for_each(|(path, p)| p.to_stdout().map_err(|e| (path, e))));
         match written {
@@ -314,10 +349,6 @@ fn is_folder(path: &Path) -> bool {
 
 fn file_name(source: &Path, target: &TargetDef) -> String {
     format!("{}.{}", stem(source), target.extension)
-}
-
-fn same_file(a: &Path, b: &Path) -> bool {
-    a == b || matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
 }
 
 /// Options of a target in the project file, read like those of the command line.

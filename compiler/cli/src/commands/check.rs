@@ -14,7 +14,7 @@ use crate::options::{CheckArgs, Global};
 use crate::progress::Progress;
 use crate::render::Renderer;
 use crate::setup::{Station, is_program, station};
-use crate::sources::{Sources, read, walk};
+use crate::sources::{Sources, read_program, walk};
 
 /// What came of one file.
 pub struct Checked {
@@ -160,7 +160,7 @@ fn each(files: &[PathBuf], station: &Station, jobs: usize, mut done: impl FnMut(
 /// Checks one file.
 pub fn check(path: &Path, station: &Station) -> Checked {
     let name = if path == Path::new("-") { "<stdin>".to_string() } else { path.display().to_string() };
-    match read(path) {
+    match read_program(path) {
         Ok(decoded) => {
             let mut checked = checked(&name, path, &decoded.text, station);
             if !matches!(decoded.encoding, gr_text::Encoding::Utf8 | gr_text::Encoding::Latin1) && !exchange::is_exchange(path, &decoded.text) {

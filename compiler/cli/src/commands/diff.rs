@@ -129,6 +129,10 @@ pub fn verify(global: &Global, args: &VerifyArgs) -> Exit {
     if let Some(machine) = station.machine.as_ref().filter(|m| crate::robot::is_checked(m)) {
         return on_robot(global, args, &station, machine, &mut renderer);
     }
+    if args.output.is_some() {
+        eprintln!("-o goes with --machine and a robot: without one there is no table of points to write");
+        return Exit::Usage;
+    }
     let goal = Goal { target: "rs274ngc", options: &args.options, machine: None, from_line: None, file: None };
     let made = load(&args.file, &station).and_then(|unit| {
         let a = motion(&unit, None)?.0;
@@ -171,8 +175,16 @@ pub fn verify(global: &Global, args: &VerifyArgs) -> Exit {
     tell(global, &result, &a.sources, &b.sources)
 }
 
+/// What matters to the joint values.
+const ROBOT_OPTIONS: [&str; 6] = ["--approach", "--reconfigure", "--arc-tolerance", "--job", "--compensate", "--reference"];
+
 /// Joint values of a robot against the points they are for.
 fn on_robot(global: &Global, args: &VerifyArgs, station: &Station, machine: &gr_machine::Machine, renderer: &mut Renderer) -> Exit {
+    let idle = crate::emit::given(&args.options).into_iter().find(|o| !ROBOT_OPTIONS.contains(o));
+    if let Some(option) = idle {
+        eprintln!("{option} does nothing when the joint values of a robot are verified");
+        return Exit::Usage;
+    }
     let made = load(&args.file, station).and_then(|unit| crate::robot::verify(&unit, machine, args));
     let report = match made {
         Ok(Ok(report)) => report,
@@ -188,10 +200,10 @@ fn on_robot(global: &Global, args: &VerifyArgs, station: &Station, machine: &gr_
     };
     if let Some(folder) = &args.output {
         let files = crate::robot::report_files(&report, folder, &crate::emit::stem(&args.file));
-        let written = std::fs::create_dir_all(folder).map_err(|e| (folder.clone(), e));
-        if let Err((path, e)) = written.and_then(|()| crate::output::write_with(&files, Vec::new())) {
-            eprintln!("{}: {e}", path.display());
-            return Exit::Io;
+        let exit = super::write(renderer, &mut Sources::default(), &args.file, &files);
+        if exit != Exit::Ok {
+            renderer.finish(false);
+            return exit;
         }
     }
     super::print(&report.table())

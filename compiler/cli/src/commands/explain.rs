@@ -1,6 +1,6 @@
 //! `gcc-robot explain E0203 | arc/radius-mismatch | G83 | F`
 
-use gr_spec::{ArgDef, Code, CodeDef, Dialect, Severity, WordDef};
+use gr_spec::{ArgDef, Code, CodeDef, Dialect, Severity, WordDef, open};
 
 use crate::exit::Exit;
 use crate::options::ExplainArgs;
@@ -76,10 +76,9 @@ fn word(severity: Severity) -> &'static str {
 fn diagnostic(code: Code) -> String {
     let d = code.def();
     let kind = if d.lint { format!("{}, a lint", word(d.severity)) } else { word(d.severity).to_string() };
-    let told = |template: &str| gr_spec::fill(template, &["…".into(), "…".into(), "…".into(), "…".into()]);
-    let mut text = format!("{} {} ({kind})\n\n{}\n\n{}\n", d.code, d.slug, told(d.message), d.explanation);
+    let mut text = format!("{} {} ({kind})\n\n{}\n\n{}\n", d.code, d.slug, open(d.message), d.explanation);
     if let Some(fix) = d.fix {
-        text.push_str(&format!("\nWhat to do: {}\n", told(fix)));
+        text.push_str(&format!("\nWhat to do: {}\n", open(fix)));
     }
     if let Some(dialect) = d.dialect {
         text.push_str(&format!("\nThe examples are for the dialect {dialect}.\n"));
@@ -117,11 +116,6 @@ fn code(def: &CodeDef, dialect: &Dialect) -> String {
         text.push_str(&format!("\nSource: {}\n", def.source));
     }
     text
-}
-
-/// A message without what only a program can fill in.
-fn open(message: &str) -> String {
-    (0..8).fold(message.to_string(), |text, n| text.replace(&format!("{{{n}}}"), "…"))
 }
 
 fn argument(a: &ArgDef) -> String {

@@ -11,7 +11,7 @@ use super::check::{Checked, show};
 use crate::emit::{Built, Goal, build};
 use crate::exit::Exit;
 use crate::options::{FilterArgs, Global, LintArgs};
-use crate::output::{to_stdout, write_all};
+use crate::output::{same_file, to_stdout, write_all};
 use crate::pipeline::load;
 use crate::render::{MessageFormat, Renderer};
 use crate::setup::{Station, station};
@@ -81,6 +81,10 @@ fn deliver(args: &FilterArgs, station: &Station, built: Built, renderer: &mut Re
     let bad = built.found.iter().any(|d| d.severity == Severity::Error);
     show(renderer, &Checked { sources: built.sources, found: built.found, more: 0, unreadable: false });
     let Some(main) = built.artifacts.into_iter().next().filter(|_| !bad) else { return Exit::Findings };
+    if let Some(name) = args.write_tools.as_ref().filter(|path| same_file(path, &args.file)).map(|p| p.display().to_string()) {
+        super::complain(renderer, sources, &name, code::FILE_OVERWRITES_SOURCE, std::slice::from_ref(&name));
+        return Exit::Findings;
+    }
     if let (Some(path), Some(table)) = (&args.write_tools, &built.table)
         && let Err(e) = write_table(path, &in_machine_units(table, station))
     {

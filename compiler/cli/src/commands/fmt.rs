@@ -13,7 +13,7 @@ use crate::options::{CaseArg, FmtArgs, Global, LintArgs, RenumberArgs, SetupArgs
 use crate::output::{to_stdout, write_all};
 use crate::render::Renderer;
 use crate::setup::{self, Station, station};
-use crate::sources::{Sources, read, reason, walk};
+use crate::sources::{Sources, read_program, reason, walk};
 
 pub fn run(global: &Global, args: &FmtArgs) -> Exit {
     let mut work = match Work::new(global, args.dialect.as_ref()) {
@@ -48,7 +48,7 @@ pub fn renumber(global: &Global, args: &RenumberArgs) -> Exit {
         Ok(work) => work,
         Err(exit) => return exit,
     };
-    let exit = match read(&args.file) {
+    let exit = match read_program(&args.file) {
         Ok(decoded) if is_exchange(&args.file, &decoded.text) => work.exchange(args, &decoded),
         Ok(decoded) => {
             let dialect = work.station.dialect_of(&args.file, &decoded.text);
@@ -186,7 +186,7 @@ impl Work {
     }
 
     fn format(&mut self, path: &PathBuf, check: bool, options: &FormatOptions) -> Exit {
-        let decoded: Decoded = match read(path) {
+        let decoded: Decoded = match read_program(path) {
             Ok(d) => d,
             Err((code, args)) => return self.complain(path, code, &args),
         };
@@ -215,6 +215,10 @@ impl Work {
 
     /// Instances of an exchange file in order; with faults in it no number is changed.
     fn exchange(&mut self, args: &RenumberArgs, decoded: &Decoded) -> Exit {
+        if args.all || args.start != 10 || args.step != 10 {
+            eprintln!("--start, --step and --all are for G-code: the instances of a STEP-NC file are numbered from #1 on");
+            return Exit::Usage;
+        }
         match gr_p21::renumber(decoded.text.as_bytes()) {
             Ok(new) => {
                 let text = String::from_utf8_lossy(&new).into_owned();

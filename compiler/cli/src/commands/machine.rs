@@ -31,8 +31,20 @@ fn show(global: &Global, name: &str, toml: bool) -> Exit {
     if gr_machine::is_path(name) {
         return check(global, Path::new(name), true, toml);
     }
-    let known: Vec<&str> = list().collect();
-    super::refuse(global, Path::new(name), code::PROJECT_UNKNOWN_MACHINE, &[name.to_string(), known.join(", ")])
+    super::refuse(global, Path::new(name), code::PROJECT_UNKNOWN_MACHINE, &[name.to_string(), instead_of(name)])
+}
+
+/// Ids that resemble an unknown one, and where the others are.
+fn instead_of(name: &str) -> String {
+    let wanted = name.to_ascii_lowercase();
+    let model = wanted.rsplit('/').next().unwrap_or(&wanted);
+    let resembles = |id: &str| {
+        let own = id.rsplit('/').next().unwrap_or(id);
+        !model.is_empty() && (own.contains(model) || model.contains(own) || id.starts_with(&wanted))
+    };
+    let near: Vec<&str> = list().filter(|id| resembles(id)).take(5).collect();
+    let choose = if near.is_empty() { String::new() } else { format!("did you mean {}? ", near.join(", ")) };
+    format!("{choose}`gcc-robot machine list` shows all ids; the path of a machine file works too")
 }
 
 /// Reads a machine file and reports what is wrong with it.
@@ -46,7 +58,7 @@ fn check(global: &Global, path: &Path, print: bool, toml: bool) -> Exit {
     match parse(file, &text) {
         Ok(_) if print && toml => super::print(&text),
         Ok(machine) if print => super::print(&machine.describe()),
-        Ok(_) => Exit::Ok,
+        Ok(machine) => said(global, path, &machine),
         Err(found) => {
             let mut renderer = global.renderer(false);
             renderer.tally.files = 1;
@@ -55,6 +67,14 @@ fn check(global: &Global, path: &Path, print: bool, toml: bool) -> Exit {
             Exit::Findings
         }
     }
+}
+
+/// A good file says so: silence looks like nothing happened.
+fn said(global: &Global, path: &Path, machine: &gr_machine::Machine) -> Exit {
+    if global.quiet || global.message_format != crate::render::MessageFormat::Human {
+        return Exit::Ok;
+    }
+    super::print(&format!("{}: {}, no errors\n", path.display(), machine.title))
 }
 
 /// Makes a machine file of a URDF.
@@ -71,14 +91,11 @@ fn import(global: &Global, path: &Path, id: &str, output: Option<&Path>) -> Exit
         }
     };
     made.notes.iter().for_each(|n| eprintln!("{n}"));
-    let Some(output) = output else { return super::print(&made.toml) };
-    match crate::output::write_with(&[(output.to_path_buf(), made.toml.into_bytes())], Vec::new()) {
-        Ok(()) => Exit::Ok,
-        Err((path, e)) => {
-            eprintln!("{}: {e}", path.display());
-            Exit::Io
-        }
-    }
+    let Some(output) = output.filter(|o| *o != Path::new("-")) else { return super::print(&made.toml) };
+    let mut renderer = global.renderer(false);
+    let exit = super::write(&mut renderer, &mut Sources::default(), path, &[(output.to_path_buf(), made.toml.into_bytes())]);
+    renderer.finish(false);
+    exit
 }
 
 /// The machine of an id or of a file. What is wrong with it points into `sources`.
@@ -88,9 +105,8 @@ pub fn load(name: &str, sources: &mut Sources) -> Result<gr_machine::Machine, Ve
         return Ok(machine);
     }
     if !gr_machine::is_path(name) && !Path::new(name).exists() {
-        let known: Vec<&str> = list().collect();
         let file = sources.add("", "");
-        return Err(vec![about_file(code::PROJECT_UNKNOWN_MACHINE, file, &[name.to_string(), known.join(", ")])]);
+        return Err(vec![about_file(code::PROJECT_UNKNOWN_MACHINE, file, &[name.to_string(), instead_of(name)])]);
     }
     match read(Path::new(name)) {
         Ok(d) => {

@@ -12,9 +12,8 @@ use gr_text::code;
 use super::accuracy::{referenced, triple};
 use crate::exit::Exit;
 use crate::options::{Global, MapArgs};
-use crate::output::write_all;
 use crate::progress::Progress;
-use crate::sources::{Sources, reason};
+use crate::sources::Sources;
 
 pub fn run(global: &Global, args: &MapArgs) -> Exit {
     let mut sources = Sources::default();
@@ -46,9 +45,11 @@ pub fn run(global: &Global, args: &MapArgs) -> Exit {
         Ok(made) => made,
         Err((what, why)) => return refuse(&what, &why),
     };
-    if let Err((path, e)) = write_all(&files) {
-        let name = path.display().to_string();
-        return super::refuse(global, &path, code::FILE_UNWRITABLE, &[name, reason(&e)]);
+    let mut renderer = global.renderer(true);
+    let exit = super::write(&mut renderer, &mut sources, Path::new(&args.machine), &files);
+    renderer.finish(false);
+    if exit != Exit::Ok {
+        return exit;
     }
     super::print(&text)
 }

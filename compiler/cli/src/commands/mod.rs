@@ -19,14 +19,15 @@ pub mod rs274;
 pub mod target;
 
 use std::io::IsTerminal as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use gr_text::Code;
+use gr_text::{Code, code};
 
 use crate::exit::Exit;
 use crate::options::{Global, When};
+use crate::output::same_file;
 use crate::render::Renderer;
-use crate::sources::{Sources, about_file};
+use crate::sources::{Sources, about_file, reason};
 
 impl Global {
     /// A renderer as the options ask for it.
@@ -47,10 +48,27 @@ pub fn complain(renderer: &mut Renderer, sources: &mut Sources, name: &str, code
 }
 
 /// Tells which folders can't be read.
-pub fn unreadable(closed: &[(std::path::PathBuf, std::io::Error)], sources: &mut Sources, renderer: &mut Renderer) {
+pub fn unreadable(closed: &[(PathBuf, std::io::Error)], sources: &mut Sources, renderer: &mut Renderer) {
     for (at, e) in closed {
         let name = at.display().to_string();
-        complain(renderer, sources, &name, gr_text::code::FILE_UNREADABLE, &[name.clone(), crate::sources::reason(e)]);
+        complain(renderer, sources, &name, code::FILE_UNREADABLE, &[name.clone(), reason(e)]);
+    }
+}
+
+/// Writes files, all or none, and never over what they were made from; says which one could not be written.
+pub fn write(renderer: &mut Renderer, sources: &mut Sources, from: &Path, files: &[(PathBuf, Vec<u8>)]) -> Exit {
+    if files.iter().any(|(path, _)| same_file(path, from)) {
+        let name = from.display().to_string();
+        complain(renderer, sources, &name, code::FILE_OVERWRITES_SOURCE, std::slice::from_ref(&name));
+        return Exit::Findings;
+    }
+    match crate::output::write_all(files) {
+        Ok(()) => Exit::Ok,
+        Err((path, e)) => {
+            let name = path.display().to_string();
+            complain(renderer, sources, &name, code::FILE_UNWRITABLE, &[name.clone(), reason(&e)]);
+            Exit::Io
+        }
     }
 }
 

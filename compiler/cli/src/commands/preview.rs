@@ -3,17 +3,16 @@
 use std::path::Path;
 
 use gr_backends::plot::{Options, Show};
-use gr_text::{Severity, code};
+use gr_text::Severity;
 
 use super::check::{Checked, show};
 use crate::emit::{picture, stem, tool_rows};
 use crate::exit::Exit;
 use crate::options::{Global, LintArgs, PreviewArgs, ViewArg};
-use crate::output::write_all;
 use crate::pipeline::{load, motion};
 use crate::progress::Progress;
 use crate::setup::station;
-use crate::sources::{Sources, reason};
+use crate::sources::Sources;
 
 pub fn run(global: &Global, args: &PreviewArgs) -> Exit {
     let Some(goal) = args.output.as_ref().filter(|_| !args.serve) else {
@@ -48,14 +47,7 @@ pub fn run(global: &Global, args: &PreviewArgs) -> Exit {
             eprintln!("{text}");
             Exit::Usage
         }
-        Ok(bytes) => match write_all(&[(goal.clone(), bytes)]) {
-            Ok(()) => Exit::Ok,
-            Err((path, e)) => {
-                let name = path.display().to_string();
-                super::complain(&mut renderer, &mut sources, &name, code::FILE_UNWRITABLE, &[name.clone(), reason(&e)]);
-                Exit::Io
-            }
-        },
+        Ok(bytes) => super::write(&mut renderer, &mut sources, &args.file, &[(goal.clone(), bytes)]),
     };
     renderer.finish(false);
     exit

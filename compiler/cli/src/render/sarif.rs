@@ -85,7 +85,7 @@ fn rule(code: Code) -> Value {
     let def = code.def();
     let mut value = json!({
         "id": def.code, "name": def.slug,
-        "shortDescription": { "text": def.message },
+        "shortDescription": { "text": gr_spec::open(def.message) },
         "fullDescription": { "text": def.explanation },
         "defaultConfiguration": { "level": level(def.severity) },
     });

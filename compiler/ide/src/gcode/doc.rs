@@ -121,23 +121,4 @@ pub fn code_name(letter: u8, value: f64) -> String {
     if tenths % 10.0 == 0.0 { format!("{letter}{}", tenths / 10.0) } else { format!("{letter}{:.1}", tenths / 10.0) }
 }
 
-/// A number as people read it: at most `places` decimals, no needless zeros.
-pub fn number(value: f64, places: usize) -> String {
-    if !value.is_finite() {
-        return value.to_string();
-    }
-    let text = format!("{value:.places$}");
-    let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
-    if text == "-0" { "0".into() } else { text.into() }
-}
-
-/// Seconds as people read them: `0.42 s`, `12.5 s`, `3 min 7 s`, `1 h 02 min`.
-pub fn duration(seconds: f64) -> String {
-    let whole = seconds.round() as u64;
-    match whole {
-        0..10 => format!("{} s", number(seconds, 2)),
-        10..60 => format!("{} s", number(seconds, 1)),
-        60..3600 => format!("{} min {} s", whole / 60, whole % 60),
-        _ => format!("{} h {:02} min", whole / 3600, whole % 3600 / 60),
-    }
-}
+pub use gr_text::figures::{duration, number};

@@ -39,26 +39,7 @@ pub struct Sub {
 
 /// The word of a keyword.
 pub fn keyword(k: Keyword) -> &'static str {
-    match k {
-        Keyword::Sub => "sub",
-        Keyword::Endsub => "endsub",
-        Keyword::Call => "call",
-        Keyword::Do | Keyword::MacroDo => "do",
-        Keyword::While | Keyword::MacroWhile => "while",
-        Keyword::Endwhile => "endwhile",
-        Keyword::If | Keyword::MacroIfGoto | Keyword::MacroIfThen => "if",
-        Keyword::Elseif => "elseif",
-        Keyword::Else => "else",
-        Keyword::Endif => "endif",
-        Keyword::Break => "break",
-        Keyword::Continue => "continue",
-        Keyword::Return => "return",
-        Keyword::Repeat => "repeat",
-        Keyword::Endrepeat => "endrepeat",
-        Keyword::Program => "program",
-        Keyword::MacroGoto => "goto",
-        Keyword::MacroEnd => "end",
-    }
+    if k == Keyword::Program { "program" } else { k.name() }
 }
 
 /// `o100`, `o<name>`.

@@ -1,0 +1,81 @@
+//! Which codes a dialect has: every dialect but LinuxCNC's own is a closed list, and a code that LinuxCNC has beside it
+//! is refused rather than carried out with LinuxCNC's meaning.
+
+use std::sync::LazyLock;
+
+use gr_canon::Sink;
+use gr_spec::{Dialect, Family, code, rs274};
+
+use crate::{Fault, Interp, Res};
+
+/// The codes of one dialect as bits: G-codes times ten, M-codes.
+pub(crate) struct Closed {
+    g: [u64; 16],
+    m: [u64; 4],
+}
+
+static LISTS: LazyLock<Vec<(&'static str, Closed)>> = LazyLock::new(|| {
+    let closed = |d: &&Dialect| d.family != Family::Linuxcnc;
+    Dialect::all().iter().filter(closed).map(|d| (d.id, Closed::of(d))).collect()
+});
+
+/// The list of a dialect; none for LinuxCNC's, where the interpreter's own tables are the list.
+pub(crate) fn list_of(dialect: &Dialect) -> Option<&'static Closed> {
+    LISTS.iter().find(|(id, _)| *id == dialect.id).map(|(_, list)| list)
+}
+
+fn put(bits: &mut [u64], n: usize) {
+    if let Some(word) = bits.get_mut(n / 64) {
+        *word |= 1 << (n % 64);
+    }
+}
+
+fn has(bits: &[u64], n: i32) -> bool {
+    usize::try_from(n).ok().and_then(|n| Some(bits.get(n / 64)? >> (n % 64) & 1 == 1)).unwrap_or(false)
+}
+
+impl Closed {
+    fn of(dialect: &Dialect) -> Closed {
+        let mut list = Closed { g: [0; 16], m: [0; 4] };
+        for row in dialect.codes {
+            let Some(number) = row.code.get(1..).and_then(|n| n.parse::<f64>().ok()) else { continue };
+            match row.code.as_bytes()[0] {
+                b'G' => put(&mut list.g, (number * 10.0 + 0.5) as usize),
+                _ => put(&mut list.m, number as usize),
+            }
+        }
+        list
+    }
+}
+
+const OTHER_CODE: &str =
+    "write it with codes of this control (docs/dialects.md has them all), or choose the dialect the program was written for";
+
+impl<S: Sink> Interp<'_, S> {
+    /// What another control has and this one does not.
+    pub(crate) fn not_in_dialect(&self, what: &str, instead: &str) -> Box<Fault> {
+        Fault::new(code::SYNTAX_NOT_IN_DIALECT, rs274::SILENT).arg(what).arg(self.setup.dialect.id).arg(instead)
+    }
+
+    /// A G-code (times ten) that LinuxCNC knows must be in the dialect's own list.
+    #[inline]
+    pub(crate) fn check_listed_g(&self, n: i32) -> Res {
+        match self.closed {
+            Some(list) if !has(&list.g, n) && crate::read::g_group(n) >= 0 => {
+                Err(self.not_in_dialect(&crate::check::code_name(n as i16), OTHER_CODE).at(b'g'))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// The same for an M-code.
+    #[inline]
+    pub(crate) fn check_listed_m(&self, n: i32) -> Res {
+        match self.closed {
+            Some(list) if !has(&list.m, n) && crate::read::m_group(n) >= 0 => {
+                Err(self.not_in_dialect(&format!("M{n}"), OTHER_CODE).at(b'm'))
+            }
+            _ => Ok(()),
+        }
+    }
+}
