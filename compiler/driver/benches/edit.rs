@@ -1,6 +1,7 @@
 //! How long an edit takes until fresh diagnostics are there, and how much memory a session holds.
 //!
-//! `cargo bench -p gr-driver --bench edit` prints medians and 99th percentiles of processor time beside their budgets.
+//! `cargo bench -p gr-driver --bench edit` prints medians and 99th percentiles of processor time beside their budgets;
+//! `-- calls 1000000` runs only what has both words in its name.
 
 #[allow(dead_code, unused_imports, reason = "shared with the test crate")]
 #[path = "../../../tests/src/generate.rs"]
@@ -171,9 +172,13 @@ fn main() {
             ("branches everywhere", branches),
         ];
         for (kind, make) in kinds {
+            let name = format!("{kind}, {lines} lines");
+            if !std::env::args().skip(1).filter(|a| !a.starts_with('-')).all(|wanted| name.contains(&wanted)) {
+                continue;
+            }
             let text = make(lines);
             let before = resident() - text.len() as f64 / 1e6;
-            let mut bench = Bench::open(&format!("{kind}, {lines} lines"), text, before);
+            let mut bench = Bench::open(&name, text, before);
             let rounds = if lines > 500_000 { 400 } else { 1000 };
             bench.rounds("one digit", budget, rounds, digit);
             bench.rounds("a feed word", budget, rounds, |l| l.contains('X').then(|| (l.len(), l.len(), " F777".to_string())));
