@@ -1,8 +1,15 @@
-//! Correcting a program for deviations of the geometry that are known.
+//! Correcting a program for deviations of the geometry that are known. A robot's program is corrected target by
+//! target, position and turn; [`motion`] does it before any control's words are made, for mills and for machines
+//! whose tool turns as it will.
 
-use gr_machine::math::{Frame, V3, add, cross, dot, norm, product, rotate, scale, sub, transpose};
-use gr_machine::{Kinematics, KinematicsError, Machine};
-use gr_robot::{Action, RobotProgram, Step, Target};
+use gr_machine::math::{
+    Frame, V3, about, add, cross, dot, norm, product, quaternion_of, rotate, rotation_vector, scale, sub, transpose, turn_of,
+};
+use gr_machine::{Control, Kinematics, KinematicsError, Machine};
+use gr_robot::{Action, RobotProgram, Step, Target, Zone};
+
+mod motion;
+pub use motion::{CompensatedMotion, motion, work_shift};
 
 /// A machine whose geometry is known to differ from what its control computes with.
 pub struct Corrector {
@@ -36,12 +43,17 @@ impl Corrector {
         Ok(self.real.forward_frame(&joints)?.then(tool).position)
     }
 
-    /// The flange to command, so that the tool point of the real machine is where that of `aim` is, and the joint
-    /// values the control makes of it. Repeated until nothing is left over; the turn is commanded as it is.
+    /// The flange to command, so that the real machine's is where `aim` is, and the joint values the control makes of
+    /// it. A machine that can't turn its tool at will, or not this way, puts the tool point there and no more.
     pub fn command(&self, aim: &Frame, tool: &Frame, near: &[f64]) -> Result<(Frame, Vec<f64>), KinematicsError> {
+        if self.nominal.control() == Control::Full
+            && let Ok(found) = self.whole(aim, near)
+        {
+            return Ok(found);
+        }
         let wanted = aim.then(tool).position;
         let mut command = *aim;
-        for _ in 0..12 {
+        for _ in 0..STEPS {
             let left = sub(wanted, self.real_place(&command, tool, near)?);
             command.position = add(command.position, left);
             if norm(left) < 1e-12 * norm(wanted).max(1.0) {
@@ -51,6 +63,37 @@ impl Corrector {
         let joints = self.joints(&command, near)?;
         Ok((command, joints))
     }
+
+    /// Position and turn together.
+    fn whole(&self, aim: &Frame, near: &[f64]) -> Result<(Frame, Vec<f64>), KinematicsError> {
+        let mut command = *aim;
+        for _ in 0..STEPS {
+            let (shift, turn) = self.real.forward_frame(&self.joints(&command, near)?)?.error_to(aim);
+            command.position = add(command.position, shift);
+            let angle = norm(turn);
+            if angle > 1e-13 {
+                command.turn = product(&about(scale(turn, 1.0 / angle), angle), &command.turn);
+            }
+            if norm(shift) < 1e-12 * norm(aim.position).max(1.0) && angle < 1e-13 {
+                break;
+            }
+        }
+        let joints = self.joints(&command, near)?;
+        Ok((command, joints))
+    }
+
+    /// By what angle the tool axis of the real machine leans from that of `aim`, rad.
+    fn lean(&self, joints: &[f64], aim: &Frame, tool: &Frame) -> f64 {
+        let axis = |f: &Frame| f.then(tool).axis(2);
+        self.real.forward_frame(joints).map_or(0.0, |real| angle(axis(&real), axis(aim)))
+    }
+}
+
+/// Corrections are repeated at most so often; each time next to nothing is left of what was.
+const STEPS: usize = 12;
+
+fn angle(a: V3, b: V3) -> f64 {
+    libm::atan2(norm(cross(a, b)), dot(a, b))
 }
 
 /// What was done to one target.
@@ -62,6 +105,10 @@ pub struct Correction {
     pub aim: V3,
     /// How far from there it is commanded, mm.
     pub by: V3,
+    /// By what angle the tool is commanded to turn besides, rad.
+    pub turn: f64,
+    /// By what angle the tool's axis still leans, rad.
+    pub left: f64,
 }
 
 /// A corrected program.
@@ -117,7 +164,7 @@ pub fn program(
                     let t = i as f64 / pieces as f64;
                     let piece = if i == pieces { end } else { between(&from, &end, t) };
                     let index = push(&mut out, &corrector, &at, &piece, step).map_err(fail)?;
-                    let zone = if i == pieces { *zone } else { gr_robot::Zone::Blend(tolerance) };
+                    let zone = if i == pieces { *zone } else { Zone::Blend(tolerance) };
                     let action = Action::Linear { to: index, speed: *speed, zone, rapid: *rapid };
                     out.program.steps.push(Step { action, source: step.source });
                 }
@@ -135,7 +182,7 @@ pub fn program(
                     let t = i as f64 / pieces as f64;
                     let piece = if i == pieces { end } else { on_arc(&from, &end, (*center, *normal, *angle), t) };
                     let index = push(&mut out, &corrector, &at, &piece, step).map_err(fail)?;
-                    let zone = if i == pieces { *zone } else { gr_robot::Zone::Blend(tolerance) };
+                    let zone = if i == pieces { *zone } else { Zone::Blend(tolerance) };
                     let action = Action::Linear { to: index, speed: *speed, zone, rapid: false };
                     out.program.steps.push(Step { action, source: step.source });
                 }
@@ -152,14 +199,6 @@ struct Place {
     tool: Frame,
 }
 
-fn turn_of([w, x, y, z]: [f64; 4]) -> gr_machine::math::M3 {
-    [
-        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
-        [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
-        [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
-    ]
-}
-
 impl Place {
     /// Flange of a target in the base. A machine that decides its turn itself stands as its joints say.
     fn flange(&self, corrector: &Corrector, target: &Target) -> Frame {
@@ -167,7 +206,7 @@ impl Place {
         let count = corrector.nominal.joint_count().min(target.joints.len());
         let asked = tip.then(&self.tool.inverse());
         match corrector.nominal.forward_frame(&target.joints[..count]) {
-            Ok(real) if norm(gr_machine::math::rotation_vector(&product(&real.turn, &transpose(&asked.turn)))) > 1e-6 => {
+            Ok(real) if norm(rotation_vector(&product(&real.turn, &transpose(&asked.turn)))) > 1e-6 => {
                 let lever = rotate(&real.turn, self.tool.position);
                 Frame { turn: real.turn, position: sub(tip.position, lever) }
             }
@@ -186,13 +225,19 @@ fn push(
     let count = corrector.nominal.joint_count().min(target.joints.len());
     let aim = at.flange(corrector, target);
     let (command, joints) = corrector.command(&aim, &at.tool, &target.joints[..count])?;
-    let by = sub(command.position, aim.position);
+    let (wanted, tip) = (aim.then(&at.tool), command.then(&at.tool));
+    let by = sub(tip.position, wanted.position);
+    let turn = norm(wanted.error_to(&tip).1);
     let mut corrected = *target;
     // The correction in the directions of the work frame.
     corrected.position = add(target.position, rotate(&transpose(&at.frame.turn), by));
+    if turn > 1e-12 {
+        corrected.quaternion = quaternion_of(&product(&transpose(&at.frame.turn), &tip.turn));
+    }
     corrected.joints[..count].copy_from_slice(&joints);
     let line = step.source.map(|s| s.line);
-    out.corrections.push(Correction { line, aim: aim.then(&at.tool).position, by });
+    let left = corrector.lean(&joints, &aim, &at.tool);
+    out.corrections.push(Correction { line, aim: wanted.position, by, turn, left });
     out.program.targets.push(corrected);
     Ok(u32::try_from(out.program.targets.len() - 1).unwrap_or(u32::MAX))
 }
@@ -227,11 +272,17 @@ fn straight(corrector: &Corrector, at: &Place, from: &Target, end: &Target, tole
     let by = |t: f64| -> Result<V3, KinematicsError> {
         let target = between(from, end, t);
         let aim = at.flange(corrector, &target);
-        Ok(sub(corrector.command(&aim, &at.tool, &target.joints[..count])?.0.position, aim.position))
+        let command = corrector.command(&aim, &at.tool, &target.joints[..count])?.0;
+        Ok(sub(command.then(&at.tool).position, aim.then(&at.tool).position))
     };
+    halved(by, tolerance)
+}
+
+/// Into how many pieces a way must be cut for the correction in the middle of each to be the mean of those at its ends.
+fn halved<E>(by: impl Fn(f64) -> Result<V3, E>, tolerance: f64) -> Result<usize, E> {
     let mut pieces = 1;
     while pieces < PIECES {
-        let bends = |i: usize| -> Result<f64, KinematicsError> {
+        let bends = |i: usize| {
             let (a, b) = (i as f64 / pieces as f64, (i + 1) as f64 / pieces as f64);
             let (p, m, q) = (by(a)?, by((a + b) / 2.0)?, by(b)?);
             Ok(norm(sub(m, scale(add(p, q), 0.5))))

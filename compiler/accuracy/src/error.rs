@@ -76,7 +76,7 @@ pub struct Sensitivity {
 }
 
 /// The velocity of a point `lever` away from where a column holds.
-fn at_lever(column: &[f64; 6], lever: V3) -> V3 {
+pub(crate) fn at_lever(column: &[f64; 6], lever: V3) -> V3 {
     let [x, y, z, a, b, c] = *column;
     add([x, y, z], cross([a, b, c], lever))
 }

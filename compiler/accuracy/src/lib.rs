@@ -7,10 +7,11 @@
 //! | `material` | materials and cutting force |
 //! | `error` | the errors at one place of the machine |
 //! | `map` | a quantity over the work space |
+//! | `outline` | the border of what is within reach |
 //! | `picture` | maps and bar charts as PNG and SVG |
 //! | `place` | where a part is best put |
 //! | `report` | errors along a program |
-//! | `compensate` | correction for known deviations |
+//! | `compensate` | correction for known deviations, of a robot's program or of motion |
 
 // `!(x <= limit)` is meant: a value that is not a number must fail the test.
 #![allow(clippy::neg_cmp_op_on_partial_ord)]
@@ -20,6 +21,7 @@ pub mod error;
 pub mod grade;
 pub mod map;
 pub mod material;
+pub mod outline;
 pub mod picture;
 pub mod place;
 pub mod report;

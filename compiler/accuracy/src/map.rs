@@ -1,7 +1,7 @@
 //! Maps over the work space: a quantity on a grid in a plane of the base.
 
-use crate::error::{Budget, Sensitivity, Spread};
-use gr_machine::math::{Frame, V3, eigenvalues, norm};
+use crate::error::{Budget, Sensitivity, Spread, at_lever};
+use gr_machine::math::{Frame, M3, V3, eigenvalues, norm, product, rot_x, rotate, sub};
 use gr_machine::{Chain, Control, Kinematics, Machine, Opw, TwoLegs, differential};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -14,6 +14,11 @@ pub enum Quantity {
     Condition,
     /// Distance from a singularity: least over greatest singular value, 0 to 1.
     Singularity,
+    /// Product of the singular values of the velocities of the tool point (Yoshikawa); for three joints the determinant
+    /// without its sign.
+    Manipulability,
+    /// Root of the sum of squares of the velocities of the tool point (Frobenius).
+    Norm,
     /// Error by the joints, µm.
     Kinematic(Part),
     /// Error by the geometry, µm.
@@ -37,10 +42,12 @@ pub enum Part {
 
 impl Quantity {
     /// Its name on the command line, and the other way round.
-    pub const NAMES: [(&'static str, Quantity); 17] = [
+    pub const NAMES: [(&'static str, Quantity); 19] = [
         ("workspace", Quantity::Workspace),
         ("condition", Quantity::Condition),
         ("singularity", Quantity::Singularity),
+        ("manipulability", Quantity::Manipulability),
+        ("norm", Quantity::Norm),
         ("kinematic", Quantity::Kinematic(Part::Length)),
         ("kinematic-x", Quantity::Kinematic(Part::Axis(0))),
         ("kinematic-y", Quantity::Kinematic(Part::Axis(1))),
@@ -62,12 +69,32 @@ impl Quantity {
         Quantity::NAMES.iter().find(|(_, q)| *q == self).map_or("", |(n, _)| n)
     }
 
-    /// Its unit; empty for a plain number.
+    /// What it is, for people.
+    pub fn words(self) -> String {
+        let of = |what: &str, part: Part| match part {
+            Part::Axis(i) => format!("{what}, along {}", ["X", "Y", "Z"][i.min(2)]),
+            Part::Length => what.to_string(),
+        };
+        match self {
+            Quantity::Workspace => "reach".into(),
+            Quantity::Condition => "condition number".into(),
+            Quantity::Singularity => "distance from a singularity".into(),
+            Quantity::Manipulability => "manipulability".into(),
+            Quantity::Norm => "norm of the velocities".into(),
+            Quantity::Kinematic(part) => of("error by the joints", part),
+            Quantity::Geometric(part) => of("error by the geometry", part),
+            Quantity::Elastic(part) => of("deflection", part),
+            Quantity::Total => "joints, geometry and deflection together".into(),
+            Quantity::Stiffness => "stiffness in the softest direction".into(),
+        }
+    }
+
+    /// Its unit; empty for a plain number and for what depends on the units of the joints.
     pub fn unit(self) -> &'static str {
         match self {
-            Quantity::Workspace | Quantity::Condition | Quantity::Singularity => "",
+            Quantity::Kinematic(_) | Quantity::Geometric(_) | Quantity::Elastic(_) | Quantity::Total => "µm",
             Quantity::Stiffness => "N/µm",
-            _ => "µm",
+            _ => "",
         }
     }
 
@@ -216,7 +243,9 @@ pub struct Probe<'a> {
     machine: &'a Machine,
     kinematics: Box<dyn Kinematics>,
     /// Turn of the tool in the base.
-    turn: gr_machine::math::M3,
+    turn: M3,
+    /// Tool point on the flange.
+    tool: Frame,
     start: Vec<f64>,
 }
 
@@ -224,14 +253,30 @@ impl<'a> Probe<'a> {
     /// With the tool turned as at the machine's start.
     pub fn new(machine: &'a Machine) -> Probe<'a> {
         let start = machine.start_joints.clone().unwrap_or_default();
-        Probe { machine, kinematics: machine.kinematics(), turn: machine.start.frame().turn, start }
+        Probe { machine, kinematics: machine.kinematics(), turn: machine.start.frame().turn, tool: Frame::IDENTITY, start }
+    }
+
+    /// With the point of this tool (on the flange) in place of the flange, and its axis as the flange's was; in a base
+    /// turned by `part`.
+    pub fn with_tool(self, tool: Frame, part: &M3) -> Probe<'a> {
+        // A spindle that can't turn its part stands as it stands.
+        let turn = if matches!(self.machine.chain, Chain::Cartesian) { self.turn } else { product(part, &self.turn) };
+        Probe { tool, turn, ..self }
+    }
+
+    /// Where the flange is when the tool point is there. A machine that only places its tool point takes it upright.
+    fn flange(&self, p: V3) -> Frame {
+        match self.kinematics.control() {
+            Control::Position => Frame::shift(sub(p, self.tool.position)),
+            _ => Frame { turn: self.turn, position: p }.then(&self.tool.inverse()),
+        }
     }
 
     /// With the tool's axis pointing straight down (the flange's Z along −Z of the base).
     pub fn downward(machine: &'a Machine) -> Probe<'a> {
         let mut probe = Probe::new(machine);
         if probe.kinematics.control() == Control::Full && machine.joints.len() >= 6 {
-            probe.turn = gr_machine::math::rot_y(std::f64::consts::PI);
+            probe.turn = rot_x(std::f64::consts::PI);
         }
         probe
     }
@@ -241,8 +286,7 @@ impl<'a> Probe<'a> {
         if let Chain::Opw(k) = &self.machine.chain {
             return self.opw(k, p).map(|q| q.to_vec());
         }
-        let frame = Frame { turn: self.turn, position: p };
-        let all = self.kinematics.inverse_frame(&frame).ok()?;
+        let all = self.kinematics.inverse_frame(&self.flange(p)).ok()?;
         let good = all.into_iter().map(|s| s.joints).filter(|q| {
             self.machine.outside(q).is_empty() && self.kinematics.violations(q).is_empty()
         });
@@ -254,7 +298,7 @@ impl<'a> Probe<'a> {
     }
 
     fn opw(&self, k: &Opw, p: V3) -> Option<[f64; 6]> {
-        let all = k.solve(&Frame { turn: self.turn, position: p });
+        let all = k.solve(&self.flange(p));
         let mut best: Option<(f64, [f64; 6])> = None;
         for (i, q) in all.joints.iter().enumerate().filter(|(i, _)| all.good >> i & 1 == 1) {
             let far = self.far(q);
@@ -274,7 +318,7 @@ impl<'a> Probe<'a> {
     /// Whether the tool can be put there.
     pub fn reaches(&self, p: V3) -> bool {
         match &self.machine.chain {
-            Chain::TwoLegs(k) => legs_reach(k, k.place_of(p)),
+            Chain::TwoLegs(k) => legs_reach(k, k.place_of(self.flange(p).position)),
             _ => self.joints(p).is_some(),
         }
     }
@@ -283,34 +327,46 @@ impl<'a> Probe<'a> {
     pub fn sensitivity(&self, p: V3, geometry: bool) -> Option<Sensitivity> {
         match &self.machine.chain {
             Chain::TwoLegs(k) => {
-                let at = k.place_of(p);
+                let at = k.place_of(self.flange(p).position);
                 if !legs_reach(k, at) {
                     return None;
                 }
                 Sensitivity::of_two_legs(self.machine, k, at)
             }
-            _ if geometry => Sensitivity::new(self.machine, &self.joints(p)?, [0.0; 3]).ok(),
+            _ if geometry => {
+                let q = self.joints(p)?;
+                Sensitivity::new(self.machine, &q, self.lever(&q)?).ok()
+            }
             Chain::Opw(k) => {
                 let q = self.opw(k, p)?;
                 let columns = differential::opw(k, &q);
-                Some(self.bare(&q, &columns))
+                self.bare(&q, &columns)
             }
             _ => {
                 let q = self.joints(p)?;
                 let columns = differential::velocity(self.machine, &q).ok()?;
-                Some(self.bare(&q, &columns))
+                self.bare(&q, &columns)
             }
         }
     }
 
+    /// From the flange to the tool point, base directions.
+    fn lever(&self, q: &[f64]) -> Option<V3> {
+        if self.tool.position == [0.0; 3] {
+            return Some([0.0; 3]);
+        }
+        Some(rotate(&self.kinematics.forward_frame(q).ok()?.turn, self.tool.position))
+    }
+
     /// Without the geometry's part.
-    fn bare(&self, q: &[f64], columns: &[[f64; 6]]) -> Sensitivity {
+    fn bare(&self, q: &[f64], columns: &[[f64; 6]]) -> Option<Sensitivity> {
         let stiff = self.machine.cell.stiffness.as_ref();
-        Sensitivity {
-            joints: columns.iter().map(|c| [c[0], c[1], c[2]]).collect(),
+        let lever = self.lever(q)?;
+        Some(Sensitivity {
+            joints: columns.iter().map(|c| at_lever(c, lever)).collect(),
             geometry: Vec::new(),
             stiffness: q.iter().enumerate().map(|(i, v)| stiff.and_then(|s| s.joint(i, *v))).collect(),
-        }
+        })
     }
 
     /// The part of the base the tool can reach, roughly: least and greatest X, Y and Z, mm.
@@ -356,6 +412,8 @@ impl<'a> Probe<'a> {
             Quantity::Workspace => 1.0,
             Quantity::Condition => 1.0 / share(&s.joints).max(1e-12),
             Quantity::Singularity => share(&s.joints),
+            Quantity::Manipulability => libm::sqrt(spectrum(&s.joints).iter().map(|v| v.max(0.0)).product()),
+            Quantity::Norm => libm::sqrt(s.joints.iter().map(|c| norm(*c) * norm(*c)).sum()),
             Quantity::Kinematic(part) => match (&request.signs, &budget.joints) {
                 (Some(signs), Some(sizes)) => {
                     let signed: Vec<f64> = sizes.iter().zip(signs).map(|(a, b)| a * b).collect();
@@ -406,8 +464,8 @@ fn halton(mut n: u32, base: u32) -> f64 {
     out
 }
 
-/// Least over greatest singular value of the velocities of the tool point.
-fn share(columns: &[V3]) -> f64 {
+/// Squares of the singular values of the velocities of the tool point: three, or two of a planar machine.
+fn spectrum(columns: &[V3]) -> Vec<f64> {
     let mut square = [[0.0; 3]; 3];
     for c in columns {
         for i in 0..3 {
@@ -419,7 +477,12 @@ fn share(columns: &[V3]) -> f64 {
     // A planar machine has two directions; the third says nothing of it.
     let flat = square[2][2] == 0.0;
     let size = if flat { 2 } else { 3 };
-    let values = eigenvalues(square[..size].iter().map(|r| r[..size].to_vec()).collect());
+    eigenvalues(square[..size].iter().map(|r| r[..size].to_vec()).collect())
+}
+
+/// Least over greatest singular value of the velocities of the tool point.
+fn share(columns: &[V3]) -> f64 {
+    let values = spectrum(columns);
     let most = values.iter().fold(0.0f64, |m, v| m.max(*v));
     let least = values.iter().fold(f64::INFINITY, |m, v| m.min(*v));
     if most > 0.0 { libm::sqrt((least / most).max(0.0)) } else { 0.0 }
@@ -501,29 +564,69 @@ pub fn volume(probe: &Probe<'_>, layers: usize, nodes: usize) -> f64 {
         .sum()
 }
 
+/// Places spread over a plane that are looked at to tell how long a map takes.
+pub fn sample(probe: &Probe<'_>, budget: &Budget, request: &Request, count: usize) -> usize {
+    let (a, b) = request.plane.axes();
+    let extent = probe.extent();
+    let window = request.window.unwrap_or([extent[a], extent[b]]);
+    let one = |n: &u32| {
+        let mut p = [0.0; 3];
+        p[request.plane.axis] = request.plane.at;
+        p[a] = window[0].0 + (window[0].1 - window[0].0) * halton(*n, 2);
+        p[b] = window[1].0 + (window[1].1 - window[1].0) * halton(*n, 3);
+        probe.value(p, request, budget).is_some()
+    };
+    (1..=u32::try_from(count).unwrap_or(u32::MAX)).filter(one).count()
+}
+
+/// Calls with every place of a grid in a plane of the work space, borders included.
+fn nodes(probe: &Probe<'_>, plane: Plane, size: (usize, usize), mut look: impl FnMut(V3)) {
+    let (a, b) = plane.axes();
+    let extent = probe.extent();
+    let at = |e: (f64, f64), n: usize, of: usize| e.0 + (e.1 - e.0) * n as f64 / (of.max(2) - 1) as f64;
+    for j in 0..size.1 {
+        for i in 0..size.0 {
+            let mut p = [0.0; 3];
+            p[plane.axis] = plane.at;
+            (p[a], p[b]) = (at(extent[a], i, size.0), at(extent[b], j, size.1));
+            look(p);
+        }
+    }
+}
+
 /// Mean movement of the tool point per unit of each number of the geometry, over the nodes within reach: by axis and
 /// in length, mm per mm or rad.
 pub fn mean_sensitivity(probe: &Probe<'_>, plane: Plane, size: (usize, usize)) -> Vec<(String, [f64; 4])> {
     let names = probe.machine.parameters();
     let mut sums = vec![[0.0; 4]; names.len()];
     let mut count = 0usize;
-    let (a, b) = plane.axes();
-    let extent = probe.extent();
-    for j in 0..size.1 {
-        for i in 0..size.0 {
-            let mut p = [0.0; 3];
-            p[plane.axis] = plane.at;
-            let at = |e: (f64, f64), n: usize, of: usize| e.0 + (e.1 - e.0) * n as f64 / (of.max(2) - 1) as f64;
-            p[a] = at(extent[a], i, size.0);
-            p[b] = at(extent[b], j, size.1);
-            let Some(s) = probe.sensitivity(p, true) else { continue };
-            count += 1;
-            for (sum, c) in sums.iter_mut().zip(&s.geometry) {
-                (0..3).for_each(|k| sum[k] += c[k].abs());
-                sum[3] += norm(*c);
-            }
+    nodes(probe, plane, size, |p| {
+        let Some(s) = probe.sensitivity(p, true) else { return };
+        count += 1;
+        for (sum, c) in sums.iter_mut().zip(&s.geometry) {
+            (0..3).for_each(|k| sum[k] += c[k].abs());
+            sum[3] += norm(*c);
         }
-    }
+    });
     let mean = |s: [f64; 4]| s.map(|v| v / count.max(1) as f64);
     names.into_iter().zip(sums).map(|(p, s)| (p.name, mean(s))).collect()
+}
+
+/// The same as Gojtan 2009, equation 7.5, has it: mean change of the yaw, rad/mm, and of the arm's length, mm/mm. None
+/// for other machines.
+pub fn mean_sensitivity_usp2009(probe: &Probe<'_>, plane: Plane, size: (usize, usize)) -> Option<Vec<(String, [f64; 2])>> {
+    let Chain::TwoLegs(k) = &probe.machine.chain else { return None };
+    let names = probe.machine.parameters();
+    let mut sums = vec![[0.0; 2]; names.len()];
+    let mut count = 0usize;
+    nodes(probe, plane, size, |p| {
+        let at = k.place_of(p);
+        let Some(columns) = k.by_parameters(at).filter(|_| legs_reach(k, at)) else { return };
+        count += 1;
+        for (sum, c) in sums.iter_mut().zip(columns) {
+            (0..2).for_each(|i| sum[i] += c[i].abs());
+        }
+    });
+    let mean = |s: [f64; 2]| s.map(|v| v / count.max(1) as f64);
+    Some(names.into_iter().zip(sums).map(|(p, s)| (p.name, mean(s))).collect())
 }

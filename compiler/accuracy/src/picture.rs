@@ -82,13 +82,17 @@ impl Picture {
         const WIDE: f32 = 820.0;
         const TALL: f32 = 820.0;
         const LEFT: f32 = 86.0;
-        const TOP: f32 = 56.0;
+        const TOP: f32 = 78.0;
         let span = [0, 1].map(|i| (map.window[i].1 - map.window[i].0).max(1e-9));
         let scale = (f64::from(WIDE) / span[0]).min(f64::from(TALL) / span[1]);
         let (w, h) = ((span[0] * scale) as f32, (span[1] * scale) as f32);
-        let size = ((LEFT + w + 150.0).ceil() as u32, (TOP + h + 92.0).ceil() as u32);
+        // The machine in the first line, what is shown in the second.
+        let (machine, what) = title.split_once(": ").unwrap_or((title, ""));
+        let wide = (LEFT + w + 150.0).max(LEFT + 20.0 + font::width(machine, 14.0).max(font::width(what, 11.0)));
+        let size = (wide.ceil() as u32, (TOP + h + 92.0).ceil() as u32);
         let mut p = Picture { size, title: title.to_string(), shapes: Vec::new() };
-        p.text(title, [LEFT, 30.0], 14.0, 0.0);
+        p.text(machine, [LEFT, 26.0], 14.0, 0.0);
+        p.text(what, [LEFT, 48.0], 11.0, 0.0);
         let summary = map.summary();
         let range = summary.map_or((0.0, 1.0), |s| (s.least.0, s.greatest.0));
         let flat = !(range.1 - range.0 > 1e-9 * range.1.abs().max(1e-9));
@@ -112,7 +116,7 @@ impl Picture {
         if let Some(s) = summary {
             let unit = map.quantity.unit();
             let text = if map.quantity == Quantity::Workspace {
-                format!("area {} dm2", number(s.area / 1e4, s.area / 1e4))
+                format!("area {:.2} dm²", s.area / 1e4)
             } else {
                 let wide = range.1.abs().max(range.0.abs());
                 format!(
@@ -122,10 +126,26 @@ impl Picture {
                     number(s.mean, wide)
                 )
             };
-            // The stroke font of the PNG has no Greek.
-            p.text(text.replace('µ', "u"), [LEFT, TOP + h + 76.0], 11.0, 0.0);
+            p.text(text, [LEFT, TOP + h + 76.0], 11.0, 0.0);
+            if !flat {
+                let spot = |at: [f64; 2]| [LEFT + ((at[0] - map.window[0].0) * scale) as f32, TOP + h - ((at[1] - map.window[1].0) * scale) as f32];
+                p.mark(spot(s.least.1), "least", LEFT + w);
+                p.mark(spot(s.greatest.1), "greatest", LEFT + w);
+            }
         }
         p
+    }
+
+    /// A cross with a word beside it, on the side where there is room.
+    fn mark(&mut self, [x, y]: [f32; 2], word: &str, right: f32) {
+        for (off, color) in [(-1.0, PAPER), (1.0, PAPER), (0.0, INK)] {
+            self.shapes.push(Shape::Line([x - 5.0, y + off], [x + 5.0, y + off], color));
+            self.shapes.push(Shape::Line([x + off, y - 5.0], [x + off, y + 5.0], color));
+        }
+        let wide = font::width(word, 9.0);
+        let left = if x + wide + 12.0 < right { x + 9.0 } else { x - 9.0 - wide };
+        self.shapes.push(Shape::Rect([left - 2.0, y - 17.0, wide + 4.0, 14.0], PAPER));
+        self.text(word, [left, y - 6.0], 9.0, 0.0);
     }
 
     fn axes(&mut self, map: &Map, [x, y, w, h]: [f32; 4]) {
@@ -161,7 +181,7 @@ impl Picture {
             self.shapes.push(Shape::Line([x + w, at], [x + w + 6.0, at], INK));
             self.text(number(t, range.1 - range.0), [x + w + 10.0, at + 5.0], 11.0, 0.0);
         }
-        self.text(unit.replace('µ', "u"), [x, y - 10.0], 12.0, 0.0);
+        self.text(unit, [x, y - 10.0], 12.0, 0.0);
     }
 
     /// Bars with their names below each other.

@@ -3,8 +3,8 @@
 use crate::error::{Budget, Errors, Sensitivity};
 use crate::material::{Cut, Material};
 use gr_ir::{Marker, Op, Program, Source};
-use gr_machine::Kinematics;
-use gr_machine::math::{Frame, M3, V3, add, about, cross, dot, norm, rotate, scale, sub};
+use gr_machine::{Kinematics, Machine};
+use gr_machine::math::{Frame, V3, add, about, cross, dot, norm, rotate, scale, sub, turn_of};
 use gr_robot::{Action, RobotProgram, Target};
 use std::collections::HashMap;
 
@@ -115,7 +115,7 @@ impl Operations {
 }
 
 /// The largest error of an operation and where it is.
-#[derive(Clone, Copy, PartialEq, Debug)]
+#[derive(Clone, PartialEq, Debug)]
 pub struct Worst {
     /// Source line.
     pub source: Source,
@@ -123,6 +123,24 @@ pub struct Worst {
     pub point: V3,
     /// Errors there.
     pub errors: Errors,
+    /// What makes most of it: names of joints and numbers of the geometry, and how far each alone moves the tool point,
+    /// mm, the greatest first.
+    pub causes: Vec<(String, f64)>,
+}
+
+/// A stretch of the program whose every place that was looked at is over the tolerance.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Stretch {
+    /// Its first place.
+    pub first: Source,
+    /// Its last place.
+    pub last: Source,
+    /// Where the sum is largest.
+    pub worst: Source,
+    /// The sum there, mm.
+    pub sum: f64,
+    /// Root of squares there, mm.
+    pub rss: f64,
 }
 
 /// One row of the report.
@@ -134,6 +152,8 @@ pub struct Row {
     pub places: usize,
     /// Where the sum is largest.
     pub worst: Option<Worst>,
+    /// Where it is over the operation's tolerance, in order.
+    pub over: Vec<Stretch>,
     /// Largest kinematic, geometric and elastic error anywhere in it, mm.
     pub most: [Option<f64>; 3],
     /// Least and greatest thickness of the chip, mm.
@@ -171,6 +191,7 @@ pub fn report(
         tool: Frame::IDENTITY,
         rows: operations.list.iter().map(|o| row(o.clone())).collect(),
         last: None,
+        over: None,
     };
     let mut from = program.home;
     for (n, step) in program.steps.iter().enumerate() {
@@ -203,7 +224,7 @@ pub fn report(
 }
 
 fn row(operation: Operation) -> Row {
-    Row { operation, places: 0, worst: None, most: [None; 3], chip: None }
+    Row { operation, places: 0, worst: None, over: Vec::new(), most: [None; 3], chip: None }
 }
 
 struct Walk<'a> {
@@ -216,14 +237,8 @@ struct Walk<'a> {
     tool: Frame,
     rows: Vec<Row>,
     last: Option<(usize, V3)>,
-}
-
-fn turn_of([w, x, y, z]: [f64; 4]) -> M3 {
-    [
-        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
-        [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
-        [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
-    ]
+    /// The operation whose stretch over the tolerance is going on.
+    over: Option<usize>,
 }
 
 impl Walk<'_> {
@@ -299,8 +314,25 @@ impl Walk<'_> {
         if let Some((_, chip)) = force {
             row.chip = Some(row.chip.map_or((chip, chip), |(a, b)| (a.min(chip), b.max(chip))));
         }
-        if row.worst.is_none_or(|w| errors.sum() > w.errors.sum()) {
-            row.worst = Some(Worst { source, point: here.position, errors });
+        let sum = errors.sum();
+        if row.operation.tolerance.is_some_and(|t| sum > t) {
+            let rss = errors.root_of_squares();
+            match row.over.last_mut().filter(|_| self.over == Some(operation)) {
+                Some(open) => {
+                    open.last = source;
+                    if sum > open.sum {
+                        (open.worst, open.sum, open.rss) = (source, sum, rss);
+                    }
+                }
+                None => row.over.push(Stretch { first: source, last: source, worst: source, sum, rss }),
+            }
+            self.over = Some(operation);
+        } else {
+            self.over = None;
+        }
+        if row.worst.as_ref().is_none_or(|w| sum > w.errors.sum()) {
+            let causes = causes(&self.program.machine, &at, self.budget);
+            row.worst = Some(Worst { source, point: here.position, errors, causes });
         }
     }
 
@@ -319,6 +351,26 @@ impl Walk<'_> {
         let force = cut.force(self.material?)?;
         Some((force.vector(feed, axis)?, force.chip))
     }
+}
+
+/// So many causes are named.
+const NAMED: usize = 4;
+
+/// What moves the tool point most.
+fn causes(machine: &Machine, at: &Sensitivity, budget: &Budget) -> Vec<(String, f64)> {
+    let mut all: Vec<(String, f64)> = Vec::new();
+    let joints = machine.joints.iter().map(|j| format!("joint {}", j.name));
+    for (name, (column, size)) in joints.zip(at.joints.iter().zip(budget.joints.iter().flatten())) {
+        all.push((name, norm(*column) * size));
+    }
+    let parameters = machine.parameters().into_iter().map(|p| p.name);
+    for (name, (column, size)) in parameters.zip(at.geometry.iter().zip(budget.geometry.iter().flatten())) {
+        all.push((name, norm(*column) * size));
+    }
+    all.retain(|(_, v)| *v > 0.0);
+    all.sort_by(|a, b| b.1.total_cmp(&a.1));
+    all.truncate(NAMED);
+    all
 }
 
 fn pieces(length: f64) -> usize {

@@ -270,3 +270,103 @@ fn rectangles_and_volume() {
     let v = volume(&probe, 68, 120) / 1e6;
     assert!((v - 212.3).abs() < 1.0, "{v}");
 }
+
+/// Stiffness of the members, section 5.2 of the recomputation: legs at their least, at a middle and at their greatest
+/// length, the column at three heights.
+#[test]
+fn stiffness_of_legs_and_column() {
+    let m = machine();
+    let s = m.cell.stiffness.as_ref().unwrap();
+    let legs = [(850.0, 92_335.195), (1044.33, 83_467.41), (1294.1, 74_296.43)];
+    for (length, want) in legs {
+        assert!((s.joint(0, length).unwrap() - want).abs() < 0.01, "{length}");
+        assert!((s.joint(1, length).unwrap() - want).abs() < 0.01, "{length}");
+    }
+    for (height, want) in [(0.0, 1_145_724.45), (300.0, 1_200_931.27), (600.0, 1_403_867.70)] {
+        assert!((s.joint(2, height).unwrap() - want).abs() < 0.01, "{height}");
+    }
+}
+
+/// The determinant never changes its sign in the work space and keeps its range; places 3 and 4 of table 9.5 are out of
+/// reach, and which condition they break has a name.
+#[test]
+fn singularities_and_reach() {
+    let m = machine();
+    let k = legs(&m);
+    for (height, low, high) in [(0.0, -1.234e9, -5.10e8), (600.0, -9.55e8, -7.89e8)] {
+        let all: Vec<f64> = nodes(k, height).into_iter().map(|at| k.determinant(at)).collect();
+        let least = all.iter().copied().fold(f64::INFINITY, f64::min);
+        let most = all.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        assert!((least - low).abs() < 1e6 && (most - high).abs() < 1e6, "{least} {most}");
+    }
+    let thirty = 30f64.to_radians();
+    let names = |at: V3| k.broken(at).into_iter().map(|v| v.name).collect::<Vec<_>>();
+    assert_eq!(names([800.0, thirty, 0.0]), ["leg-1-short"]);
+    assert!((k.lengths([800.0, thirty, 0.0])[0] - 834.82).abs() < 0.01);
+    assert!(names([800.0, thirty, 200.0]).is_empty());
+    assert_eq!(names([800.0, thirty, 300.0]), ["spherical-1"]);
+    for (p, want) in [
+        ([650.0, 300.0, 120.0], &["leg-1-short"][..]),
+        ([693.0, 400.0, 0.0], &["leg-1-short"]),
+        ([693.0, 400.0, 300.0], &["spherical-1"]),
+        ([1000.0, 450.0, 0.0], &["arm-long", "leg-2-long"]),
+        ([900.0, -250.0, 240.0], &[]),
+    ] {
+        assert_eq!(names(k.place_of(p)), want, "{p:?}");
+    }
+    // Both ends of this way are within reach, its middle is not.
+    let h2 = [850.949, 835.093, 830.867, 838.987, 859.568];
+    for (i, want) in h2.into_iter().enumerate() {
+        let t = i as f64 / 4.0;
+        let at = k.place_of([705.0 - 48.0 * t, -445.0 + 355.0 * t, 0.0]);
+        assert!((k.lengths(at)[1] - want).abs() < 5e-4);
+        assert_eq!(names(at).is_empty(), want > 850.0, "{i}");
+    }
+}
+
+/// How far a way is from straight when the joints go evenly, and how many equal pieces keep it within 10 µm.
+#[test]
+fn joints_that_go_evenly() {
+    let m = machine();
+    let k = legs(&m);
+    let machine = m.kinematics();
+    let joints = |p: V3| k.lengths(k.place_of(p));
+    let off = |a: V3, b: V3, t: f64| {
+        let (p, q) = (joints(a), joints(b));
+        let at: V3 = std::array::from_fn(|i| p[i] + (q[i] - p[i]) * t);
+        let got = machine.forward_frame(&at).unwrap().position;
+        let (way, from) = (gr_machine::math::sub(b, a), gr_machine::math::sub(got, a));
+        let u = gr_machine::math::scale(way, 1.0 / norm(way));
+        norm(gr_machine::math::sub(from, gr_machine::math::scale(u, gr_machine::math::dot(u, from))))
+    };
+    let most = |a: V3, b: V3| (1..200).map(|i| off(a, b, f64::from(i) / 200.0)).fold(0.0, f64::max);
+    for (a, b, want) in [
+        ([750.0, -250.0, 0.0], [750.0, 250.0, 0.0], 32.1657),
+        ([700.0, -100.0, 0.0], [900.0, 100.0, 0.0], 11.7662),
+        ([800.0, 0.0, -200.0], [800.0, 0.0, 200.0], 19.3299),
+        ([650.0, 0.0, 0.0], [1000.0, 0.0, 0.0], 0.0),
+    ] {
+        assert!((most(a, b) - want).abs() < 1e-4, "{a:?}: {}", most(a, b));
+    }
+    let pieces = |n: u32| {
+        let y = |i: u32| -250.0 + 500.0 * f64::from(i) / f64::from(n);
+        (0..n).map(|i| off([750.0, y(i), 0.0], [750.0, y(i + 1), 0.0], 0.5)).fold(0.0, f64::max)
+    };
+    assert!(pieces(61) <= 0.010 && pieces(60) > 0.010, "{} {}", pieces(61), pieces(60));
+}
+
+/// The velocities in closed form are those of differences; the thesis' small-example roots are in the kinematics' tests.
+#[test]
+fn velocities_are_differences() {
+    let m = machine();
+    let k = legs(&m);
+    for p in [[800.0, 0.0, 0.0], [700.0, 150.0, 100.0], [950.0, 60.0, -240.0]] {
+        let at = k.place_of(p);
+        let q = k.lengths(at);
+        let closed = gr_machine::differential::velocity(&m, &q).unwrap();
+        let numeric = gr_machine::differential::jacobian(&*m.kinematics(), &q).unwrap();
+        for (a, b) in closed.iter().flatten().zip(numeric.iter().flatten()) {
+            assert!((a - b).abs() < 1e-5 * b.abs().max(1.0), "{a} {b}");
+        }
+    }
+}

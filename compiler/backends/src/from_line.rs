@@ -174,14 +174,7 @@ fn build(program: &Program, index: usize, state: &State, pose: &Pose, safe: f64,
     let used = axes_used(program);
     let far = Pose::at(std::array::from_fn(|i| if i < 3 || used[i] { pose.axes[i] + 777.25 } else { pose.axes[i] }));
     let mut out = Builder::from_state(far, State::default());
-    for (id, name) in &program.files {
-        out.file(*id, name);
-    }
-    for frame in program.frames.iter() {
-        let name = program.frames.name(frame).into();
-        let (parent, file, line, pass) = (frame.parent, frame.file, frame.line, frame.pass);
-        out.frame(frame.id, &gr_canon::CallFrame { parent, file, line, name, pass });
-    }
+    out.names_of(program);
     let source = Source { line: INSERTED, ..Source::default() };
     // The line that asked for the offset knows more than the offset: of a tool that was never measured it is 0.
     let offset = program.steps().take(index).filter(|s| matches!(s.op, Op::ToolOffset(_))).last().map_or(source, |s| s.source);

@@ -202,6 +202,9 @@ pub fn build(unit: &Unit, goal: &Goal<'_>) -> Result<Result<(Built, Checked), St
         return of_exchange(unit, goal);
     }
     if goal.target == "canon" {
+        if goal.options.robot.compensate {
+            return Ok(Err("--compensate goes with targets that are made of motion, not with canon".into()));
+        }
         if goal.from_line.is_some() {
             return Ok(Err("--from-line goes with targets that are made of motion, not with canon".into()));
         }
@@ -351,6 +354,16 @@ fn of_motion(mut motion: Motion, unit: &Unit, goal: &Goal<'_>) -> Result<Built, 
         return Ok(built(motion, Vec::new(), Vec::new()));
     }
     let name = stem(&unit.path);
+    let mut corrected = None;
+    if goal.options.robot.compensate && !crate::robot::is_planned(goal) {
+        match crate::robot::corrected(&motion.program, goal, &texts(&motion))? {
+            Ok((program, made)) => {
+                motion.program = program;
+                corrected = Some(made);
+            }
+            Err(found) => return Ok(built(motion, Vec::new(), found)),
+        }
+    }
     let planned = match goal.target {
         "joint-gcode" if crate::robot::plans_joints(goal) => Some(crate::robot::joint_gcode(&motion, goal, &texts(&motion), &name)?),
         "setpoints" => Some(crate::robot::setpoints(&motion, goal, &texts(&motion), &name)?),
@@ -377,9 +390,13 @@ fn of_motion(mut motion: Motion, unit: &Unit, goal: &Goal<'_>) -> Result<Built, 
         "sheet" | "sheet-json" | "sheet-html" => Ok((one(sheet(&motion, unit, goal.target, &name)), Vec::new())),
         other => return Err(format!("the target {other} can't be made by this version")),
     };
-    Ok(match made {
-        Ok((artifacts, notes)) => built(motion, artifacts, notes),
-        Err(found) => built(motion, Vec::new(), found),
+    Ok(match (made, corrected) {
+        (Ok((mut artifacts, notes)), Some(c)) => {
+            artifacts.push(c.table);
+            Built { summary: Some(c.summary), ..built(motion, artifacts, notes) }
+        }
+        (Ok((artifacts, notes)), None) => built(motion, artifacts, notes),
+        (Err(found), _) => built(motion, Vec::new(), found),
     })
 }
 

@@ -479,7 +479,7 @@ pub struct AccuracyArgs {
     /// Where the part's origin is in the machine's base [default: as the machine file says]
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
     pub part: Option<String>,
-    /// Tolerance of the part where the program states none, plus or minus, mm
+    /// Tolerance, plus or minus, mm [default: that of the STEP-NC feature, else of its workpiece]
     #[arg(long, value_name = "MM")]
     pub tolerance: Option<f64>,
     /// Grade of ISO 286-1 of the machine's geometry, in place of its file's
@@ -536,7 +536,7 @@ pub struct MapArgs {
     /// Machine: an id such as usp/2ups-prp, or the path of a machine file
     #[arg(long, value_name = "MACHINE")]
     pub machine: String,
-    /// workspace, condition, singularity, kinematic[-x|-y|-z], geometric[-x|-y|-z], elastic[-x|-y|-z], total,
+    /// workspace, condition, singularity, manipulability, norm, kinematic[-x|-y|-z], geometric[-x|-y|-z], elastic[-x|-y|-z], total,
     /// stiffness, or sensitivity (bars)
     #[arg(long, value_name = "NAME", default_value = "workspace")]
     pub quantity: String,
@@ -546,9 +546,9 @@ pub struct MapArgs {
     /// Picture or table: its ending says which (.png, .svg, .csv); may be given several times
     #[arg(short, long, value_name = "FILE")]
     pub output: Vec<PathBuf>,
-    /// Nodes along each side
-    #[arg(long, value_name = "COUNT", default_value_t = 400, value_parser = clap::value_parser!(u32).range(2..=4000))]
-    pub resolution: u32,
+    /// Nodes along each side [default: 400, for bars 120]
+    #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u32).range(2..=4000))]
+    pub resolution: Option<u32>,
     /// Force on the tool, N: three numbers, for deflections
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
     pub force: Option<String>,

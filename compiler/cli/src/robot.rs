@@ -1,7 +1,9 @@
 //! Programs for robots: planned for a machine, written in its maker's language, checked, verified.
 
 use clap::Args;
+use gr_accuracy::compensate::{self, Correction};
 use gr_ir::Sources;
+use gr_machine::math::norm;
 use gr_machine::{Kind, Machine};
 use gr_robot::{Options, Planned, plan};
 use gr_text::Diagnostic;
@@ -25,7 +27,7 @@ pub struct RobotOptions {
     /// Robots: job file, which gives parts of the program to setups with their own placement of the part
     #[arg(long, value_name = "FILE")]
     pub job: Option<std::path::PathBuf>,
-    /// Robots: correct every point for the deviations in `[as_built]` of the machine file
+    /// Correct every point for the deviations in `[as_built]` of the machine file
     #[arg(long)]
     pub compensate: bool,
     /// setpoints: time in which acceleration builds up, s; 0 = at once [default: 0]
@@ -113,13 +115,13 @@ pub fn build(motion: &Motion, goal: &Goal<'_>, texts: &dyn Sources, name: &str) 
     let name = goal.file.filter(|f| f.extension().is_some()).map_or_else(|| name.to_string(), crate::emit::stem);
     let options = options(goal, &name)?;
     let planned = plan(&motion.program, &machine, texts, &options).and_then(|p| compensated(p, goal, texts, options.tolerance));
-    let (planned, corrections) = match planned {
+    let (planned, corrected) = match planned {
         Ok(planned) => planned,
         Err(found) => return Ok(Err(found)),
     };
     let choice = gr_vendors::Options { decimals: goal.options.decimals, allow_unverified: goal.options.robot.allow_unverified };
     let output = language.emit(&planned.program, texts, &choice);
-    let summary = summary(&planned);
+    let mut summary = summary(&planned);
     let mut notes = planned.warnings;
     notes.extend(output.findings);
     if notes.iter().any(|d| d.severity == gr_text::Severity::Error) {
@@ -128,39 +130,98 @@ pub fn build(motion: &Motion, goal: &Goal<'_>, texts: &dyn Sources, name: &str) 
     let several = output.files.len() > 1;
     let artifact = |f: gr_vendors::OutputFile| Artifact { name: several.then_some(f.name), ..Artifact::new("", f.bytes) };
     let mut artifacts: Vec<Artifact> = output.files.into_iter().map(artifact).collect();
-    artifacts.extend(corrections.map(|c| Artifact { name: several.then(|| format!("{name}-corrections.csv")), ..c }));
+    if let Some(c) = corrected {
+        summary += &c.summary;
+        artifacts.push(Artifact { name: several.then(|| format!("{name}-corrections.csv")), ..c.table });
+    }
     Ok(Ok(Made { artifacts, notes, summary }))
 }
 
-/// The program corrected for the machine's known geometry, where that is asked for, and a table of what was corrected.
+/// What was corrected.
+pub struct Corrected {
+    /// Every correction, as a table.
+    pub table: Artifact,
+    /// The greatest ones, for people.
+    pub summary: String,
+}
+
+impl Corrected {
+    fn new(list: &[Correction], arcs: usize) -> Corrected {
+        let mut table = String::from("line,x mm,y mm,z mm,dx um,dy um,dz um,turn deg,lean left deg\n");
+        for c in list {
+            let line = c.line.map_or(String::new(), |l| (l + 1).to_string());
+            let ([x, y, z], [dx, dy, dz]) = (c.aim, c.by.map(|v| v * 1e3 + 0.0));
+            let (turn, left) = (c.turn.to_degrees(), c.left.to_degrees());
+            table += &format!("{line},{x:.4},{y:.4},{z:.4},{dx:.3},{dy:.3},{dz:.3},{turn:.6},{left:.6}\n");
+        }
+        let at = |c: &Correction| c.line.map_or(String::new(), |l| format!(" (line {})", l + 1));
+        let most = |of: fn(&Correction) -> f64| list.iter().max_by(|a, b| of(a).total_cmp(&of(b))).map(|c| (of(c), at(c)));
+        let mut summary = String::new();
+        if let Some((mm, line)) = most(|c| norm(c.by)) {
+            summary += &format!("  corrected as built: by up to {:.1} µm{line}\n", mm * 1e3);
+        }
+        match arcs {
+            0 => {}
+            1 => summary += "  1 arc became straight pieces\n",
+            n => summary += &format!("  {n} arcs became straight pieces\n"),
+        }
+        // Less than a millionth of a degree is rounding.
+        if let Some((lean, line)) = most(|c| c.left).filter(|(lean, _)| lean.to_degrees() > 1e-6) {
+            summary += &format!("  not corrected: the direction of the tool, which leans by up to {:.4}°{line}\n", lean.to_degrees());
+        }
+        Corrected { table: Artifact::new("-corrections.csv", table.into_bytes()), summary }
+    }
+}
+
+/// The deviations that a machine is corrected for.
+fn deviations(machine: &Machine, texts: &dyn Sources) -> Result<Vec<f64>, Vec<Diagnostic>> {
+    compensate::deviations(machine).ok_or_else(|| {
+        let top = texts.place(gr_ir::Source::default());
+        vec![Diagnostic::new(gr_text::code::ACCURACY_ONLY_TOLERANCES, top.0, top.1, &[machine.id.clone()])]
+    })
+}
+
+fn not_corrected(source: gr_ir::Source, why: String, texts: &dyn Sources) -> Vec<Diagnostic> {
+    let (file, span) = texts.place(source);
+    vec![Diagnostic::new(gr_text::code::ACCURACY_BAD_OPTION, file, span, &["--compensate".to_string(), why])]
+}
+
+/// The program corrected for the machine's known geometry, where that is asked for, and what was corrected.
 fn compensated(
     planned: Planned,
     goal: &Goal<'_>,
     texts: &dyn Sources,
     tolerance: f64,
-) -> Result<(Planned, Option<Artifact>), Vec<Diagnostic>> {
-    use gr_accuracy::compensate;
+) -> Result<(Planned, Option<Corrected>), Vec<Diagnostic>> {
     if !goal.options.robot.compensate {
         return Ok((planned, None));
     }
-    let top = texts.place(gr_ir::Source::default());
-    let machine = &planned.program.machine;
-    let Some(deviations) = compensate::deviations(machine) else {
-        return Err(vec![Diagnostic::new(gr_text::code::ACCURACY_ONLY_TOLERANCES, top.0, top.1, &[machine.id.clone()])]);
-    };
-    let made = compensate::program(&planned.program, &deviations, tolerance).map_err(|(step, e)| {
-        let (file, span) = texts.place(step.source.unwrap_or_default());
-        let args = ["--compensate".to_string(), format!("the corrected point can't be reached: {e}")];
-        vec![Diagnostic::new(gr_text::code::ACCURACY_BAD_OPTION, file, span, &args)]
-    })?;
-    let mut table = String::from("line,x mm,y mm,z mm,dx um,dy um,dz um\n");
-    for c in &made.corrections {
-        let line = c.line.map_or(String::new(), |l| (l + 1).to_string());
-        let ([x, y, z], [dx, dy, dz]) = (c.aim, c.by.map(|v| v * 1e3 + 0.0));
-        table += &format!("{line},{x:.4},{y:.4},{z:.4},{dx:.3},{dy:.3},{dz:.3}\n");
+    let deviations = deviations(&planned.program.machine, texts)?;
+    let made = compensate::program(&planned.program, &deviations, tolerance)
+        .map_err(|(step, e)| not_corrected(step.source.unwrap_or_default(), format!("the corrected point can't be reached: {e}"), texts))?;
+    let corrected = Corrected::new(&made.corrections, made.arcs);
+    Ok((Planned { program: made.program, ..planned }, Some(corrected)))
+}
+
+/// Whether a target is made from a plan of the machine's joints, which is then what is corrected.
+pub fn is_planned(goal: &Goal<'_>) -> bool {
+    is_language(goal.target) || goal.target == "setpoints" || goal.target == "joint-gcode" && plans_joints(goal)
+}
+
+/// A program as motion, corrected for the machine's known geometry.
+pub fn corrected(program: &gr_ir::Program, goal: &Goal<'_>, texts: &dyn Sources) -> Result<Result<(gr_ir::Program, Corrected), Vec<Diagnostic>>, String> {
+    let machine = goal.machine.ok_or("--compensate needs --machine with `[as_built]`")?;
+    let tolerance = goal.options.arc_tolerance.unwrap_or(Options::default().tolerance);
+    if !(tolerance > 0.0) {
+        return Err("--arc-tolerance must be above zero".into());
     }
-    let planned = Planned { program: made.program, ..planned };
-    Ok((planned, Some(Artifact::new("-corrections.csv", table.into_bytes()))))
+    let made = deviations(machine, texts).and_then(|d| {
+        compensate::motion(program, machine, &d, tolerance).map_err(|(source, why)| not_corrected(source, why, texts))
+    });
+    Ok(made.map(|m| {
+        let corrected = Corrected::new(&m.corrections, m.arcs);
+        (m.program, corrected)
+    }))
 }
 
 /// The machine of a goal, in a reference mode as its publication has it.
@@ -252,13 +313,11 @@ pub fn ask(name: &str, text: &str, machine: &Machine, setup: &gr_interp::Setup, 
 type Files = Result<Result<Made, Vec<Diagnostic>>, String>;
 
 /// Plans for a controller that knows the words of the program itself.
-fn own_plan(motion: &Motion, goal: &Goal<'_>, texts: &dyn Sources, name: &str) -> Result<Result<Planned, Vec<Diagnostic>>, String> {
+fn own_plan(motion: &Motion, goal: &Goal<'_>, texts: &dyn Sources, name: &str) -> Result<Result<(Planned, Option<Corrected>), Vec<Diagnostic>>, String> {
     let machine = machine(goal)?;
     let options = Options { own_words: true, ..options(goal, name)? };
     let tolerance = options.tolerance;
-    Ok(plan(&motion.program, &machine, texts, &options)
-        .and_then(|p| compensated(p, goal, texts, tolerance))
-        .map(|(planned, _)| planned))
+    Ok(plan(&motion.program, &machine, texts, &options).and_then(|p| compensated(p, goal, texts, tolerance)))
 }
 
 fn too_many(found: &gr_robot::joints::TooMany, texts: &dyn Sources) -> Diagnostic {
@@ -278,7 +337,7 @@ pub fn joint_gcode(motion: &Motion, goal: &Goal<'_>, texts: &dyn Sources, name: 
     if o.interval.is_some_and(|t| !(t > 0.0)) {
         return Err("--interval must be above zero".into());
     }
-    let planned = match own_plan(motion, goal, texts, name)? {
+    let (planned, corrected) = match own_plan(motion, goal, texts, name)? {
         Ok(planned) => planned,
         Err(found) => return Ok(Err(found)),
     };
@@ -294,12 +353,17 @@ pub fn joint_gcode(motion: &Motion, goal: &Goal<'_>, texts: &dyn Sources, name: 
         Err(e) => return Ok(Err(vec![too_many(&e, texts)])),
     };
     let table = TableOptions { decimals: o.decimals.unwrap_or(6), comma: o.decimal_comma };
-    let artifacts = vec![
+    let mut artifacts = vec![
         Artifact::new("", gcode(&planned.program, &path, table.decimals).into_bytes()),
         Artifact::new("-cartesian.csv", cartesian_csv(&path, table).into_bytes()),
         Artifact::new("-joint.csv", joint_csv(&planned.program, &path, table).into_bytes()),
     ];
-    Ok(Ok(Made { artifacts, summary: summary(&planned), notes: planned.warnings }))
+    let mut summary = summary(&planned);
+    if let Some(c) = corrected {
+        summary += &c.summary;
+        artifacts.push(c.table);
+    }
+    Ok(Ok(Made { artifacts, summary, notes: planned.warnings }))
 }
 
 /// Set-points for a joint controller: a table, and the same as bytes beside it.
@@ -311,7 +375,7 @@ pub fn setpoints(motion: &Motion, goal: &Goal<'_>, texts: &dyn Sources, name: &s
     if !(interval > 0.0 && smoothing >= 0.0 && smoothing.is_finite()) {
         return Err("--interval must be above zero, --smoothing zero or more".into());
     }
-    let planned = match own_plan(motion, goal, texts, name)? {
+    let (planned, corrected) = match own_plan(motion, goal, texts, name)? {
         Ok(planned) => planned,
         Err(found) => return Ok(Err(found)),
     };
@@ -319,9 +383,13 @@ pub fn setpoints(motion: &Motion, goal: &Goal<'_>, texts: &dyn Sources, name: &s
         Ok(made) => made,
         Err(e) => return Ok(Err(vec![too_many(&e, texts)])),
     };
-    let artifacts = vec![Artifact::new("", made.csv().into_bytes()), Artifact::new(".bin", made.bytes())];
+    let mut artifacts = vec![Artifact::new("", made.csv().into_bytes()), Artifact::new(".bin", made.bytes())];
     let seconds = made.rows.len().saturating_sub(1) as f64 * interval;
-    let summary = format!("{}  {} set-points, {} with acceleration\n", summary(&planned), made.rows.len(), duration(seconds));
+    let mut summary = format!("{}  {} set-points, {} with acceleration\n", summary(&planned), made.rows.len(), duration(seconds));
+    if let Some(c) = corrected {
+        summary += &c.summary;
+        artifacts.push(c.table);
+    }
     let mut notes = planned.warnings;
     notes.extend(corners_kept(&planned.program, texts));
     Ok(Ok(Made { artifacts, summary, notes }))
@@ -351,7 +419,7 @@ pub fn verify(unit: &crate::pipeline::Unit, machine: &Machine, args: &crate::opt
     let texts = crate::emit::texts(&motion);
     match own_plan(&motion, &goal, &texts, &name) {
         Err(text) => Ok(Err(text)),
-        Ok(Ok(planned)) => Ok(Ok(gr_robot::verify::Report::of(&planned))),
+        Ok(Ok((planned, _))) => Ok(Ok(gr_robot::verify::Report::of(&planned))),
         Ok(Err(found)) => {
             drop(texts);
             Err(crate::commands::check::Checked { sources: motion.sources, found, more: 0, unreadable: false })

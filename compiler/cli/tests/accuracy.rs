@@ -83,3 +83,40 @@ fn places() {
     insta::assert_snapshot!("rectangle", whole(&run(examples(), &["place", "--machine=usp/2ups-prp", "--reference=usp2009", "--heights=-240,240"])));
     insta::assert_snapshot!("no_machine", whole(&run(Path::new(env!("CARGO_MANIFEST_DIR")), &["place", "--message-format=short"])));
 }
+
+/// `build --compensate`: a mill's G-code, the parallel machine's joints, an arm's language; what it refuses.
+#[test]
+fn compensated() {
+    let folder = tempfile::tempdir().unwrap();
+    let machine = |name: &str, base: &str, rest: &str| {
+        let text = format!("format = 1\nid = \"test/{name}\"\nextends = \"{base}\"\n[as_built]\nsource = \"ball bar\"\n{rest}");
+        std::fs::write(folder.path().join(format!("{name}.toml")), text).unwrap();
+    };
+    machine("mill", "generic/mill3", "parameter = [{ name = \"square-xy\", deviation = 0.02 }]\n");
+    machine("table", "generic/mill5-ac-table", "parameter = [{ name = \"rotary1.z\", deviation = 0.05 }, { name = \"rotary1.tilt-b\", deviation = 0.01 }]\n");
+    machine("legs", "usp/2ups-prp", "parameter = [{ name = \"ls1x\", deviation = 0.05 }, { name = \"lu2y\", deviation = -0.08 }]\n[frames.part]\nposition = [800, 0, 0]\n");
+    machine("arm", "abb/irb2400", "parameter = [{ name = \"a2\", deviation = 0.4 }, { name = \"J5.zero\", deviation = 0.05 }]\n[frames.part]\nposition = [900, 0, 600]\n");
+    let program = "G21 G90 G94 F600\nG0 X0 Y0 Z5\nG1 Z-2\nG1 X100\nG1 Y100\nG3 X80 Y120 I-20\nG1 X0 Y0\nG0 Z5\nM2\n";
+    std::fs::write(folder.path().join("p.ngc"), program).unwrap();
+    std::fs::write(folder.path().join("five.ngc"), "G21 G90 G94 F600\nG0 X0 Y0 Z5\nG1 Z-2\nG1 X60 A-30 C45\nG0 Z50 A0 C0\nM2\n").unwrap();
+    let build = |args: &[&str]| run(folder.path(), &[&["build", "--compensate", "--message-format=short"], args].concat());
+    let text = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap();
+    insta::assert_snapshot!("compensated_mill", whole(&build(&["p.ngc", "--machine=mill.toml", "-ors274ngc.ngc"])));
+    insta::assert_snapshot!("compensated_mill_program", text("rs274ngc.ngc"));
+    insta::assert_snapshot!("compensated_five", whole(&build(&["five.ngc", "--machine=table.toml", "-ofive-out.ngc"])) + &text("five-out.ngc"));
+    insta::assert_snapshot!("compensated_legs", whole(&build(&["p.ngc", "--machine=legs.toml", "--target=joint-gcode", "-olegs.ngc"])));
+    let corrections = text("legs-corrections.csv");
+    assert!(corrections.lines().count() > 5 && corrections.starts_with("line,x mm"), "{corrections}");
+    insta::assert_snapshot!("compensated_legs_motion", whole(&build(&["p.ngc", "--machine=legs.toml", "--target=rs274ngc", "-olegs2.ngc"])));
+    insta::assert_snapshot!("compensated_arm", whole(&build(&["p.ngc", "--machine=arm.toml", "--target=rapid", "-oarm.mod"])));
+    insta::assert_snapshot!("compensated_arm_table", text("arm-corrections.csv").lines().take(6).collect::<Vec<_>>().join("\n"));
+    // Tolerances are no deviations; a machine must be named; canonical calls are none of motion; an arm's configuration
+    // is not in G-code.
+    let refused = [
+        build(&["p.ngc", "--machine=generic/mill3", "-ono.ngc"]),
+        build(&["p.ngc", "-ono.ngc"]),
+        build(&["p.ngc", "--machine=mill.toml", "--target=canon", "-ono.canon"]),
+        build(&["p.ngc", "--machine=arm.toml", "--target=rs274ngc", "-ono.ngc"]),
+    ];
+    insta::assert_snapshot!("compensated_refused", refused.iter().map(whole).collect::<Vec<_>>().join("\n"));
+}

@@ -436,6 +436,11 @@ impl Builder {
     pub fn frame(&mut self, id: FrameId, frame: &gr_canon::CallFrame) {
         self.program.frames.add(id, frame);
     }
+    /// Takes over the names of another program's files and its call tree.
+    pub fn names_of(&mut self, other: &Program) {
+        self.program.files.extend_from_slice(&other.files);
+        self.program.frames = other.frames.clone();
+    }
     /// The program.
     pub fn finish(mut self) -> Program {
         let p = &mut self.program;

@@ -163,6 +163,38 @@ pub fn rotation_vector(m: &M3) -> V3 {
     scale(best, angle / norm(best).max(f64::MIN_POSITIVE))
 }
 
+/// Matrix of a unit quaternion, scalar first.
+pub fn turn_of([w, x, y, z]: [f64; 4]) -> M3 {
+    [
+        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
+        [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
+        [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
+    ]
+}
+
+/// A turn as unit quaternion, scalar first and never negative.
+pub fn quaternion_of(m: &M3) -> [f64; 4] {
+    let t = m[0][0] + m[1][1] + m[2][2];
+    let q = if t > 0.0 {
+        let s = libm::sqrt(t + 1.0) * 2.0;
+        [s / 4.0, (m[2][1] - m[1][2]) / s, (m[0][2] - m[2][0]) / s, (m[1][0] - m[0][1]) / s]
+    } else if m[0][0] >= m[1][1] && m[0][0] >= m[2][2] {
+        let s = libm::sqrt(1.0 + m[0][0] - m[1][1] - m[2][2]) * 2.0;
+        [(m[2][1] - m[1][2]) / s, s / 4.0, (m[0][1] + m[1][0]) / s, (m[0][2] + m[2][0]) / s]
+    } else if m[1][1] >= m[2][2] {
+        let s = libm::sqrt(1.0 + m[1][1] - m[0][0] - m[2][2]) * 2.0;
+        [(m[0][2] - m[2][0]) / s, (m[0][1] + m[1][0]) / s, s / 4.0, (m[1][2] + m[2][1]) / s]
+    } else {
+        let s = libm::sqrt(1.0 + m[2][2] - m[0][0] - m[1][1]) * 2.0;
+        [(m[1][0] - m[0][1]) / s, (m[0][2] + m[2][0]) / s, (m[1][2] + m[2][1]) / s, s / 4.0]
+    };
+    let l = libm::sqrt(q.iter().map(|v| v * v).sum());
+    // The first part that is not 0 is positive: one turn has one quaternion.
+    let negative = q.iter().find(|v| v.abs() > 1e-12).is_some_and(|v| *v < 0.0);
+    let sign = if negative { -1.0 } else { 1.0 };
+    q.map(|v| v / l * sign + 0.0)
+}
+
 /// Solves a dense linear system with row exchange; none when it is singular.
 pub fn solve(mut a: Vec<Vec<f64>>, mut b: Vec<f64>) -> Option<Vec<f64>> {
     let n = b.len();
@@ -244,6 +276,16 @@ mod tests {
             let back = euler(euler_of(&m));
             for (p, q) in m.iter().flatten().zip(back.iter().flatten()) {
                 prop_assert!((p - q).abs() < 1e-12, "{m:?} {back:?}");
+            }
+        }
+
+        #[test]
+        fn quaternions_give_their_matrix_back(angles in prop::array::uniform3(prop_oneof![-3.1f64..3.1, Just(std::f64::consts::PI), Just(std::f64::consts::FRAC_PI_2), Just(1e-9)])) {
+            let m = euler(angles);
+            let q = quaternion_of(&m);
+            prop_assert!(q[0] > -1e-12);
+            for (p, r) in m.iter().flatten().zip(turn_of(q).iter().flatten()) {
+                prop_assert!((p - r).abs() < 1e-9);
             }
         }
 

@@ -219,6 +219,7 @@ impl<'m> Aim<'m> {
             depth: 0.0,
             shape: Shape::Toolpath,
             copies: vec![Frame::default()],
+            tolerance: None,
         };
         let operation = Operation {
             origin: origin(operation),

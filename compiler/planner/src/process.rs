@@ -212,6 +212,8 @@ pub struct Feature {
     pub shape: Shape,
     /// Where it is repeated: placements in the setup. Without a pattern, just `frame`.
     pub copies: Vec<Frame>,
+    /// The least plus-or-minus tolerance that its own lengths are written with, mm.
+    pub tolerance: Option<f64>,
 }
 
 /// Shapes.

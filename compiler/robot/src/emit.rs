@@ -2,7 +2,7 @@
 //! figures of the summary are gathered.
 
 use gr_ir::Source;
-use gr_machine::math::{Frame, M3};
+use gr_machine::math::{Frame, M3, quaternion_of};
 use gr_machine::Machine;
 use gr_text::code;
 
@@ -122,7 +122,7 @@ impl<'a> Emit<'a> {
         for (slot, v) in joints.iter_mut().skip(self.solver.count).zip(&self.external) {
             *slot = *v;
         }
-        Target { position, quaternion: quaternion(turn), joints, branch }
+        Target { position, quaternion: quaternion_of(turn), joints, branch }
     }
 
     fn home_target(&self, g: &Gathered, home: &Joints, here: Option<&Here>) -> Target {
@@ -297,27 +297,4 @@ fn nearest(all: &Branches, q: &Joints, count: usize) -> u8 {
 fn gr_turn(angle: f64) -> f64 {
     const TURN: f64 = std::f64::consts::TAU;
     angle - TURN * libm::round(angle / TURN)
-}
-
-/// A turn as unit quaternion, scalar first and never negative.
-pub(crate) fn quaternion(m: &M3) -> [f64; 4] {
-    let t = m[0][0] + m[1][1] + m[2][2];
-    let q = if t > 0.0 {
-        let s = libm::sqrt(t + 1.0) * 2.0;
-        [s / 4.0, (m[2][1] - m[1][2]) / s, (m[0][2] - m[2][0]) / s, (m[1][0] - m[0][1]) / s]
-    } else if m[0][0] >= m[1][1] && m[0][0] >= m[2][2] {
-        let s = libm::sqrt(1.0 + m[0][0] - m[1][1] - m[2][2]) * 2.0;
-        [(m[2][1] - m[1][2]) / s, s / 4.0, (m[0][1] + m[1][0]) / s, (m[0][2] + m[2][0]) / s]
-    } else if m[1][1] >= m[2][2] {
-        let s = libm::sqrt(1.0 + m[1][1] - m[0][0] - m[2][2]) * 2.0;
-        [(m[0][2] - m[2][0]) / s, (m[0][1] + m[1][0]) / s, s / 4.0, (m[1][2] + m[2][1]) / s]
-    } else {
-        let s = libm::sqrt(1.0 + m[2][2] - m[0][0] - m[1][1]) * 2.0;
-        [(m[1][0] - m[0][1]) / s, (m[0][2] + m[2][0]) / s, (m[1][2] + m[2][1]) / s, s / 4.0]
-    };
-    let l = libm::sqrt(q.iter().map(|v| v * v).sum());
-    // The first part that is not 0 is positive: one turn has one quaternion.
-    let negative = q.iter().find(|v| v.abs() > 1e-12).is_some_and(|v| *v < 0.0);
-    let sign = if negative { -1.0 } else { 1.0 };
-    q.map(|v| v / l * sign + 0.0)
 }

@@ -4,7 +4,7 @@
 use std::fmt::Write as _;
 
 use gr_ir::Source;
-use gr_machine::math::{Frame, norm, sub};
+use gr_machine::math::{Frame, norm, sub, turn_of};
 use gr_machine::JointKind;
 
 use crate::choose::unwrap;
@@ -194,7 +194,7 @@ impl Run<'_> {
 
     fn path(&mut self, to: u32, arc: Option<ArcPiece>, speed: f64, zone: Zone, rapid: bool, source: Option<Source>) -> Result<(), TooMany> {
         let to = self.program.targets[to as usize];
-        let turns = (matrix(self.here.quaternion), matrix(to.quaternion));
+        let turns = (turn_of(self.here.quaternion), turn_of(to.quaternion));
         let way = if arc.is_some() { Way::Arc(0) } else { Way::Line };
         self.g.arcs.clear();
         self.g.arcs.extend(arc);
@@ -312,15 +312,6 @@ impl Cut<'_> {
         out.extend(found.last());
         out
     }
-}
-
-/// The matrix of a unit quaternion.
-pub(crate) fn matrix([w, x, y, z]: [f64; 4]) -> gr_machine::math::M3 {
-    [
-        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
-        [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
-        [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
-    ]
 }
 
 /// LinuxCNC words of a machine driven in joint mode: G93, so that each line takes its time.

@@ -12,10 +12,11 @@ use std::fmt::Write as _;
 
 use gr_ir::Source;
 use gr_machine::JointKind;
+use gr_machine::math::turn_of;
 
 use crate::choose::unwrap;
 use crate::gather::{ArcPiece, Gathered, Move, Way};
-use crate::joints::{TooMany, matrix};
+use crate::joints::TooMany;
 use crate::path::{Mount, Path};
 use crate::solver::{Branches, Joints, Limits, Solver};
 use crate::{Action, MAX_JOINTS, RobotProgram, Target, Zone};
@@ -195,7 +196,7 @@ impl<'a> Maker<'a> {
     #[allow(clippy::too_many_arguments)]
     fn cut(&mut self, g: &mut Gathered, here: Target, to: u32, arc: Option<ArcPiece>, speed: f64, zone: Zone, (tool, frame): (u16, u16)) -> Target {
         let to = self.program.targets[to as usize];
-        g.turns = vec![matrix(here.quaternion), matrix(to.quaternion)];
+        g.turns = vec![turn_of(here.quaternion), turn_of(to.quaternion)];
         g.arcs.clear();
         g.arcs.extend(arc);
         let m = Move {

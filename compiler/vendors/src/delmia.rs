@@ -178,7 +178,7 @@ impl Body for Writer {
                     let tool = cx.program.tools.first().map(|t| t.frame).unwrap_or_default();
                     let frame = cx.program.frames.first().map(|f| f.frame).unwrap_or_default();
                     let seen = frame.inverse().then(&flange.then(&tool));
-                    (home.position, home.quaternion) = (seen.position, orient::quaternion(&seen.turn));
+                    (home.position, home.quaternion) = (seen.position, gr_machine::math::quaternion_of(&seen.turn));
                 }
                 self.motion(cx, "Joint", &home, &profile, None);
             }

@@ -11,7 +11,7 @@ use crate::parts::Parts;
 use crate::walk::{Arms, Body, Cx, Op, Traits, Value, any_error, walk, wrapped};
 use crate::{Language, Options, Output, OutputFile, orient};
 use gr_ir::Sources;
-use gr_machine::math::Frame;
+use gr_machine::math::{Frame, turn_of};
 use gr_robot::{RobotProgram, Target};
 use gr_text::code;
 use std::fmt::Write;
@@ -130,7 +130,7 @@ impl Writer {
         let turn = |v: f64| libm::floor((v + 180.0) / 360.0) as i32;
         let (f, u, b) = (if q[4] < 0.0 { 'N' } else { 'F' }, if p.up() { 'U' } else { 'D' }, if p.behind { 'B' } else { 'T' });
         let _ = write!(self.points, "\tCONFIG : '{f} {u} {b}, {}, {}, {}',\r\n", turn(q[3]), turn(q[4]), turn(q[5]));
-        self.angles = orient::fixed_xyz(&orient::matrix(&t.quaternion), self.angles);
+        self.angles = orient::fixed_xyz(&turn_of(t.quaternion), self.angles);
         let (x, w) = (t.position, self.angles.map(f64::to_degrees));
         let row = |out: &mut String, names: [&str; 3], unit: &str, v: [f64; 3], end: &str| {
             for i in 0..3 {

@@ -8,7 +8,7 @@ use crate::parts::Parts;
 use crate::walk::{Arms, Body, Cx, Op, Traits, Value, any_error, walk, wrapped};
 use crate::{Language, Options, Output, OutputFile, orient};
 use gr_ir::Sources;
-use gr_machine::math::Frame;
+use gr_machine::math::{Frame, quaternion_of, turn_of};
 use gr_robot::{RobotProgram, Target};
 use gr_text::code;
 use std::fmt::Write;
@@ -114,7 +114,7 @@ impl Writer {
             self.group = group;
         }
         self.user = cx.frame + 1;
-        self.angles = orient::fixed_xyz(&orient::matrix(&t.quaternion), self.angles);
+        self.angles = orient::fixed_xyz(&turn_of(t.quaternion), self.angles);
         let (x, r) = (t.position.map(|v| fix(v, 3)), self.angles.map(|v| fix(v.to_degrees(), 4)));
         let name = format!("C{:05}", self.count);
         let _ = write!(self.positions, "{name}={},{},{},{},{},{}\r\n", x[0], x[1], x[2], r[0], r[1], r[2]);
@@ -278,5 +278,5 @@ fn at_flange(cx: &Cx, t: &Target) -> Target {
     let tool = cx.program.tools.get(cx.tool).map(|t| t.frame).unwrap_or_default();
     let frame = cx.program.frames.get(cx.frame).map(|f| f.frame).unwrap_or_default();
     let seen = frame.inverse().then(&flange.then(&tool));
-    Target { position: seen.position, quaternion: orient::quaternion(&seen.turn), ..*t }
+    Target { position: seen.position, quaternion: quaternion_of(&seen.turn), ..*t }
 }

@@ -10,7 +10,7 @@ use crate::parts::Parts;
 use crate::walk::{Arms, Body, Cx, Op, Traits, Value, any_error, walk, wrapped};
 use crate::{Language, Options, Output, OutputFile, orient};
 use gr_ir::Sources;
-use gr_machine::math::Frame;
+use gr_machine::math::{Frame, turn_of};
 use gr_robot::{RobotProgram, Target};
 
 pub(crate) struct Krl;
@@ -94,7 +94,7 @@ impl Writer {
     }
 
     fn point(&mut self, cx: &Cx, t: &Target) -> String {
-        let mut text = self.pose(&t.position, &orient::matrix(&t.quaternion), cx.decimals());
+        let mut text = self.pose(&t.position, &turn_of(t.quaternion), cx.decimals());
         for (i, v) in cx.external(t).iter().enumerate() {
             text += &format!(",E{} {}", i + 1, real(*v, 4));
         }

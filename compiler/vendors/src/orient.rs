@@ -3,7 +3,7 @@
 //! Where a convention has a pole only a sum or difference of two angles is determined; the one that is free is kept
 //! from the point before.
 
-use gr_machine::math::{Frame, M3, rotation_vector, transpose};
+use gr_machine::math::{Frame, M3, rotation_vector, transpose, turn_of};
 
 /// Below this sine the pole is reached: 2·10⁻⁶ degrees, less than anything a program is written with.
 const POLE: f64 = 4e-8;
@@ -11,33 +11,6 @@ const POLE: f64 = 4e-8;
 /// Half a turn is written as 180°, not −180°.
 fn half(angle: f64) -> f64 {
     if angle + std::f64::consts::PI < 1e-9 { std::f64::consts::PI } else { angle }
-}
-
-/// Matrix of a unit quaternion, scalar first.
-pub(crate) fn matrix(q: &[f64; 4]) -> M3 {
-    let [w, x, y, z] = *q;
-    [
-        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
-        [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
-        [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
-    ]
-}
-
-/// Unit quaternion of a matrix, scalar first and not negative.
-pub(crate) fn quaternion(m: &M3) -> [f64; 4] {
-    let trace = m[0][0] + m[1][1] + m[2][2];
-    let squares = [1.0 + trace, 1.0 + 2.0 * m[0][0] - trace, 1.0 + 2.0 * m[1][1] - trace, 1.0 + 2.0 * m[2][2] - trace];
-    let best = (0..4).max_by(|a, b| squares[*a].total_cmp(&squares[*b])).unwrap_or(0);
-    let d = 2.0 * libm::sqrt(squares[best].max(0.0));
-    let (a, b, c) = (m[2][1] - m[1][2], m[0][2] - m[2][0], m[1][0] - m[0][1]);
-    let (ab, ac, bc) = (m[0][1] + m[1][0], m[0][2] + m[2][0], m[1][2] + m[2][1]);
-    let q = match best {
-        0 => [d / 4.0, a / d, b / d, c / d],
-        1 => [a / d, d / 4.0, ab / d, ac / d],
-        2 => [b / d, ab / d, d / 4.0, bc / d],
-        _ => [c / d, ac / d, bc / d, d / 4.0],
-    };
-    if q[0] < 0.0 { q.map(|v| -v) } else { q }
 }
 
 /// Turns about the fixed X, Y, Z: R = Rz(c)·Ry(b)·Rx(a); at the pole `a` is that of the point before.
@@ -72,7 +45,7 @@ pub(crate) fn vector(m: &M3) -> [f64; 3] {
 
 /// A pose as a frame.
 pub(crate) fn frame(position: [f64; 3], quaternion: &[f64; 4]) -> Frame {
-    Frame { turn: matrix(quaternion), position }
+    Frame { turn: turn_of(*quaternion), position }
 }
 
 /// Shortest turn between two unit quaternions, at a share of the way.
@@ -121,7 +94,6 @@ mod tests {
             prop_assert!(near(&m, &product(&rot_x(a), &product(&rot_y(b), &rot_z(c)))));
             let [o, a, t] = zyz(&m, before);
             prop_assert!(near(&m, &product(&rot_z(o), &product(&rot_y(a), &rot_z(t)))));
-            prop_assert!(near(&m, &matrix(&quaternion(&m))));
         }
     }
 

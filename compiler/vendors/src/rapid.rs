@@ -8,9 +8,9 @@ use crate::name::{Names, Rule};
 use crate::number::{down, num, short, single};
 use crate::parts::Parts;
 use crate::walk::{Arms, Body, Cx, Op, Traits, Value, any_error, walk, wrapped};
-use crate::{Language, Options, Output, OutputFile, orient};
+use crate::{Language, Options, Output, OutputFile};
 use gr_ir::Sources;
-use gr_machine::math::Frame;
+use gr_machine::math::{Frame, quaternion_of};
 use gr_robot::{RobotProgram, Target};
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -352,6 +352,6 @@ fn unit(q: &[f64; 4]) -> String {
 }
 
 fn pose(frame: &Frame) -> String {
-    format!("[{},{}]", list(&frame.position, 4), unit(&orient::quaternion(&frame.turn)))
+    format!("[{},{}]", list(&frame.position, 4), unit(&quaternion_of(&frame.turn)))
 }
 

@@ -6,7 +6,7 @@ use crate::orient;
 use crate::posture::Posture;
 use crate::{Options, Output};
 use gr_ir::{Source, Sources};
-use gr_machine::math::{about, add, cross, dot, norm, rotate, scale, sub};
+use gr_machine::math::{about, add, cross, dot, norm, quaternion_of, rotate, scale, sub};
 use gr_machine::{Chain, Kinematics, Machine, Signal};
 use gr_robot::{Action, MAX_JOINTS, RobotProgram, Target, Zone};
 use gr_text::{Code, Diagnostic, FileId, Findings, Span, code};
@@ -274,7 +274,7 @@ impl<'p> Cx<'p> {
         let tool = self.program.tools.get(self.tool).map(|t| t.frame).unwrap_or_default();
         let frame = self.program.frames.get(self.frame).map(|f| f.frame).unwrap_or_default();
         let seen = frame.inverse().then(&flange.then(&tool));
-        (moved.position, moved.quaternion) = (seen.position, orient::quaternion(&seen.turn));
+        (moved.position, moved.quaternion) = (seen.position, quaternion_of(&seen.turn));
         Some(moved)
     }
 

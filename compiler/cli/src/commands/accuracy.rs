@@ -109,8 +109,8 @@ fn predict(
     let process = unit.exchange.then(|| crate::exchange::process(unit).ok().map(|(p, _, _)| p)).flatten();
     let mut operations = Operations::new(&motion.program);
     cutting(&mut operations, args, unit, motion, process.as_ref());
-    let tolerance = args.tolerance.or(process.as_ref().and_then(|p| p.workpieces.iter().find_map(|w| w.tolerance)));
-    operations.list.iter_mut().for_each(|o| o.tolerance = o.tolerance.or(tolerance));
+    let global = process.as_ref().and_then(|p| p.workpieces.iter().find_map(|w| w.tolerance)).filter(|t| *t > 0.0);
+    operations.list.iter_mut().for_each(|o| o.tolerance = args.tolerance.or(o.tolerance).or(global));
     let top = (FileId(0), Span::default());
     let say = |code, args: &[String]| Diagnostic::new(code, top.0, top.1, args);
     let wanted = args.material.clone().or_else(|| process.as_ref().and_then(|p| p.workpieces.iter().map(|w| w.material.clone()).find(|m| !m.is_empty())));
@@ -136,7 +136,9 @@ fn predict(
     let options = gr_robot::Options { name: unit.name(), ..gr_robot::Options::default() };
     let mut planned_on = machine.clone();
     if let Some(part) = part {
-        (planned_on.cell.table, planned_on.cell.part) = (Frame::IDENTITY, part);
+        // Put down there, turned as the machine file has it.
+        let turn = machine.cell.part_in_base().turn;
+        (planned_on.cell.table, planned_on.cell.part) = (Frame::IDENTITY, Frame { turn, ..part });
     }
     tool_points(&mut found, &mut planned_on, &operations, &say);
     let planned = gr_robot::plan(&motion.program, &planned_on, &texts, &options)?;
@@ -161,7 +163,7 @@ fn predict(
 }
 
 /// A tool that the machine file does not have is looked at as if its point were on the flange.
-fn tool_points(
+pub fn tool_points(
     found: &mut Vec<Diagnostic>,
     machine: &mut Machine,
     operations: &Operations,
@@ -227,20 +229,11 @@ fn um(mm: f64) -> String {
 }
 
 fn judge(found: &mut Vec<Diagnostic>, row: &Row, material: Option<&Material>, motion: &Motion) {
-    let Some(worst) = row.worst else { return };
-    let (file, span) = place(motion, worst.source);
-    let sum = worst.errors.sum();
-    if let Some(limit) = row.operation.tolerance
-        && sum > limit
-    {
-        // As many digits as show that it is more.
-        let close = um(sum) == um(limit);
-        let show = |v: f64| if close { format!("{:.3}", v * 1e3) } else { um(v) };
-        let args = [show(sum), row.operation.name.clone(), show(limit)];
-        let mut d = Diagnostic::new(code::ACCURACY_OVER_TOLERANCE, file, span, &args);
-        d.notes.push(format!("typical (root of squares): {} µm", um(worst.errors.root_of_squares())));
-        found.push(d);
+    let Some(worst) = &row.worst else { return };
+    if let Some(limit) = row.operation.tolerance {
+        over(found, row, limit, motion);
     }
+    let (file, span) = place(motion, worst.source);
     if let (Some((least, most)), Some(m)) = (row.chip, material)
         && (least < m.range.0 || most > m.range.1)
     {
@@ -248,6 +241,44 @@ fn judge(found: &mut Vec<Diagnostic>, row: &Row, material: Option<&Material>, mo
         let args = [row.operation.name.clone(), format!("{chip:.4}"), m.range.0.to_string(), m.range.1.to_string()];
         found.push(Diagnostic::new(code::ACCURACY_CHIP_THICKNESS, file, span, &args));
     }
+}
+
+/// So many stretches of one operation are told one by one.
+const STRETCHES: usize = 10;
+
+/// Every stretch that is over the tolerance, at its worst line; of many the worst.
+fn over(found: &mut Vec<Diagnostic>, row: &Row, limit: f64, motion: &Motion) {
+    let mut told: Vec<usize> = (0..row.over.len()).collect();
+    told.sort_by(|a, b| row.over[*b].sum.total_cmp(&row.over[*a].sum));
+    told.truncate(STRETCHES);
+    told.sort_unstable();
+    for (n, i) in told.iter().enumerate() {
+        let s = &row.over[*i];
+        let (file, span) = place(motion, s.worst);
+        // As many digits as show that it is more.
+        let close = um(s.sum) == um(limit);
+        let show = |v: f64| if close { format!("{:.3}", v * 1e3) } else { um(v) };
+        let args = [show(s.sum), row.operation.name.clone(), show(limit)];
+        let mut d = Diagnostic::new(code::ACCURACY_OVER_TOLERANCE, file, span, &args);
+        if s.first.line != s.last.line {
+            d.notes.push(format!("over the tolerance from line {} to line {}", line_of(motion, s.first), line_of(motion, s.last)));
+        }
+        d.notes.push(format!("typical (root of squares): {} µm", um(s.rss)));
+        if let (Some(w), true) = (&row.worst, row.worst.as_ref().is_some_and(|w| w.source == s.worst)) {
+            d.notes.extend(most_of_it(&w.causes));
+        }
+        let more = row.over.len() - told.len();
+        if more > 0 && n + 1 == told.len() {
+            d.notes.push(format!("{more} more stretches of {} are over; these are the worst", row.operation.name));
+        }
+        found.push(d);
+    }
+}
+
+/// What makes most of an error, in words.
+fn most_of_it(causes: &[(String, f64)]) -> Option<String> {
+    let list: Vec<String> = causes.iter().map(|(name, v)| format!("{name} {}", um(*v))).collect();
+    (!list.is_empty()).then(|| format!("most of it, each alone: {} µm", list.join(", ")))
 }
 
 /// How each operation cuts: the file's word, then the tool table's, then the options'.
@@ -261,6 +292,7 @@ fn cutting(operations: &mut Operations, args: &AccuracyArgs, unit: &Unit, motion
     for o in &mut operations.list {
         let step = steps.iter().find(|s| o.workingstep != 0 && i32::try_from(s.origin.id) == Ok(o.workingstep));
         let own = step.map_or(CutData::default(), |s| of_step(s));
+        o.tolerance = step.and_then(|s| s.feature.tolerance);
         let row = tools.iter().find(|t| i64::from(t.number) == i64::from(o.tool) && t.diameter > 0.0);
         let table = CutData { diameter: row.map(|t| t.diameter), ..CutData::default() };
         o.cut = own.or(table).or(said);
@@ -336,7 +368,7 @@ fn text(report: &Report, motion: &Motion, machine: &Machine, material: Option<&M
             .collect();
         let _ = writeln!(out, "{}", cells.join("  ").trim_end());
     }
-    let worst = report.rows.iter().filter_map(|r| r.worst.map(|w| (w, r))).max_by(|a, b| a.0.errors.sum().total_cmp(&b.0.errors.sum()));
+    let worst = report.rows.iter().filter_map(|r| r.worst.as_ref().map(|w| (w, r))).max_by(|a, b| a.0.errors.sum().total_cmp(&b.0.errors.sum()));
     if let Some((w, r)) = worst.filter(|(w, _)| known(&w.errors)) {
         let axis = |i: usize| {
             let sum = w.errors.kinematic.map_or(0.0, |s| s.worst[i])
@@ -355,6 +387,9 @@ fn text(report: &Report, motion: &Motion, machine: &Machine, material: Option<&M
             axis(1),
             axis(2)
         );
+        if let Some(text) = most_of_it(&w.causes) {
+            let _ = writeln!(out, "{text}");
+        }
     }
     let _ = writeln!(out, "{RULES}");
     if report.rows.iter().any(|r| r.most[2].is_some()) {
@@ -371,7 +406,7 @@ fn as_json(report: &Report, motion: &Motion, machine: &Machine, material: Option
         .rows
         .iter()
         .map(|r| {
-            let worst = r.worst.map(|w| {
+            let worst = r.worst.as_ref().map(|w| {
                 let spread = |s: gr_accuracy::Spread| json!({ "worst": s.worst, "rss": s.rss, "longest": s.longest, "typical": s.typical });
                 json!({
                     "file": motion.sources.get(w.source.file).map(|f| f.name.clone()),
@@ -382,11 +417,13 @@ fn as_json(report: &Report, motion: &Motion, machine: &Machine, material: Option
                     "elastic": w.errors.elastic,
                     "sum": known(&w.errors).then(|| w.errors.sum()),
                     "rss": known(&w.errors).then(|| w.errors.root_of_squares()),
+                    "causes": w.causes.iter().map(|(name, v)| json!({ "name": name, "moves": v })).collect::<Vec<_>>(),
                 })
             });
+            let over: Vec<_> = r.over.iter().map(|s| json!({ "from": s.first.line + 1, "to": s.last.line + 1, "line": s.worst.line + 1, "sum": s.sum, "rss": s.rss })).collect();
             json!({
                 "operation": r.operation.name, "tool": r.operation.tool, "places": r.places,
-                "tolerance": r.operation.tolerance, "most": r.most, "worst": worst,
+                "tolerance": r.operation.tolerance, "most": r.most, "worst": worst, "over": over,
             })
         })
         .collect();

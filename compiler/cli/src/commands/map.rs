@@ -1,9 +1,11 @@
 //! `gcc-robot map --machine usp/2ups-prp --quantity kinematic-x --plane z=0 -o map.png`
 
 use std::fmt::Write as _;
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use gr_accuracy::map::{self, Map, Plane, Probe, Quantity, Request};
+use gr_accuracy::outline::outline;
 use gr_accuracy::picture::Picture;
 use gr_accuracy::{Budget, BudgetOptions, closed_form};
 use gr_machine::{Chain, Machine};
@@ -96,20 +98,21 @@ fn area(global: &Global, args: &MapArgs, machine: &Machine, plane: Plane, budget
             format!("one + or - for each of the {} joints", machine.joints.len()),
         ))?),
     };
-    let probe = Probe::downward(machine);
-    let size = match (&machine.chain, args.reference) {
-        // The grid of the thesis' program: 5 mm, rounded to whole steps.
-        (Chain::TwoLegs(_), Some(_)) => {
-            let e = probe.extent();
-            let steps = |i: usize| libm_round((e[i].1 - e[i].0) / 5.0);
-            (steps(0) + 1, steps(1) + steps(1) % 2 + 1)
-        }
-        _ => (args.resolution as usize, args.resolution as usize),
+    let heeds = |option: &str, given: bool, fits: bool, whom: &str| {
+        if given && !fits { Err((option.to_string(), format!("it is for {whom}, not for {}", args.quantity))) } else { Ok(()) }
     };
+    let by_joints = matches!(quantity, Quantity::Kinematic(_));
+    let by_force = matches!(quantity, Quantity::Elastic(_) | Quantity::Total);
+    let by_grade = matches!(quantity, Quantity::Geometric(_) | Quantity::Total);
+    heeds("--signs", args.signs.is_some(), by_joints, "errors by the joints")?;
+    heeds("--force", args.force.is_some(), by_force, "deflections and the total")?;
+    heeds("--it", args.grade.is_some(), by_grade, "errors by the geometry and the total")?;
+    let probe = Probe::downward(machine);
+    let size = size(&probe, machine, args, 400)?;
     let request = Request { quantity, plane, size, window: None, force, signs, deviations: None };
     let progress = Progress::new(global.quiet, format!("map of {}", machine.id));
-    if !closed_form(machine) {
-        progress.tell(|| format!("map of {}: {} places by search, this takes a while", machine.id, size.0 * size.1));
+    if !closed_form(machine) && !global.quiet {
+        estimate(&probe, budget, &request);
     }
     let tell = std::sync::Mutex::new(&progress);
     let map = map::map(&probe, budget, &request, &|done, of| {
@@ -117,7 +120,7 @@ fn area(global: &Global, args: &MapArgs, machine: &Machine, plane: Plane, budget
             p.tell(|| format!("map of {}: row {done} of {of}", machine.id));
         }
     });
-    let title = format!("{}  {}  {}={} mm", machine.id, args.quantity, ["x", "y", "z"][plane.axis], plane.at);
+    let title = format!("{}: {}, {} = {} mm", machine.id, quantity.words(), ["X", "Y", "Z"][plane.axis], plane.at);
     let mut text = told(&map, machine);
     if quantity == Quantity::Workspace && closed_form(machine) {
         progress.tell(|| format!("volume of {}", machine.id));
@@ -134,8 +137,37 @@ fn area(global: &Global, args: &MapArgs, machine: &Machine, plane: Plane, budget
     Ok((text, files(&args.output, &picture, || map.csv())?))
 }
 
-fn libm_round(v: f64) -> usize {
-    (v + 0.5).max(2.0) as usize
+/// Nodes along each side.
+fn size(probe: &Probe<'_>, machine: &Machine, args: &MapArgs, usual: usize) -> Result<(usize, usize), Refused> {
+    match (&machine.chain, args.reference, args.resolution) {
+        (Chain::TwoLegs(_), Some(_), Some(_)) => {
+            Err(("--resolution".into(), "the grid of the publication is 5 mm; leave out `--reference` or this".into()))
+        }
+        // The grid of the thesis' program: 5 mm, rounded to whole steps.
+        (Chain::TwoLegs(_), Some(_), None) => {
+            let e = probe.extent();
+            let steps = |i: usize| ((e[i].1 - e[i].0) / 5.0 + 0.5).max(2.0) as usize;
+            Ok((steps(0) + 1, steps(1) + steps(1) % 2 + 1))
+        }
+        (_, _, given) => {
+            let n = given.map_or(usual, |n| n as usize);
+            Ok((n, n))
+        }
+    }
+}
+
+/// Says how long a map by search takes, from some places of it.
+fn estimate(probe: &Probe<'_>, budget: &Budget, request: &Request) {
+    const SOME: usize = 64;
+    let start = std::time::Instant::now();
+    map::sample(probe, budget, request, SOME);
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let places = request.size.0 * request.size.1;
+    let seconds = start.elapsed().as_secs_f64() / SOME as f64 * places as f64 / cores as f64;
+    if seconds >= 2.0 {
+        // Whoever closed standard error does not want to know.
+        let _ = writeln!(std::io::stderr(), "{places} places by numerical search: about {seconds:.0} s");
+    }
 }
 
 fn signs(text: &str, count: usize) -> Option<Vec<f64>> {
@@ -152,7 +184,10 @@ fn signs(text: &str, count: usize) -> Option<Vec<f64>> {
 fn told(map: &Map, machine: &Machine) -> String {
     let (a, b) = map.plane.axes();
     let name = |i: usize| ["X", "Y", "Z"][i];
-    let unit = map.quantity.unit();
+    let unit = match map.quantity.unit() {
+        "" => String::new(),
+        unit => format!(" {unit}"),
+    };
     let mut out = format!("{}: {} in the plane {} = {} mm\n", machine.id, map.quantity.name(), name(map.plane.axis), map.plane.at);
     let Some(s) = map.summary() else { return out };
     let step = map.step();
@@ -161,29 +196,60 @@ fn told(map: &Map, machine: &Machine) -> String {
     let _ = writeln!(out, "reach {} {:.1} to {:.1}, {} {:.1} to {:.1} mm", name(a), x.0, x.1, name(b), y.0, y.1);
     if map.quantity != Quantity::Workspace {
         let at = |p: [f64; 2]| format!("{} {:.1} {} {:.1}", name(a), p[0], name(b), p[1]);
-        let _ = writeln!(out, "least {:.4} {unit} at {}", s.least.0, at(s.least.1));
-        let _ = writeln!(out, "greatest {:.4} {unit} at {}", s.greatest.0, at(s.greatest.1));
-        let _ = writeln!(out, "mean {:.4} {unit}", s.mean);
+        let _ = writeln!(out, "least {:.4}{unit} at {}", s.least.0, at(s.least.1));
+        let _ = writeln!(out, "greatest {:.4}{unit} at {}", s.greatest.0, at(s.greatest.1));
+        let _ = writeln!(out, "mean {:.4}{unit}", s.mean);
+    }
+    for line in outline(map) {
+        let points: Vec<String> = line.iter().map(|[x, y]| format!("{x:.1} {y:.1}")).collect();
+        let _ = writeln!(out, "outline {} {}: {}", name(a), name(b), points.join(", "));
     }
     out
 }
 
+/// One row of a bar chart: its name, and a number for each column.
+type Bar = (String, Vec<f64>);
+
+/// Mean sensitivities, the greatest first.
 fn bars(machine: &Machine, plane: Plane, args: &MapArgs) -> Result<Made, Refused> {
-    let probe = Probe::downward(machine);
-    let side = (args.resolution as usize).min(120);
-    let all = map::mean_sensitivity(&probe, plane, (side, side));
-    let mut text = format!("{}: mean movement of the tool point per mm or rad of each number of the geometry, mm\n", machine.id);
-    let _ = writeln!(text, "{:<20}{:>12}{:>12}{:>12}{:>12}", "", "X", "Y", "Z", "length");
-    for (name, [x, y, z, length]) in &all {
-        let _ = writeln!(text, "{name:<20}{x:>12.5}{y:>12.5}{z:>12.5}{length:>12.5}");
+    if args.signs.is_some() || args.force.is_some() || args.grade.is_some() {
+        return Err(("--quantity sensitivity".into(), "it goes by the geometry alone: no `--signs`, `--force` or `--it`".into()));
     }
-    let rows: Vec<(String, f64)> = all.iter().map(|(n, v)| (n.clone(), v[3])).collect();
-    let title = format!("{}  sensitivity  {}={} mm", machine.id, ["x", "y", "z"][plane.axis], plane.at);
-    let picture = Picture::bars(&rows, &title, "mm per mm or rad");
+    let probe = Probe::downward(machine);
+    let size = size(&probe, machine, args, 120)?;
+    let published = args.reference.and_then(|_| map::mean_sensitivity_usp2009(&probe, plane, size));
+    let (columns, what, mut all): (&[&str], &str, Vec<Bar>) = match published {
+        Some(list) => (
+            &["yaw rad/mm", "arm mm/mm"],
+            "mean change of yaw and arm length per mm of each length (Gojtan 2009, eq. 7.5)",
+            list.into_iter().map(|(n, v)| (n, v.to_vec())).collect(),
+        ),
+        None => (
+            &["X", "Y", "Z", "length"],
+            "mean movement of the tool point per mm or rad of each number of the geometry, mm",
+            map::mean_sensitivity(&probe, plane, size).into_iter().map(|(n, v)| (n, v.to_vec())).collect(),
+        ),
+    };
+    let last = |b: &Bar| b.1.last().copied().unwrap_or(0.0);
+    // Rounding must not decide the order of what a symmetric machine has twice.
+    let rounded = |b: &Bar| (last(b) * 1e9).round();
+    all.sort_by(|a, b| rounded(b).total_cmp(&rounded(a)));
+    let mut text = format!("{}: {what}\n{:<20}", machine.id, "");
+    columns.iter().for_each(|c| text += &format!("{c:>14}"));
+    for (name, values) in &all {
+        let _ = write!(text, "\n{name:<20}");
+        values.iter().for_each(|v| text += &format!("{v:>14.7}"));
+    }
+    text.push('\n');
+    let rows: Vec<(String, f64)> = all.iter().map(|b| (b.0.clone(), last(b))).collect();
+    let title = format!("{}: mean sensitivity, {} = {} mm", machine.id, ["X", "Y", "Z"][plane.axis], plane.at);
+    let unit = if columns.len() == 2 { "arm, mm per mm" } else { "tool point, mm per mm or rad" };
+    let picture = Picture::bars(&rows, &title, unit);
     let csv = || {
-        let mut out = String::from("parameter,x,y,z,length\n");
-        for (name, v) in &all {
-            let _ = writeln!(out, "{name},{},{},{},{}", v[0], v[1], v[2], v[3]);
+        let mut out = format!("parameter,{}\n", columns.join(",").to_lowercase());
+        for (name, values) in &all {
+            let list: Vec<String> = values.iter().map(f64::to_string).collect();
+            let _ = writeln!(out, "{name},{}", list.join(","));
         }
         out
     };

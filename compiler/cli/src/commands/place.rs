@@ -3,23 +3,28 @@
 use std::path::Path;
 
 use gr_accuracy::map::Probe;
-use gr_accuracy::place::{Aim, place, rectangle};
-use gr_accuracy::{Budget, BudgetOptions};
+use gr_accuracy::place::{Aim, Part, place, rectangle};
+use gr_accuracy::report::Operations;
+use gr_accuracy::{Budget, BudgetOptions, compensate};
+use gr_ir::geometry;
 use gr_machine::Machine;
-use gr_text::code;
+use gr_machine::math::{Frame, add, norm, rotate, scale, sub};
+use gr_text::{Diagnostic, FileId, Span, code};
 use serde_json::json;
 
-use super::accuracy::referenced;
-use super::check::show;
+use super::accuracy::{referenced, tool_points};
+use super::check::{Checked, show};
 use crate::exit::Exit;
 use crate::options::{Global, LintArgs, PlaceAim, PlaceArgs, TableFormat};
-use crate::pipeline::{load, motion};
+use crate::pipeline::{Motion, load, motion};
 use crate::progress::Progress;
 use crate::setup::station;
 use crate::sources::Sources;
 
-/// At most so many points of a path are looked at; the corners of its box are always among them.
-const POINTS: usize = 400;
+/// The path is looked at this often, mm: reach is not convex, so the ends of a move don't speak for what lies between.
+const APART: f64 = 5.0;
+/// Points nearer to each other than this are one, mm.
+const SAME: f64 = 0.5;
 
 pub fn run(global: &Global, args: &PlaceArgs) -> Exit {
     let mut renderer = global.renderer(true);
@@ -49,19 +54,24 @@ pub fn run(global: &Global, args: &PlaceArgs) -> Exit {
             return if checked.unreadable { Exit::Io } else { Exit::Findings };
         }
     };
-    let points = path(&motion.program);
-    let probe = Probe::downward(&machine);
+    let turn = machine.cell.part_in_base().turn;
+    let parts = parts(&motion.program, &machine);
     let aim = if args.aim == PlaceAim::Error { Aim::Error } else { Aim::Margin };
-    let found = place(&probe, &budget, &points, aim, &|done, of| progress.tell(|| format!("places: {done} of {of} layers")));
-    drop(progress);
+    let found = place(&parts, &budget, aim, &|done, of| progress.tell(|| format!("places: {done} of {of} layers")));
     let Some(found) = found else {
+        drop(progress);
         return super::refuse(global, file, code::PLACE_DOES_NOT_FIT, &[machine.id.clone()]);
     };
     let [x, y, z] = found.position.map(|v| (v * 1e3).round() / 1e3 + 0.0);
+    let faults = refused(&motion, &machine, Frame { turn, position: [x, y, z] });
+    drop(progress);
+    let whole = faults.is_empty();
+    show(&mut renderer, &Checked { sources: motion.sources, found: faults, more: 0, unreadable: false });
+    renderer.finish(false);
     let error = found.error.map(|e| e * 1e3);
-    super::print(&match args.format {
+    let printed = super::print(&match args.format {
         TableFormat::Json => {
-            format!("{:#}\n", json!({ "machine": machine.id, "position": [x, y, z], "margin": found.margin, "error_um": error }))
+            format!("{:#}\n", json!({ "machine": machine.id, "position": [x, y, z], "margin": found.margin, "error_um": error, "whole_program": whole }))
         }
         TableFormat::Csv => {
             format!("x mm,y mm,z mm,margin mm,error um\n{x},{y},{z},{:.3},{}\n", found.margin, error.map_or(String::new(), |e| format!("{e:.3}")))
@@ -71,33 +81,72 @@ pub fn run(global: &Global, args: &PlaceArgs) -> Exit {
                 Some(e) => format!("largest error of the path there: {e:.1} µm (kinematic + geometric, longest of each)\n"),
                 None => "its machine file has no accuracy data: only reach was looked at\n".to_string(),
             };
+            let whole = if whole { "every move of the program can be made there, rapids too\n" } else { "not every move of the program can be made there\n" };
             format!(
-                "part's origin at X {x} Y {y} Z {z} mm in the base of {} (--part {x},{y},{z})\nfree to move {:.1} mm any way along X, Y and Z\n{error}",
+                "part's origin at X {x} Y {y} Z {z} mm in the base of {} (--part {x},{y},{z})\nfree to move {:.1} mm any way along X, Y and Z\n{error}{whole}",
                 machine.id, found.margin
             )
         }
-    })
+    });
+    if whole { printed } else { Exit::Findings }
 }
 
-/// Ends of the moves, thinned out, and the corners of the box they lie in.
-fn path(program: &gr_ir::Program) -> Vec<[f64; 3]> {
-    let mut all = Vec::new();
-    let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+/// What keeps the program from being made there: its plan is the one that a build would take.
+fn refused(motion: &Motion, machine: &Machine, part: Frame) -> Vec<Diagnostic> {
+    let mut put = machine.clone();
+    (put.cell.table, put.cell.part) = (Frame::IDENTITY, part);
+    let operations = Operations::new(&motion.program);
+    let say = |code, args: &[String]| Diagnostic::new(code, FileId(0), Span::default(), args);
+    tool_points(&mut Vec::new(), &mut put, &operations, &say);
+    let texts = gr_ir::Texts::new(motion.sources.iter().map(|(id, f)| (id, &*f.text)));
+    gr_robot::plan(&motion.program, &put, &texts, &gr_robot::Options::default()).err().unwrap_or_default()
+}
+
+/// The path of each tool, from the part's origin in the directions of the base.
+fn parts<'m>(program: &gr_ir::Program, machine: &'m Machine) -> Vec<Part<'m>> {
+    let turn = machine.cell.part_in_base().turn;
+    let mut out: Vec<(Frame, Vec<[f64; 3]>)> = Vec::new();
+    let mut known = std::collections::HashSet::new();
     let mut cursor = program.cursor();
     while let Some(view) = cursor.next() {
-        if view.op.feeds() {
-            let p = view.end.xyz();
-            (0..3).for_each(|i| (low[i], high[i]) = (low[i].min(p[i]), high[i].max(p[i])));
-            all.push(p);
+        if !view.op.feeds() {
+            continue;
         }
+        let tool = tool(machine, view.state);
+        let n = out.iter().position(|(t, _)| *t == tool).unwrap_or_else(|| {
+            out.push((tool, Vec::new()));
+            out.len() - 1
+        });
+        let work = compensate::work_shift(view.state);
+        let mut push = |p: [f64; 3]| {
+            let p = rotate(&turn, work.apply(p));
+            if known.insert((n, p.map(|v| (v / SAME).round() as i64))) {
+                out[n].1.push(p);
+            }
+        };
+        let mut from = view.start.xyz();
+        push(from);
+        geometry::flatten(&view.op, view.start, view.end, SAME / 10.0, |axes| {
+            let to = [axes[0], axes[1], axes[2]];
+            let way = sub(to, from);
+            let pieces = (norm(way) / APART).ceil().clamp(1.0, 1e5) as usize;
+            (1..=pieces).for_each(|i| push(add(from, scale(way, i as f64 / pieces as f64))));
+            from = to;
+        });
     }
-    if all.is_empty() {
-        return vec![[0.0; 3]];
+    if out.is_empty() {
+        out.push((Frame::IDENTITY, vec![[0.0; 3]]));
     }
-    let step = all.len().div_ceil(POINTS);
-    let mut out: Vec<[f64; 3]> = all.into_iter().step_by(step).collect();
-    out.extend((0..8).map(|c| [0, 1, 2].map(|i| if c >> i & 1 == 0 { low[i] } else { high[i] })));
-    out
+    let part = |(tool, points)| Part { probe: Probe::downward(machine).with_tool(tool, &turn), points };
+    out.into_iter().map(part).collect()
+}
+
+/// The tool point on the flange: the machine file's, else as long as the program's tool offset.
+fn tool(machine: &Machine, state: &gr_ir::State) -> Frame {
+    let number = u32::try_from(state.tool).unwrap_or(0);
+    let known = machine.cell.tools.contains_key(&number) || machine.kind != gr_machine::Kind::Robot;
+    let length = if known { 0.0 } else { state.tool_offset[2] };
+    machine.cell.tool_frame(number).then(&Frame::shift([0.0, 0.0, length]))
 }
 
 /// mm.

@@ -10,6 +10,29 @@ use crate::process::*;
 /// More copies of one feature than this are a mistake.
 const MOST_COPIES: usize = 100_000;
 
+/// The least of the plus-or-minus tolerances of the lengths that a feature is made of: its diameter, the sides of its
+/// profile, its radii. Its workpiece, its operations and other features are none of its lengths.
+fn tolerance(feature: Node<'_>) -> Option<f64> {
+    let mut least: Option<f64> = None;
+    let mut seen = std::collections::BTreeSet::from([feature.index()]);
+    let mut open = vec![feature];
+    while let Some(node) = open.pop() {
+        if node.is_a("plus_minus_value") {
+            let ends = ["upper_limit", "lower_limit"].map(|n| node.real(n).map(f64::abs));
+            for t in ends.into_iter().flatten().filter(|t| *t > 0.0) {
+                least = Some(least.map_or(t, |l| l.min(t)));
+            }
+        }
+        let foreign = |n: &Node<'_>| n.is_a("workpiece") || n.is_a("machining_operation") || n.is_a("manufacturing_feature");
+        for next in node.references().filter(|n| !foreign(n)) {
+            if seen.len() < 10_000 && seen.insert(next.index()) {
+                open.push(next);
+            }
+        }
+    }
+    least
+}
+
 impl<'m> Reader<'m> {
     /// A feature in the frame of its setup. `operation` chooses among the elements of a compound feature.
     pub fn feature(&mut self, node: Node<'m>, setup: Option<&Setup>, operation: u64) -> Option<Feature> {
@@ -45,7 +68,8 @@ impl<'m> Reader<'m> {
         let frame = copies.first().copied().unwrap_or(placement);
         let shape = self.shape(node, operation, &placement, setup)?;
         let (keyword, name) = (node.keyword().to_string(), node.string("its_id").into_owned());
-        Some(Feature { origin: origin(node), keyword, name, frame, placement, depth, shape, copies })
+        let tolerance = tolerance(node);
+        Some(Feature { origin: origin(node), keyword, name, frame, placement, depth, shape, copies, tolerance })
     }
 
     /// Frames that the feature's own placement is relative to: the workpiece's, or those of the compound
