@@ -35,6 +35,26 @@ fn report_of_a_part() {
     assert_eq!(String::from_utf8(csv.stdout).unwrap().lines().count(), 4);
 }
 
+/// STEP-NC: by workingstep, against the tolerance of the feature; a material that is in no table leaves the deflection out.
+#[test]
+fn report_of_a_step_nc_part() {
+    let o = run(&examples().join("stepnc"), &["accuracy", "case-study.p21", "--machine=usp/2ups-prp", "--part=700,-60,0", "--message-format=short"]);
+    insta::assert_snapshot!(whole(&o));
+    // A feature's own tolerance goes before the workpiece's, the option before both.
+    let text = std::fs::read_to_string(examples().join("stepnc/case-study.p21")).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("part.p21"), text.replace("PLUS_MINUS_VALUE(0.05,0.05,3)", "PLUS_MINUS_VALUE(0.056,0.07,3)")).unwrap();
+    let report = |more: &[&str]| {
+        let o = run(folder.path(), &[&["accuracy", "part.p21", "--machine=usp/2ups-prp", "--part=700,-60,0", "--format=json"], more].concat());
+        let v: serde_json::Value = serde_json::from_slice(&o.stdout).unwrap();
+        v["operations"].as_array().unwrap().clone()
+    };
+    let rows = report(&[]);
+    assert!(rows.iter().any(|r| r["tolerance"] == 0.056), "{rows:?}");
+    assert!(rows.iter().all(|r| (r["worst"]["sum"].as_f64() > r["tolerance"].as_f64()) != r["over"].as_array().unwrap().is_empty()));
+    assert!(report(&["--tolerance=0.08"]).iter().all(|r| r["tolerance"] == 0.08 && r["over"].as_array().unwrap().is_empty()));
+}
+
 /// A machine without accuracy data: said, and nothing made up.
 #[test]
 fn no_data() {
@@ -61,6 +81,23 @@ fn maps() {
     insta::assert_snapshot!("map_template", whole(&map(&["--machine=comau/tricept806", "--message-format=short"])));
     insta::assert_snapshot!("map_of_an_arm", whole(&map(&["--machine=abb/irb2400", "--quantity=condition", "--plane=z=800", "--resolution=40"])));
     insta::assert_snapshot!("map_sensitivity", whole(&map(&["--machine=usp/2ups-prp", "--quantity=sensitivity", "--resolution=60", "-os.svg"])));
+}
+
+/// Mean sensitivities as the thesis defines them, and options that fit no such map.
+#[test]
+fn sensitivities_of_the_publication_and_what_does_not_fit() {
+    let folder = tempfile::tempdir().unwrap();
+    let map = |args: &[&str]| run(folder.path(), &[&["map", "--machine=usp/2ups-prp", "--message-format=short"], args].concat());
+    insta::assert_snapshot!("map_sensitivity_usp2009", whole(&map(&["--quantity=sensitivity", "--reference=usp2009", "--plane=z=240"])));
+    let refused = [
+        map(&["--quantity=workspace", "--signs=+++"]),
+        map(&["--quantity=kinematic", "--force=1,0,0"]),
+        map(&["--quantity=condition", "--it=5"]),
+        map(&["--quantity=kinematic", "--reference=usp2009", "--resolution=50"]),
+        map(&["--quantity=sensitivity", "--signs=+++"]),
+        map(&["--quantity=sensitivity", "--resolution=10", "-obars.pdf"]),
+    ];
+    insta::assert_snapshot!("map_does_not_fit", refused.iter().map(whole).collect::<Vec<_>>().join("\n"));
 }
 
 /// A hole moved or a limit altered changes what comes out: no number is a special case.

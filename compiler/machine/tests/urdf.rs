@@ -77,8 +77,12 @@ fn urdf(chain: &Serial, tip: [f64; 3]) -> String {
 #[test]
 fn imported_arms_equal_their_urdf() {
     for (id, chain, _) in rows().into_iter().filter(|r| r.2) {
-        let turns = [[0.0, 1.5708, 0.0], [3.1415926, -1.570796, 0.0], [0.0; 3]];
-        let turn = turns[["kuka/kr16-2", "yaskawa/gp25", "staubli/rx160"].iter().position(|i| *i == id).unwrap()];
+        // Turns of flanges as the files round them.
+        let turn = match id.split('/').next().unwrap() {
+            "abb" | "kuka" => [0.0, 1.5708, 0.0],
+            "fanuc" | "yaskawa" => [3.1415926, -1.570796, 0.0],
+            _ => [0.0; 3],
+        };
         let import = import_urdf("test/arm", &urdf(&chain, turn)).unwrap();
         let machine = parse(FileId(0), &import.toml).unwrap_or_else(|e| panic!("{e:?}\n{}", import.toml));
         assert!(matches!(machine.chain, Chain::Opw(_)), "{id}: {:?}\n{}", import.notes, import.toml);

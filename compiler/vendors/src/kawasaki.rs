@@ -5,8 +5,9 @@
 use crate::name::{Names, Rule};
 use crate::number::{num, single};
 use crate::parts::Lines;
-use crate::walk::{Arms, Body, Cx, Op, Traits, Value, any_error, walk};
-use crate::{Language, Options, Output, OutputFile, orient};
+use crate::plain::{Plain, corner, joints, one_file, six};
+use crate::walk::{Arms, Cx, Traits};
+use crate::{Language, Options, Output, orient};
 use gr_ir::Sources;
 use gr_machine::math::Frame;
 use gr_robot::{RobotProgram, Target};
@@ -29,14 +30,9 @@ impl Language for Kawasaki {
     fn emit(&self, program: &RobotProgram, sources: &dyn Sources, options: &Options) -> Output {
         let mut names = Names::new(Rule { longest: 15, reserved: &["MAIN", "TOOL", "BASE"], upper: false });
         let name = names.give(&program.name.to_lowercase(), "p");
-        let mut w = Writer { out: Lines::new("  ", ";"), angles: [0.0; 3], set: [String::new(), String::new()] };
-        let mut out = walk(program, sources, options, &TRAITS, &mut w);
-        if !any_error(&out.findings) {
-            names.tell(&mut out, TRAITS.title);
-            let text = format!(".PROGRAM {name}()\r\n{}.END\r\n", w.out.text);
-            out.files = vec![OutputFile::new(format!("{name}.as"), text)];
-        }
-        out
+        let writer = Writer { out: Lines::new("  ", ";"), angles: [0.0; 3], set: [String::new(), String::new()] };
+        let file = format!("{name}.as");
+        one_file((program, sources, options), &TRAITS, &names, writer, file, |w| format!(".PROGRAM {name}()\r\n{}.END\r\n", w.out.text))
     }
 }
 
@@ -50,37 +46,21 @@ struct Writer {
 impl Writer {
     fn trans(&mut self, frame: &Frame, decimals: usize) -> String {
         self.angles = orient::zyz(&frame.turn, self.angles);
-        let (p, a) = (frame.position.map(|v| num(v, decimals)), self.angles.map(|v| num(v.to_degrees(), 5)));
-        format!("TRANS({},{},{},{},{},{})", p[0], p[1], p[2], a[0], a[1], a[2])
+        format!("TRANS({})", six(frame.position, decimals, self.angles))
     }
 
     fn place(&mut self, cx: &Cx, t: &Target) -> String {
         self.trans(&orient::frame(t.position, &t.quaternion), cx.decimals())
     }
 
-    fn put(&mut self, cx: &mut Cx, slot: usize, text: String) {
-        if self.set[slot] != text {
-            let remark = cx.remark.take();
-            self.out.line(cx, &text);
-            cx.remark = remark;
-            self.set[slot] = text;
-        }
-    }
-
     fn path(&mut self, cx: &mut Cx, speed: f64, zone: Option<f64>) {
-        self.put(cx, 0, format!("SPEED {} MM/S ALWAYS", single(speed)));
+        self.out.setting(cx, &mut self.set[0], format!("SPEED {} MM/S ALWAYS", single(speed)));
         // The least accuracy circle that is known to be taken stands for an exact point.
-        let r = zone.map_or(0.0, |r| libm::floor(r * 1000.0 + 1e-6) / 1000.0).max(0.001);
-        self.put(cx, 1, format!("ACCURACY {} ALWAYS", num(r, 3)));
+        let r = zone.map_or(0.0, corner).max(0.001);
+        self.out.setting(cx, &mut self.set[1], format!("ACCURACY {} ALWAYS", num(r, 3)));
     }
 
-    fn joint(&mut self, cx: &mut Cx, t: &Target, share: f64) {
-        self.put(cx, 0, format!("SPEED {} ALWAYS", num((share * 100.0).clamp(0.01, 100.0), 2)));
-        let values: Vec<String> = cx.degrees(t).iter().map(|v| num(*v, 5)).collect();
-        self.out.line(cx, &format!("JMOVE #[{}]", values.join(",")));
-    }
-
-    fn frame(&mut self, cx: &mut Cx, word: &str, frame: &Frame) {
+    fn set_frame(&mut self, cx: &mut Cx, word: &str, frame: &Frame) {
         self.angles = [0.0; 3];
         let text = self.trans(frame, 4);
         self.angles = [0.0; 3];
@@ -88,58 +68,48 @@ impl Writer {
     }
 }
 
-impl Body for Writer {
-    fn op(&mut self, cx: &mut Cx, op: Op) {
-        match op {
-            Op::Line(number, text) => self.out.remark(cx, &format!("{number}: {text}")),
-            Op::Comment(text) => self.out.remark(cx, text),
-            Op::Home(t) => self.joint(cx, t, 0.2),
-            Op::Joint { to, share, .. } => self.joint(cx, to, share),
-            Op::Linear { to, speed, zone } => {
-                self.path(cx, speed, zone);
-                let to = self.place(cx, to);
-                self.out.line(cx, &format!("LMOVE {to}"));
-            }
-            Op::Arc { via, to, speed, zone } => {
-                self.path(cx, speed, zone);
-                let (via, to) = (self.place(cx, via), self.place(cx, to));
-                self.out.line(cx, &format!("C1MOVE {via}"));
-                cx.remark = None;
-                self.out.line(cx, &format!("C2MOVE {to}"));
-            }
-            Op::Tool(i) => {
-                let frame = cx.program.tools[i].frame;
-                self.frame(cx, "TOOL", &frame);
-            }
-            Op::Frame(i) => {
-                let frame = cx.program.frames[i].frame;
-                self.frame(cx, "BASE", &frame);
-            }
-            Op::Set { name, value, word } => {
-                let n = cx.number(name, word);
-                match value {
-                    Value::Digital(on) => self.out.line(cx, &format!("SIGNAL {}{n}", if on { "" } else { "-" })),
-                    Value::Analog(_) | Value::Group(_) => cx.cannot("a number on outputs"),
-                }
-            }
-            Op::Call { name, value } => {
-                let name = cx.known(name, "routine").to_string();
-                self.out.line(cx, &format!("CALL {name}({})", value.map_or(String::new(), |v| num(v, 6))));
-            }
-            Op::Wait { name, on, timeout } => {
-                let n = cx.number(name, "wait");
-                if timeout.is_some() {
-                    cx.cannot("waiting for an input with a time limit");
-                }
-                self.out.line(cx, &format!("SWAIT {}{n}", if on { "" } else { "-" }));
-            }
-            Op::Dwell(s) => self.out.line(cx, &format!("TWAIT {}", num(s, 3))),
-            Op::Message(text) => {
-                let text = cx.ascii(text).replace('"', "'");
-                self.out.line(cx, &format!("PRINT \"{text}\""));
-            }
-            Op::Pause => self.out.line(cx, "PAUSE"),
-            Op::End => {}
-        }
+impl Plain for Writer {
+    const PAUSE: &'static str = "PAUSE";
+
+    fn out(&mut self) -> &mut Lines {
+        &mut self.out
+    }
+    fn joint(&mut self, cx: &mut Cx, to: &Target, share: f64) {
+        let speed = format!("SPEED {} ALWAYS", num((share * 100.0).clamp(0.01, 100.0), 2));
+        self.out.setting(cx, &mut self.set[0], speed);
+        self.out.line(cx, &format!("JMOVE #[{}]", joints(&cx.degrees(to))));
+    }
+    fn linear(&mut self, cx: &mut Cx, to: &Target, speed: f64, zone: Option<f64>) {
+        self.path(cx, speed, zone);
+        let to = self.place(cx, to);
+        self.out.line(cx, &format!("LMOVE {to}"));
+    }
+    fn arc(&mut self, cx: &mut Cx, via: &Target, to: &Target, speed: f64, zone: Option<f64>) {
+        self.path(cx, speed, zone);
+        let (via, to) = (self.place(cx, via), self.place(cx, to));
+        self.out.line(cx, &format!("C1MOVE {via}"));
+        cx.remark = None;
+        self.out.line(cx, &format!("C2MOVE {to}"));
+    }
+    fn tool(&mut self, cx: &mut Cx, _: usize, frame: &Frame) {
+        self.set_frame(cx, "TOOL", frame);
+    }
+    fn frame(&mut self, cx: &mut Cx, _: usize, frame: &Frame) {
+        self.set_frame(cx, "BASE", frame);
+    }
+    fn digital(number: u32, on: bool) -> String {
+        format!("SIGNAL {}{number}", if on { "" } else { "-" })
+    }
+    fn call(name: &str, value: Option<String>) -> String {
+        format!("CALL {name}({})", value.unwrap_or_default())
+    }
+    fn waits(number: u32, on: bool) -> String {
+        format!("SWAIT {}{number}", if on { "" } else { "-" })
+    }
+    fn dwell(seconds: f64) -> String {
+        format!("TWAIT {}", num(seconds, 3))
+    }
+    fn message(text: &str) -> Option<String> {
+        Some(format!("PRINT \"{}\"", text.replace('"', "'")))
     }
 }

@@ -23,6 +23,7 @@ mod number;
 mod orient;
 mod parts;
 mod pdl2;
+mod plain;
 mod posture;
 mod rapid;
 pub mod read;

@@ -6,8 +6,9 @@
 use crate::name::{Names, Rule};
 use crate::number::{num, single};
 use crate::parts::Lines;
-use crate::walk::{Arms, Body, Cx, Op, Traits, Value, any_error, walk};
-use crate::{Language, Options, Output, OutputFile, orient};
+use crate::plain::{Plain, corner, joints, one_file, six};
+use crate::walk::{Arms, Cx, Traits};
+use crate::{Language, Options, Output, orient};
 use gr_ir::Sources;
 use gr_machine::math::Frame;
 use gr_robot::{RobotProgram, Target};
@@ -31,14 +32,9 @@ impl Language for Melfa {
     fn emit(&self, program: &RobotProgram, sources: &dyn Sources, options: &Options) -> Output {
         let mut names = Names::new(Rule { longest: 12, reserved: &["END", "MOV", "MVS"], upper: true });
         let name = names.give(&program.name, "P");
-        let mut w = Writer { out: Lines::new("", "'"), data: String::new(), counts: [0; 2], angles: [0.0; 3], set: Default::default() };
-        let mut out = walk(program, sources, options, &TRAITS, &mut w);
-        if !any_error(&out.findings) {
-            names.tell(&mut out, TRAITS.title);
-            let text = format!("{}End\r\n{}", w.out.text, w.data);
-            out.files = vec![OutputFile::new(format!("{name}.prg"), text)];
-        }
-        out
+        let writer = Writer { out: Lines::new("", "'"), data: String::new(), counts: [0; 2], angles: [0.0; 3], set: Default::default() };
+        let file = format!("{name}.prg");
+        one_file((program, sources, options), &TRAITS, &names, writer, file, |w| format!("{}End\r\n{}", w.out.text, w.data))
     }
 }
 
@@ -55,8 +51,7 @@ struct Writer {
 impl Writer {
     fn place(&mut self, frame: &Frame, decimals: usize) -> String {
         self.angles = orient::fixed_xyz(&frame.turn, self.angles);
-        let (p, a) = (frame.position.map(|v| num(v, decimals)), self.angles.map(|v| num(v.to_degrees(), 5)));
-        format!("({},{},{},{},{},{})", p[0], p[1], p[2], a[0], a[1], a[2])
+        format!("({})", six(frame.position, decimals, self.angles))
     }
 
     fn point(&mut self, cx: &Cx, t: &Target) -> String {
@@ -69,35 +64,16 @@ impl Writer {
         name
     }
 
-    fn put(&mut self, cx: &mut Cx, slot: usize, text: String) {
-        if self.set[slot] != text {
-            let remark = cx.remark.take();
-            self.out.line(cx, &text);
-            cx.remark = remark;
-            self.set[slot] = text;
-        }
-    }
-
     fn path(&mut self, cx: &mut Cx, speed: f64, zone: Option<f64>) {
-        self.put(cx, 0, format!("Spd {}", single(speed)));
+        self.out.setting(cx, &mut self.set[0], format!("Spd {}", single(speed)));
         let text = zone.map_or("Cnt 0".into(), |r| {
-            let r = num(libm::floor(r * 1000.0 + 1e-6) / 1000.0, 3);
+            let r = num(corner(r), 3);
             format!("Cnt 1,{r},{r}")
         });
-        self.put(cx, 2, text);
+        self.out.setting(cx, &mut self.set[2], text);
     }
 
-    fn joint(&mut self, cx: &mut Cx, t: &Target, share: f64) {
-        self.counts[1] += 1;
-        let name = format!("J{}", self.counts[1]);
-        let values: Vec<String> = cx.degrees(t).iter().map(|v| num(*v, 5)).collect();
-        let _ = write!(self.data, "{name}=({})\r\n", values.join(","));
-        self.put(cx, 1, format!("JOvrd {}", num((share * 100.0).clamp(1.0, 100.0), 1)));
-        self.put(cx, 2, "Cnt 0".into());
-        self.out.line(cx, &format!("Mov {name}"));
-    }
-
-    fn frame(&mut self, cx: &mut Cx, word: &str, frame: &Frame) {
+    fn set_frame(&mut self, cx: &mut Cx, word: &str, frame: &Frame) {
         self.angles = [0.0; 3];
         let text = self.place(frame, 4);
         self.angles = [0.0; 3];
@@ -105,55 +81,48 @@ impl Writer {
     }
 }
 
-impl Body for Writer {
-    fn op(&mut self, cx: &mut Cx, op: Op) {
-        match op {
-            Op::Line(number, text) => self.out.remark(cx, &format!("{number}: {text}")),
-            Op::Comment(text) => self.out.remark(cx, text),
-            Op::Home(t) => self.joint(cx, t, 0.2),
-            Op::Joint { to, share, .. } => self.joint(cx, to, share),
-            Op::Linear { to, speed, zone } => {
-                self.path(cx, speed, zone);
-                let to = self.point(cx, to);
-                self.out.line(cx, &format!("Mvs {to}"));
-            }
-            Op::Arc { via, to, speed, zone } => {
-                self.path(cx, speed, zone);
-                let Some(from) = cx.before else { return };
-                let (from, via, to) = (self.point(cx, &from), self.point(cx, via), self.point(cx, to));
-                self.out.line(cx, &format!("Mvr {from},{via},{to}"));
-            }
-            Op::Tool(i) => {
-                let frame = cx.program.tools[i].frame;
-                self.frame(cx, "Tool", &frame);
-            }
-            Op::Frame(i) => {
-                // The controller's base is the robot seen from the work frame.
-                let frame = cx.program.frames[i].frame.inverse();
-                self.frame(cx, "Base", &frame);
-            }
-            Op::Set { name, value, word } => {
-                let n = cx.number(name, word);
-                match value {
-                    Value::Digital(on) => self.out.line(cx, &format!("M_Out({n})={}", u8::from(on))),
-                    Value::Analog(_) | Value::Group(_) => cx.cannot("a number on outputs"),
-                }
-            }
-            Op::Call { name, value } => {
-                let name = cx.known(name, "routine").to_string();
-                self.out.line(cx, &value.map_or(format!("CallP \"{name}\""), |v| format!("CallP \"{name}\",{}", num(v, 6))));
-            }
-            Op::Wait { name, on, timeout } => {
-                let n = cx.number(name, "wait");
-                if timeout.is_some() {
-                    cx.cannot("waiting for an input with a time limit");
-                }
-                self.out.line(cx, &format!("Wait M_In({n})={}", u8::from(on)));
-            }
-            Op::Dwell(s) => self.out.line(cx, &format!("Dly {}", num(s, 3))),
-            Op::Message(text) => self.out.remark(cx, text),
-            Op::Pause => self.out.line(cx, "Hlt"),
-            Op::End => {}
-        }
+impl Plain for Writer {
+    const PAUSE: &'static str = "Hlt";
+
+    fn out(&mut self) -> &mut Lines {
+        &mut self.out
+    }
+    fn joint(&mut self, cx: &mut Cx, to: &Target, share: f64) {
+        self.counts[1] += 1;
+        let name = format!("J{}", self.counts[1]);
+        let _ = write!(self.data, "{name}=({})\r\n", joints(&cx.degrees(to)));
+        self.out.setting(cx, &mut self.set[1], format!("JOvrd {}", num((share * 100.0).clamp(1.0, 100.0), 1)));
+        self.out.setting(cx, &mut self.set[2], "Cnt 0".into());
+        self.out.line(cx, &format!("Mov {name}"));
+    }
+    fn linear(&mut self, cx: &mut Cx, to: &Target, speed: f64, zone: Option<f64>) {
+        self.path(cx, speed, zone);
+        let to = self.point(cx, to);
+        self.out.line(cx, &format!("Mvs {to}"));
+    }
+    fn arc(&mut self, cx: &mut Cx, via: &Target, to: &Target, speed: f64, zone: Option<f64>) {
+        self.path(cx, speed, zone);
+        let Some(from) = cx.before else { return };
+        let (from, via, to) = (self.point(cx, &from), self.point(cx, via), self.point(cx, to));
+        self.out.line(cx, &format!("Mvr {from},{via},{to}"));
+    }
+    fn tool(&mut self, cx: &mut Cx, _: usize, frame: &Frame) {
+        self.set_frame(cx, "Tool", frame);
+    }
+    fn frame(&mut self, cx: &mut Cx, _: usize, frame: &Frame) {
+        // The controller's base is the robot seen from the work frame.
+        self.set_frame(cx, "Base", &frame.inverse());
+    }
+    fn digital(number: u32, on: bool) -> String {
+        format!("M_Out({number})={}", u8::from(on))
+    }
+    fn call(name: &str, value: Option<String>) -> String {
+        value.map_or(format!("CallP \"{name}\""), |v| format!("CallP \"{name}\",{v}"))
+    }
+    fn waits(number: u32, on: bool) -> String {
+        format!("Wait M_In({number})={}", u8::from(on))
+    }
+    fn dwell(seconds: f64) -> String {
+        format!("Dly {}", num(seconds, 3))
     }
 }

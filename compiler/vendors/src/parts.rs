@@ -84,6 +84,15 @@ impl Lines {
             cx.say(gr_text::code::VENDOR_PROGRAM_TOO_LONG, &args);
         }
     }
+    /// Appends what holds from here on, when it is another than before. A move's remark waits for the move.
+    pub(crate) fn setting(&mut self, cx: &mut crate::walk::Cx, before: &mut String, text: String) {
+        if *before != text {
+            let remark = cx.remark.take();
+            self.line(cx, &text);
+            cx.remark = remark;
+            *before = text;
+        }
+    }
     /// Appends remarks.
     pub(crate) fn remark(&mut self, cx: &mut crate::walk::Cx, text: &str) {
         let text = cx.ascii(text);

@@ -6,8 +6,9 @@
 use crate::name::{Names, Rule};
 use crate::number::{num, single};
 use crate::parts::Lines;
-use crate::walk::{Arms, Body, Cx, Op, Traits, Value, any_error, walk};
-use crate::{Language, Options, Output, OutputFile, orient};
+use crate::plain::{Plain, corner, joints, one_file, per_cent, six};
+use crate::walk::{Arms, Cx, Traits};
+use crate::{Language, Options, Output, orient};
 use gr_ir::Sources;
 use gr_machine::math::Frame;
 use gr_robot::{RobotProgram, Target};
@@ -30,14 +31,9 @@ impl Language for Pdl2 {
     fn emit(&self, program: &RobotProgram, sources: &dyn Sources, options: &Options) -> Output {
         let mut names = Names::new(Rule { longest: 32, reserved: &["PROGRAM", "BEGIN", "END", "VAR", "MOVE", "TO"], upper: false });
         let name = names.give(&program.name.to_lowercase(), "p");
-        let mut w = Writer { out: Lines::new("  ", "--"), angles: [0.0; 3], set: [String::new(), String::new(), String::new()] };
-        let mut out = walk(program, sources, options, &TRAITS, &mut w);
-        if !any_error(&out.findings) {
-            names.tell(&mut out, TRAITS.title);
-            let text = format!("PROGRAM {name}\r\nBEGIN\r\n{}END {name}\r\n", w.out.text);
-            out.files = vec![OutputFile::new(format!("{name}.pdl"), text)];
-        }
-        out
+        let writer = Writer { out: Lines::new("  ", "--"), angles: [0.0; 3], set: [String::new(), String::new(), String::new()] };
+        let file = format!("{name}.pdl");
+        one_file((program, sources, options), &TRAITS, &names, writer, file, |w| format!("PROGRAM {name}\r\nBEGIN\r\n{}END {name}\r\n", w.out.text))
     }
 }
 
@@ -51,8 +47,7 @@ struct Writer {
 impl Writer {
     fn pos(&mut self, frame: &Frame, decimals: usize, configuration: &str) -> String {
         self.angles = orient::zyz(&frame.turn, self.angles);
-        let (p, a) = (frame.position.map(|v| num(v, decimals)), self.angles.map(|v| num(v.to_degrees(), 5)));
-        format!("POS({},{},{},{},{},{},'{configuration}')", p[0], p[1], p[2], a[0], a[1], a[2])
+        format!("POS({},'{configuration}')", six(frame.position, decimals, self.angles))
     }
 
     fn place(&mut self, cx: &Cx, t: &Target) -> String {
@@ -62,34 +57,15 @@ impl Writer {
         self.pos(&orient::frame(t.position, &t.quaternion), cx.decimals(), &format!("{text}T1:0 T2:0 T3:0"))
     }
 
-    fn put(&mut self, cx: &mut Cx, slot: usize, text: String) {
-        if self.set[slot] != text {
-            let remark = cx.remark.take();
-            self.out.line(cx, &text);
-            cx.remark = remark;
-            self.set[slot] = text;
-        }
+    /// Speed and fly distance; what the move says before and behind it when it flies by.
+    fn path(&mut self, cx: &mut Cx, speed: f64, zone: Option<f64>) -> [&'static str; 2] {
+        self.out.setting(cx, &mut self.set[0], format!("$LIN_SPD := {}", single(speed / 1000.0)));
+        let Some(r) = zone else { return ["", ""] };
+        self.out.setting(cx, &mut self.set[1], format!("$FLY_DIST := {}", num(corner(r), 3)));
+        ["FLY", " ADVANCE"]
     }
 
-    /// Speed and fly distance; whether the move flies by.
-    fn path(&mut self, cx: &mut Cx, speed: f64, zone: Option<f64>) -> bool {
-        self.put(cx, 0, format!("$LIN_SPD := {}", single(speed / 1000.0)));
-        if let Some(r) = zone {
-            self.put(cx, 1, format!("$FLY_DIST := {}", num(libm::floor(r * 1000.0 + 1e-6) / 1000.0, 3)));
-        }
-        zone.is_some()
-    }
-
-    fn joint(&mut self, cx: &mut Cx, t: &Target, share: f64) {
-        self.put(cx, 2, format!("$ARM_OVR := {}", num(libm::floor(share * 100.0 + 1e-6).clamp(1.0, 100.0), 0)));
-        let values: Vec<String> = cx.degrees(t).iter().chain(&cx.external(t)).map(|v| num(*v, 5)).collect();
-        self.out.line(cx, &format!("MOVE TO {{{}}}", values.join(",")));
-        let remark = cx.remark.take();
-        self.put(cx, 2, "$ARM_OVR := 100".into());
-        cx.remark = remark;
-    }
-
-    fn frame(&mut self, cx: &mut Cx, variable: &str, frame: &Frame) {
+    fn set_frame(&mut self, cx: &mut Cx, variable: &str, frame: &Frame) {
         self.angles = [0.0; 3];
         let text = self.pos(frame, 4, "");
         self.angles = [0.0; 3];
@@ -97,57 +73,51 @@ impl Writer {
     }
 }
 
-impl Body for Writer {
-    fn op(&mut self, cx: &mut Cx, op: Op) {
-        match op {
-            Op::Line(number, text) => self.out.remark(cx, &format!("{number}: {text}")),
-            Op::Comment(text) => self.out.remark(cx, text),
-            Op::Home(t) => self.joint(cx, t, 0.2),
-            Op::Joint { to, share, .. } => self.joint(cx, to, share),
-            Op::Linear { to, speed, zone } => {
-                let fly = if self.path(cx, speed, zone) { ("FLY", " ADVANCE") } else { ("", "") };
-                let to = self.place(cx, to);
-                self.out.line(cx, &format!("MOVE{} LINEAR TO {to}{}", fly.0, fly.1));
-            }
-            Op::Arc { via, to, speed, zone } => {
-                let fly = if self.path(cx, speed, zone) { ("FLY", " ADVANCE") } else { ("", "") };
-                let (via, to) = (self.place(cx, via), self.place(cx, to));
-                self.out.line(cx, &format!("MOVE{} CIRCULAR TO {to} VIA {via}{}", fly.0, fly.1));
-            }
-            Op::Tool(i) => {
-                let frame = cx.program.tools[i].frame;
-                self.frame(cx, "$TOOL", &frame);
-            }
-            Op::Frame(i) => {
-                let frame = cx.program.frames[i].frame;
-                self.frame(cx, "$UFRAME", &frame);
-            }
-            Op::Set { name, value, word } => {
-                let n = cx.number(name, word);
-                match value {
-                    Value::Digital(on) => self.out.line(cx, &format!("$DOUT[{n}] := {}", if on { "ON" } else { "OFF" })),
-                    Value::Analog(v) => self.out.line(cx, &format!("$AOUT[{n}] := {}", num(v, 3))),
-                    Value::Group(_) => cx.cannot("a tool number on outputs"),
-                }
-            }
-            Op::Call { name, value } => {
-                let name = cx.known(name, "routine").to_string();
-                self.out.line(cx, &value.map_or(name.clone(), |v| format!("{name}({})", num(v, 6))));
-            }
-            Op::Wait { name, on, timeout } => {
-                let n = cx.number(name, "wait");
-                if timeout.is_some() {
-                    cx.cannot("waiting for an input with a time limit");
-                }
-                self.out.line(cx, &format!("WAIT FOR $DIN[{n}] = {}", if on { "ON" } else { "OFF" }));
-            }
-            Op::Dwell(s) => self.out.line(cx, &format!("DELAY {}", num(s * 1000.0, 0))),
-            Op::Message(text) => {
-                let text = cx.ascii(text).replace('\'', "\"");
-                self.out.line(cx, &format!("WRITE ('{text}', NL)"));
-            }
-            Op::Pause => self.out.line(cx, "PAUSE"),
-            Op::End => {}
-        }
+impl Plain for Writer {
+    const PAUSE: &'static str = "PAUSE";
+
+    fn out(&mut self) -> &mut Lines {
+        &mut self.out
+    }
+    fn joint(&mut self, cx: &mut Cx, to: &Target, share: f64) {
+        self.out.setting(cx, &mut self.set[2], format!("$ARM_OVR := {}", per_cent(share)));
+        let mut values = cx.degrees(to);
+        values.extend(cx.external(to));
+        self.out.line(cx, &format!("MOVE TO {{{}}}", joints(&values)));
+        self.out.setting(cx, &mut self.set[2], "$ARM_OVR := 100".into());
+    }
+    fn linear(&mut self, cx: &mut Cx, to: &Target, speed: f64, zone: Option<f64>) {
+        let [fly, advance] = self.path(cx, speed, zone);
+        let to = self.place(cx, to);
+        self.out.line(cx, &format!("MOVE{fly} LINEAR TO {to}{advance}"));
+    }
+    fn arc(&mut self, cx: &mut Cx, via: &Target, to: &Target, speed: f64, zone: Option<f64>) {
+        let [fly, advance] = self.path(cx, speed, zone);
+        let (via, to) = (self.place(cx, via), self.place(cx, to));
+        self.out.line(cx, &format!("MOVE{fly} CIRCULAR TO {to} VIA {via}{advance}"));
+    }
+    fn tool(&mut self, cx: &mut Cx, _: usize, frame: &Frame) {
+        self.set_frame(cx, "$TOOL", frame);
+    }
+    fn frame(&mut self, cx: &mut Cx, _: usize, frame: &Frame) {
+        self.set_frame(cx, "$UFRAME", frame);
+    }
+    fn digital(number: u32, on: bool) -> String {
+        format!("$DOUT[{number}] := {}", if on { "ON" } else { "OFF" })
+    }
+    fn analog(number: u32, value: f64) -> Option<String> {
+        Some(format!("$AOUT[{number}] := {}", num(value, 3)))
+    }
+    fn call(name: &str, value: Option<String>) -> String {
+        value.map_or(name.to_string(), |v| format!("{name}({v})"))
+    }
+    fn waits(number: u32, on: bool) -> String {
+        format!("WAIT FOR $DIN[{number}] = {}", if on { "ON" } else { "OFF" })
+    }
+    fn dwell(seconds: f64) -> String {
+        format!("DELAY {}", num(seconds * 1000.0, 0))
+    }
+    fn message(text: &str) -> Option<String> {
+        Some(format!("WRITE ('{}', NL)", text.replace('\'', "\"")))
     }
 }
