@@ -253,7 +253,10 @@ fn idle(unit: &Unit, goal: &Goal<'_>) -> Option<String> {
     let heeded = gr_spec::TargetDef::find(id)?.options;
     let reference = |o: &&str| !o.starts_with("--reference");
     let planned = id == "joint-gcode" && crate::robot::plans_joints(goal);
-    let option = given(goal.options).into_iter().filter(reference).find(|o| !heeded.contains(o) || (planned && *o == "--round"))?;
+    // Motion is corrected before any target is made of it, by straight pieces within the tolerance.
+    let compensate = goal.options.robot.compensate && !id.starts_with("plan");
+    let corrects = |o: &&str| compensate && matches!(*o, "--compensate" | "--arc-tolerance");
+    let option = given(goal.options).into_iter().filter(|o| reference(o) && !corrects(o)).find(|o| !heeded.contains(o) || (planned && *o == "--round"))?;
     Some(format!("{option} does nothing for the target {}; `gcc-robot target show {}` says what it heeds", goal.target, goal.target))
 }
 
