@@ -59,7 +59,7 @@ export function has(colors, wanted, tolerance = 3) {
 }
 
 /** Waits until a condition of the page holds. */
-export async function until(page, what, condition, argument, timeout = 20000) {
+export async function until(page, what, condition, argument, timeout = 60000) {
   try {
     await page.waitForFunction(condition, argument, { timeout, polling: 50 });
   } catch (problem) {

@@ -7,12 +7,14 @@ use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use crate::oracle::{gcc_robot, kept, missing, root};
-use crate::process::{Ended, run};
+use crate::process::{Ended, run, start};
 
 /// A folder with a machine in it, and the user that runs it. One at a time: its shared memory has fixed names.
 pub struct Controller {
     folder: tempfile::TempDir,
     user: Option<String>,
+    /// Shared memory that others had before.
+    before: Vec<String>,
     _turn: File,
 }
 
@@ -37,7 +39,7 @@ impl Controller {
         let turn = File::create(kept("linuxcnc").join("turn")).ok()?;
         turn.lock().ok()?;
         let folder = tempfile::tempdir().ok()?;
-        let mut controller = Controller { folder, user: None, _turn: turn };
+        let mut controller = Controller { folder, user: None, before: shared_memory(), _turn: turn };
         controller.furnish(display, part, program);
         controller.own();
         Some(controller)
@@ -131,13 +133,8 @@ impl Controller {
     pub fn start(&self, display: &str) -> Child {
         let log = File::create(self.path("log.txt")).expect("writable");
         let also = log.try_clone().expect("a second handle");
-        self.linuxcnc()
-            .env("DISPLAY", display)
-            .stdin(Stdio::null())
-            .stdout(log)
-            .stderr(also)
-            .spawn()
-            .expect("linuxcnc starts")
+        let mut command = self.linuxcnc();
+        start(command.env("DISPLAY", display).stdin(Stdio::null()).stdout(log).stderr(also)).expect("linuxcnc starts")
     }
 
     /// Waits until a file says what is expected.
@@ -155,33 +152,49 @@ impl Controller {
             std::thread::sleep(Duration::from_millis(100));
         }
     }
+
+    /// Processes that were started with this folder as home, as far as we may look.
+    fn left(&self) -> Vec<String> {
+        let home = format!("HOME={}", self.folder.path().display());
+        let ours = |pid: &str| {
+            let environment = std::fs::read(format!("/proc/{pid}/environ")).unwrap_or_default();
+            environment.split(|b| *b == 0).any(|v| v == home.as_bytes())
+        };
+        let all = std::fs::read_dir("/proc").into_iter().flatten().flatten();
+        let names = all.filter_map(|e| e.file_name().into_string().ok());
+        names.filter(|n| n.bytes().all(|b| b.is_ascii_digit()) && ours(n)).collect()
+    }
+}
+
+/// Segments of shared memory with a public key, as LinuxCNC's are, that nobody is attached to.
+fn shared_memory() -> Vec<String> {
+    let list = Command::new("ipcs").arg("-m").output().map(|o| o.stdout).unwrap_or_default();
+    let unused = |row: &str| match row.split_whitespace().collect::<Vec<_>>()[..] {
+        [key, id, _, _, _, "0", ..] if key != "0x00000000" => Some(id.to_string()),
+        _ => None,
+    };
+    String::from_utf8_lossy(&list).lines().filter_map(unused).collect()
 }
 
 impl Drop for Controller {
     fn drop(&mut self) {
-        let Some(name) = &self.user else { return };
-        // The controller's shared memory is the machine's: the next user can't start before this one's is gone.
+        // The controller's shared memory is the machine's: the next one can't start before this one's is gone.
         for tries in 0..100 {
-            if !Command::new("pgrep").args(["-u", name]).output().is_ok_and(|o| o.status.success()) {
+            let left = self.left();
+            if left.is_empty() {
                 break;
             }
-            if tries == 50 {
-                let _ = Command::new("pkill").args(["-KILL", "-u", name]).status();
+            if tries >= 50 {
+                let _ = Command::new("kill").arg("-KILL").args(&left).status();
             }
             std::thread::sleep(Duration::from_millis(200));
         }
-        let list = Command::new("ipcs").arg("-m").output().map(|o| o.stdout).unwrap_or_default();
-        for row in String::from_utf8_lossy(&list).lines() {
-            let cells: Vec<&str> = row.split_whitespace().collect();
-            // ipcs cuts long names.
-            if let [_, id, owner, ..] = cells[..]
-                && owner.len() >= 8
-                && name.starts_with(owner)
-            {
-                let _ = Command::new("ipcrm").args(["-m", id]).status();
-            }
+        for id in shared_memory().iter().filter(|id| !self.before.contains(id)) {
+            let _ = Command::new("ipcrm").args(["-m", id]).stderr(Stdio::null()).status();
         }
-        let _ = Command::new("userdel").arg(name).status();
+        if let Some(name) = &self.user {
+            let _ = Command::new("userdel").arg(name).status();
+        }
     }
 }
 
@@ -227,6 +240,18 @@ impl Screen {
         }
         let display = format!(":{}", String::from_utf8_lossy(&number).trim());
         Some(Screen { server, folder, display })
+    }
+
+    /// What it shows as soon as it is what is wanted, or at last after half a minute.
+    pub fn picture_when(&self, wanted: impl Fn(&Picture) -> bool) -> Picture {
+        let start = Instant::now();
+        loop {
+            let picture = self.picture();
+            if wanted(&picture) || start.elapsed() > Duration::from_secs(30) {
+                return picture;
+            }
+            std::thread::sleep(Duration::from_millis(200));
+        }
     }
 
     /// What it shows now (the file is an X window dump).

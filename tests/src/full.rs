@@ -63,7 +63,10 @@ pub fn path(program: &Path, tools_mm: Option<&Path>) -> Option<Path9> {
     if let Some(tools) = tools_mm {
         command.arg(tools);
     }
-    let out = run(&mut command, LIMIT).ok()?;
+    let Ok(out) = run(&mut command, LIMIT) else {
+        missing("/usr/bin/python3 (Debian package python3)");
+        return None;
+    };
     if out.errors().contains("No module named 'gcode'") {
         missing("Python module gcode (Debian package linuxcnc-uspace)");
         return None;

@@ -31,13 +31,34 @@ fn both(bytes: &[u8]) -> (Ended, Ended) {
     (check, build)
 }
 
-fn fails_clearly(bytes: &[u8]) {
-    let (check, build) = both(bytes);
-    for out in [check, build] {
-        assert_ne!(out.status, Some(0), "accepted");
-        let text = out.errors() + &out.output();
-        assert!(text.contains("[E") || text.contains("error"), "no clear error: {text}");
+/// Codes of findings, each once, in order.
+fn codes(out: &Ended) -> Vec<String> {
+    let text = out.errors() + &out.output();
+    let mut found = Vec::new();
+    for (i, _) in text.match_indices("[E") {
+        let code = text.get(i + 1..i + 6).unwrap_or_default();
+        if gr_spec::Code::find(code).is_some() && !found.contains(&code.to_string()) {
+            found.push(code.to_string());
+        }
     }
+    found
+}
+
+fn is_error(code: &str) -> bool {
+    gr_spec::Code::find(code).is_some_and(|c| c.def().severity == gr_spec::Severity::Error)
+}
+
+/// These bytes raise these codes and no others; an error among them ends both commands, without one both go through.
+fn gives(bytes: &[u8], expected: &[&str]) {
+    let (check, build) = both(bytes);
+    let head = String::from_utf8_lossy(&bytes[..bytes.len().min(80)]).into_owned();
+    assert_eq!(codes(&check), expected, "{head}");
+    // 3: a file that can't be had or is none.
+    let status = Some(if expected == ["E0841"] { 3 } else { i32::from(expected.iter().any(|c| is_error(c))) });
+    assert_eq!((check.status, build.status), (status, status), "{head}: {}", build.errors());
+    // Hints are for check alone.
+    let errors: Vec<String> = codes(&build).into_iter().filter(|c| is_error(c)).collect();
+    assert_eq!(errors, expected.iter().copied().filter(|c| is_error(c)).collect::<Vec<_>>(), "{head}");
 }
 
 fn is_built(bytes: &[u8]) {
@@ -65,15 +86,15 @@ fn agrees(bytes: Vec<u8>) {
 
 #[test]
 fn empty() {
-    both(b"");
-    both(b"\n\n  \n");
+    gives(b"", &["E0252"]);
+    gives(b"\n\n  \n", &["E0252"]);
     agrees(b"\n".to_vec());
 }
 
 #[test]
 fn nul_bytes() {
-    both(b"G21\nG0 X1\0Y2\nM2\n");
-    both(b"\0\0\0\0");
+    gives(b"G21\nG0 X1\0Y2\nM2\n", &["E0101"]);
+    gives(b"\0\0\0\0", &["E0252", "E0101"]);
     agrees(b"G21\nG0 X1\0Y2\nM2\n".to_vec());
 }
 
@@ -93,37 +114,41 @@ fn byte_order_marks() {
         }
         is_built_but_refused(&bytes);
     }
-    both(&[0xFF, 0xFE, 0x47]);
-    both(&[0xFF, 0xFE, 0x00, 0xD8]);
+    for bytes in [&[0xFF, 0xFE, 0x47][..], &[0xFF, 0xFE, 0x00, 0xD8]] {
+        let (check, build) = both(bytes);
+        assert!(codes(&check).contains(&"E0105".to_string()), "{:?}", codes(&check));
+        assert_eq!((check.status, build.status), (Some(1), Some(1)));
+    }
 }
 
 #[test]
 fn line_ends() {
     is_built(GOOD.replace('\n', "\r\n").as_bytes());
     agrees(GOOD.replace('\n', "\r\n").into_bytes());
-    both(GOOD.replace('\n', "\r").as_bytes());
+    is_built(GOOD.replace('\n', "\r").as_bytes());
     is_built(GOOD.trim_end().as_bytes());
 }
 
 #[test]
 fn one_line_of_10_mb() {
-    fails_clearly(format!("G1 X{}\nM2\n", "1".repeat(10_000_000)).as_bytes());
-    both("(".repeat(10_000_000).as_bytes());
-    both("[".repeat(10_000_000).as_bytes());
-    both("#".repeat(10_000_000).as_bytes());
+    gives(format!("G1 X{}\nM2\n", "1".repeat(10_000_000)).as_bytes(), &["E0102"]);
+    for open in ["(", "[", "#"] {
+        gives(open.repeat(10_000_000).as_bytes(), &["E0102", "E0252"]);
+    }
 }
 
 #[test]
 fn deep_nesting() {
-    both(format!("#1={}1{}\nM2\n", "[".repeat(100_000), "]".repeat(100_000)).as_bytes());
-    both(format!("#1={}1{}\nM2\n", "[".repeat(120), "]".repeat(120)).as_bytes());
-    both(format!("G0 X{}1\nM2\n", "-".repeat(200)).as_bytes());
-    both(format!("#1={}1{}\nM2\n", "SIN[".repeat(60), "]".repeat(60)).as_bytes());
+    gives(format!("#1={}1{}\nM2\n", "[".repeat(100_000), "]".repeat(100_000)).as_bytes(), &["E0102"]);
+    gives(format!("#1={}1{}\nM2\n", "[".repeat(120), "]".repeat(120)).as_bytes(), &["E0227"]);
+    gives(format!("G0 X{}1\nM2\n", "-".repeat(200)).as_bytes(), &["E0227"]);
+    gives(format!("#1={}1{}\nM2\n", "SIN[".repeat(60), "]".repeat(60)).as_bytes(), &["E0102"]);
+    gives(format!("#1={}1{}\nM2\n", "SIN[".repeat(20), "]".repeat(20)).as_bytes(), &[]);
     let mut loops = String::new();
     for i in 0..5000 {
         loops.push_str(&format!("o{i} if [1]\n"));
     }
-    both(loops.as_bytes());
+    gives(loops.as_bytes(), &["E0255", "E0252"]);
 }
 
 #[test]
@@ -137,18 +162,21 @@ fn binary() {
             x as u8
         })
         .collect();
-    fails_clearly(&bytes);
-    fails_clearly(&std::fs::read(std::env::current_exe().expect("a test knows its file")).expect("readable")[..1_000_000]);
+    gives(&bytes, &["E0841"]);
+    gives(&std::fs::read(std::env::current_exe().expect("a test knows its file")).expect("readable")[..1_000_000], &["E0841"]);
 }
 
 #[test]
 fn folders_and_missing_files() {
     let dir = tempfile::tempdir().expect("a temporary folder");
     std::fs::create_dir(dir.path().join("part.ngc")).expect("writable");
-    for args in [["build", "--target", "canon", "part.ngc"].as_slice(), &["check", "nothing.ngc"], &["build", "--target", "canon", "nothing.ngc"]] {
+    for (args, code) in [
+        (["build", "--target", "canon", "part.ngc"].as_slice(), "E0822"),
+        (&["check", "nothing.ngc"], "E0820"),
+        (&["build", "--target", "canon", "nothing.ngc"], "E0820"),
+    ] {
         let out = robot(dir.path(), args);
-        assert_ne!(out.status, Some(0), "{args:?}");
-        assert!(!out.errors().trim().is_empty() || !out.output().trim().is_empty(), "{args:?} says nothing");
+        assert_eq!((out.status, codes(&out)), (Some(3), vec![code.to_string()]), "{args:?}");
     }
 }
 
@@ -159,10 +187,13 @@ fn unreadable_file() {
     let file = dir.path().join("part.ngc");
     std::fs::write(&file, GOOD).expect("writable");
     std::fs::set_permissions(&file, std::fs::Permissions::from_mode(0o000)).expect("own file");
-    // Root reads everything: then the result must be right.
-    let readable = std::fs::read(&file).is_ok();
-    let out = robot(dir.path(), &["build", "--target", "canon", "-o", "x", "part.ngc"]);
-    assert_eq!(out.status == Some(0), readable, "{}", out.errors());
+    // Root reads everything: then a file that nobody can read from its start stands in.
+    let name = if std::fs::read(&file).is_ok() { "/proc/self/mem" } else { "part.ngc" };
+    for args in [["build", "--target", "canon", "-o", "x", name].as_slice(), &["check", name]] {
+        let out = robot(dir.path(), args);
+        assert_eq!((out.status, codes(&out)), (Some(3), vec!["E0821".to_string()]), "{args:?}");
+    }
+    assert!(!dir.path().join("x").exists());
 }
 
 #[test]
@@ -170,9 +201,9 @@ fn unwritable_result() {
     let dir = tempfile::tempdir().expect("a temporary folder");
     std::fs::write(dir.path().join("part.ngc"), GOOD).expect("writable");
     let out = robot(dir.path(), &["build", "--target", "canon", "-o", "part.ngc/x", "part.ngc"]);
-    assert_ne!(out.status, Some(0));
+    assert_eq!((out.status, codes(&out)), (Some(3), vec!["E0824".to_string()]));
     let out = robot(dir.path(), &["build", "--target", "canon", "-o", "part.ngc", "part.ngc"]);
-    assert_ne!(out.status, Some(0), "overwrote its source");
+    assert_eq!((out.status, codes(&out)), (Some(1), vec!["E0839".to_string()]));
     assert_eq!(std::fs::read_to_string(dir.path().join("part.ngc")).expect("readable"), GOOD);
 }
 
@@ -182,43 +213,62 @@ fn an_error_leaves_the_old_result() {
     std::fs::write(dir.path().join("part.ngc"), "G21\nF100\nG1 X1\nG1 X[1/0]\nM2\n").expect("writable");
     std::fs::write(dir.path().join("part.canon"), "old").expect("writable");
     let out = robot(dir.path(), &["build", "--target", "canon", "-o", "part.canon", "part.ngc"]);
-    assert_ne!(out.status, Some(0));
+    assert_eq!((out.status, codes(&out)), (Some(1), vec!["E0233".to_string()]));
     assert_eq!(std::fs::read_to_string(dir.path().join("part.canon")).expect("readable"), "old");
 }
 
 #[test]
 fn subs_that_are_missing_or_call_themselves() {
-    fails_clearly(b"o<nowhere> call\nM2\n");
-    fails_clearly(b"o77 call\nM2\n");
-    fails_clearly(b"o1 sub\no1 call\no1 endsub\no1 call\nM2\n");
-    fails_clearly(b"M98 P5\nM2\nO5\nM98 P5\nM99\n");
+    gives(b"o<nowhere> call\nM2\n", &["E0250"]);
+    gives(b"o77 call\nM2\n", &["E0250"]);
+    gives(b"o1 sub\no1 call\no1 endsub\no1 call\nM2\n", &["E0251"]);
+    gives(b"M98 P5\nM2\nO5\nM98 P5\nM99\n", &["E0251"]);
     agrees(b"o1 sub\no1 call\no1 endsub\no1 call\nM2\n".to_vec());
 }
 
 #[test]
 fn numbers_out_of_range() {
-    for line in [
-        "#1=[1/0]", "#1=[0/0]", "#1=[10**400]", "#1=SQRT[-1]", "#1=LN[-1]", "#1=[1e400]", "G0 X1e400", "#1=ASIN[2]", "#1=EXP[99999]",
-        "#1=[[-1]**0.5]", "T99999999999", "M999999999999", "G999999999999999999999 X1", "#99999999999=1", "#[1/0]=1", "G4 P-1",
-        "#[-1]=1", "#1=#99999999999", "N99999999999999999999 G0 X1", "o99999999999999999999 call", "S99999999999999999999 M3", "G81 X1 Z-1 R1 L99999999999",
+    for (line, codes) in [
+        ("#1=[1/0]", &["E0233"][..]),
+        ("#1=[0/0]", &["E0233"]),
+        ("#1=[10**400]", &["E0235"]),
+        ("#1=SQRT[-1]", &["E0234"]),
+        ("#1=LN[-1]", &["E0234"]),
+        ("#1=[1e400]", &["E0215"]),
+        ("G0 X1e400", &["E0207"]),
+        ("#1=ASIN[2]", &["E0234"]),
+        ("#1=EXP[99999]", &["E0235"]),
+        ("#1=[[-1]**0.5]", &["E0234"]),
+        ("T99999999999", &["E0202"]),
+        ("M999999999999", &["E0202"]),
+        ("G999999999999999999999 X1", &["E0202"]),
+        ("#99999999999=1", &["E0237"]),
+        ("#[1/0]=1", &["E0233"]),
+        ("G4 P-1", &["E0209"]),
+        ("#[-1]=1", &["E0237"]),
+        ("#1=#99999999999", &["E0237"]),
+        ("N99999999999999999999 G0 X1", &[]),
+        ("o99999999999999999999 call", &["E0250"]),
+        ("S99999999999999999999 M3", &["E0283"]),
+        ("G81 X1 Z-1 R1 L99999999999", &["E0202"]),
     ] {
         let text = format!("G21\nF100\n{line}\nM2\n");
-        both(text.as_bytes());
+        gives(text.as_bytes(), codes);
         if !line.contains("99999999") {
             agrees(text.into_bytes());
         }
     }
-    both(format!("G21\nF100\nG1 X{}\nG1 X0\nM2\n", "9".repeat(200)).as_bytes());
-    both(b"G21 F1\nG2 X1e9 I99999999999\nG76 P0 Z0 I0 J0 K0\nM2\n");
+    gives(format!("G21\nF100\nG1 X{}\nG1 X0\nM2\n", "9".repeat(200)).as_bytes(), &[]);
+    gives(b"G21 F1\nG2 X1e9 I99999999999\nG76 P0 Z0 I0 J0 K0\nM2\n", &["E0207", "E0274"]);
 }
 
 #[test]
 fn runaway_programs_end() {
-    fails_clearly(b"o1 while [1]\n#1=[#1+1]\no1 endwhile\nM2\n");
-    fails_clearly(b"o1 while [1]\nG0 X1\nG0 X0\no1 endwhile\nM2\n");
-    fails_clearly(b"o1 repeat [1000000000]\nG4 P0\no1 endrepeat\nM2\n");
-    fails_clearly(b"o1 do\no1 while [1]\nM2\n");
-    both(b"G21 F100\nG81 X1 Y1 Z-1 R1 L2000000000\nM2\n");
+    gives(b"o1 while [1]\n#1=[#1+1]\no1 endwhile\nM2\n", &["E0254"]);
+    gives(b"o1 while [1]\nG0 X1\nG0 X0\no1 endwhile\nM2\n", &["E0254", "E0288"]);
+    gives(b"o1 repeat [1000000000]\nG4 P0\no1 endrepeat\nM2\n", &["E0254"]);
+    gives(b"o1 do\no1 while [1]\nM2\n", &["E0254"]);
+    gives(b"G21 F100\nG81 X1 Y1 Z-1 R1 L2000000000\nM2\n", &["E0254", "E0275"]);
 }
 
 /// Two gigabytes of nothing, which take no room on the disk: refused at once or read as the NUL bytes they are.
@@ -230,14 +280,14 @@ fn sparse_file_of_2_gb() {
     drop(file);
     let out = robot(dir.path(), &["check", "part.ngc"]);
     let text = out.errors() + &out.output();
-    assert_ne!(out.status, Some(0), "{text}");
-    assert!(text.contains("E0823") || text.contains("error"), "{text}");
+    assert_eq!((out.status, codes(&out)), (Some(3), vec!["E0823".to_string()]), "{text}");
 }
 
 #[test]
 fn many_faults_are_not_too_many() {
     let text: String = (0..20_000).map(|i| format!("G1 X{i} Q\n")).collect();
     let (check, _) = both(text.as_bytes());
+    assert_eq!((check.status, codes(&check)), (Some(1), vec!["E0211".to_string()]));
     assert!(check.stderr.len() + check.stdout.len() < 5_000_000, "a flood of messages");
 }
 

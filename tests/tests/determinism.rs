@@ -1,4 +1,4 @@
-//! The same program gives the same bytes: in every target, every time, with one worker or several.
+//! The same program gives the same bytes: in every target, every time; a check with one worker or several says the same.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -57,7 +57,7 @@ fn every_target_twice() {
 }
 
 #[test]
-fn one_worker_or_several() {
+fn many_files_and_workers() {
     let dir = tempfile::tempdir().expect("a temporary folder");
     let mut names = programs(dir.path());
     // A mistake keeps everything from being written.

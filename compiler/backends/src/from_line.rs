@@ -100,8 +100,9 @@ fn find(program: &Program, file: FileId, line: u32) -> Option<Found> {
     }
     let repeated = (ways.len() > 1).then(|| {
         let inner = program.call_stack(ways[0]).next();
-        let name = inner.map(|f| program.frames.name(f).to_string()).unwrap_or_default();
-        format!("{} times, in {name}", if ways.len() < 1000 { ways.len().to_string() } else { "many".into() })
+        let name = inner.map(|f| program.frames.name(f)).filter(|n| !n.is_empty());
+        let times = if ways.len() < 1000 { ways.len().to_string() } else { "many".into() };
+        format!("{times} times{}", name.map_or(String::new(), |n| format!(", in {n}")))
     });
     Some(Found { index: first.or(later)?, repeated })
 }

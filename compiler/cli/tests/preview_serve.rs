@@ -2,16 +2,22 @@
 
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::net::TcpStream;
-use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+use std::process::{Child, ChildStdin, Command, Stdio};
+use std::sync::mpsc::{Receiver, channel};
+use std::time::Duration;
 
 use serde_json::Value;
+
+/// Longest wait for anything.
+const LIMIT: Duration = Duration::from_secs(60);
 
 const PROGRAM: &str = "G21 G90 F600\nG0 X0 Y0\nG1 X40\nM2\n";
 
 struct Served {
     child: Child,
-    input: ChildStdin,
-    output: BufReader<ChildStdout>,
+    /// Until the editor goes.
+    input: Option<ChildStdin>,
+    output: Receiver<String>,
     port: u16,
     path: String,
 }
@@ -26,8 +32,10 @@ impl Served {
             .stdout(Stdio::piped())
             .spawn()
             .unwrap();
-        let input = child.stdin.take().unwrap();
-        let output = BufReader::new(child.stdout.take().unwrap());
+        let input = child.stdin.take();
+        let lines = BufReader::new(child.stdout.take().unwrap()).lines();
+        let (send, output) = channel();
+        std::thread::spawn(move || lines.map_while(Result::ok).try_for_each(|line| send.send(line)));
         let mut served = Served { child, input, output, port: 0, path: String::new() };
         let url = served.hear()["url"].as_str().unwrap().to_string();
         let rest = url.strip_prefix("http://127.0.0.1:").expect("this computer only");
@@ -37,18 +45,17 @@ impl Served {
         served
     }
 
-    fn hear(&mut self) -> Value {
-        let mut line = String::new();
-        self.output.read_line(&mut line).unwrap();
-        serde_json::from_str(&line).unwrap()
+    fn hear(&self) -> Value {
+        serde_json::from_str(&self.output.recv_timeout(LIMIT).expect("a line in time")).unwrap()
     }
 
     fn say(&mut self, message: &Value) {
-        writeln!(self.input, "{message}").unwrap();
+        writeln!(self.input.as_mut().unwrap(), "{message}").unwrap();
     }
 
     fn raw(&self, text: &str) -> String {
         let mut stream = TcpStream::connect(("127.0.0.1", self.port)).unwrap();
+        stream.set_read_timeout(Some(LIMIT)).unwrap();
         stream.write_all(text.as_bytes()).unwrap();
         let mut answer = String::new();
         stream.read_to_string(&mut answer).unwrap();
@@ -63,6 +70,13 @@ impl Served {
 
     fn get(&self, path: &str) -> String {
         self.ask("GET", &format!("{}{path}", self.path), "", "")
+    }
+}
+
+impl Drop for Served {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
     }
 }
 
@@ -85,20 +99,23 @@ fn page_path_and_choice() {
     assert_eq!(status(&served.ask("POST", &choose, "", "2")), "204");
     assert_eq!(served.hear()["line"], 3);
     served.say(&serde_json::json!({ "text": "G21 G90\nG1 X40 Q\n" }));
-    let wrong = (0..200).any(|_| {
+    let wrong = (0..3000).any(|_| {
         std::thread::sleep(std::time::Duration::from_millis(20));
         served.get("path").contains("\"problem\":\"line 2: ")
     });
     assert!(wrong, "the first error is told with its line");
-    let Served { mut child, input, .. } = served;
-    drop(input);
-    assert!(child.wait().unwrap().success(), "it ends with its editor");
+    drop(served.input.take());
+    let ended = (0..3000).find_map(|_| {
+        std::thread::sleep(Duration::from_millis(20));
+        served.child.try_wait().unwrap()
+    });
+    assert!(ended.expect("it ends with its editor").success());
 }
 
 #[test]
 fn only_what_belongs_to_it() {
     let folder = tempfile::tempdir().unwrap();
-    let mut served = Served::start(folder.path());
+    let served = Served::start(folder.path());
     let token = served.path.trim_matches('/').to_string();
     assert!(token.len() == 32 && token.bytes().all(|b| b.is_ascii_hexdigit()));
     for path in ["/", "/path", "/0/path", &format!("/{token}"), &format!("/{token}/part.ngc"), &format!("/{token}/../../etc/passwd")] {
@@ -116,5 +133,4 @@ fn only_what_belongs_to_it() {
     let _ = TcpStream::connect(("127.0.0.1", served.port)).unwrap().write_all(&[0xff; 64]);
     let _ = TcpStream::connect(("127.0.0.1", served.port)).unwrap().write_all(&[b'a'; 100_000]);
     assert_eq!(status(&served.get("")), "200");
-    served.child.kill().unwrap();
 }

@@ -54,10 +54,34 @@ fn joint_targets() {
         let out = folder.path().join("part.txt");
         let made = run(&["build", PART, "--machine", CELL, "--target", target, "-o", out.to_str().unwrap()]);
         assert!(made.status.success(), "{}", text(&made.stderr));
-        assert!(std::fs::metadata(&out).unwrap().len() > 1000);
-        for end in beside {
-            assert!(folder.path().join(format!("part{end}")).is_file(), "{end}");
+        let read = |end: &str| std::fs::read(folder.path().join(format!("part{end}"))).unwrap_or_else(|e| panic!("{end}: {e}"));
+        let program = text(&read(".txt"));
+        if target == "setpoints" {
+            let rows: Vec<&str> = program.lines().skip(1).collect();
+            // A head of 28 bytes; then six angles, six speeds, six accelerations as f64.
+            let bytes = read(beside[0]);
+            assert_eq!((bytes.len(), &bytes[..4]), (28 + rows.len() * 144, &b"GRSP"[..]));
+            let home: Vec<&str> = rows[0].split(',').skip(1).step_by(3).collect();
+            assert_eq!(home, ["0.000000", "-20.000000", "20.000000", "0.000000", "60.000000", "0.000000"]);
+            for (i, degrees) in [0.0, -20.0, 20.0, 0.0, 60.0, 0.0f64].into_iter().enumerate() {
+                let at = 28 + 8 * i;
+                let first = f64::from_le_bytes(bytes[at..at + 8].try_into().unwrap());
+                assert!((first - degrees.to_radians()).abs() < 1e-12, "J{}: {first}", i + 1);
+            }
+            continue;
         }
+        let [space, joints] = beside.map(|end| text(&read(end)));
+        assert_eq!(space.lines().next(), Some("t,X,Y,Z,A,B,C"));
+        assert_eq!(joints.lines().take(2).collect::<Vec<_>>(), ["t,J1,J2,J3,J4,J5,J6", "0,0,-20,20,0,60,0"]);
+        assert_eq!(space.lines().count(), joints.lines().count());
+        // Each row of the table is a move of the program, its joints in the words of LinuxCNC.
+        let moves: Vec<String> = program.lines().filter_map(|l| Some(l.strip_prefix("G1 ")?.split_once(" F")?.0.to_string())).collect();
+        let rows: Vec<String> = joints
+            .lines()
+            .skip(1)
+            .map(|l| l.split(',').skip(1).zip("XYZABC".chars()).map(|(v, w)| format!("{w}{v}")).collect::<Vec<_>>().join(" "))
+            .collect();
+        assert!(rows.len() > 300 && moves == rows, "{} moves, {} rows", moves.len(), rows.len());
     }
 }
 
@@ -68,6 +92,11 @@ fn verify_reports() {
     assert!(made.status.success(), "{}", text(&made.stderr));
     let table = text(&made.stdout);
     assert!(table.contains("points on example/irb2400-cell; error = target − reached, µm"), "{table}");
+    for axis in ["X", "Y", "Z"] {
+        let row = table.lines().find(|l| l.starts_with(&format!("{axis} "))).unwrap_or_else(|| panic!("{table}"));
+        let [mean, upper, lower] = row.split_whitespace().skip(1).map(|v| v.parse::<f64>().unwrap()).collect::<Vec<_>>()[..] else { panic!("{row}") };
+        assert!(lower <= mean && mean <= upper && upper.abs() < 1e-6 && lower.abs() < 1e-6, "{row}");
+    }
     for end in ["errors.csv", "errors.svg", "joints.svg", "speeds.svg"] {
         assert!(folder.path().join(format!("bracket-{end}")).is_file(), "{end}");
     }

@@ -24,9 +24,8 @@ fn options(code: Code) -> Option<Options> {
         None => {}
         Some("check -i mill.ini") => setup.ini = read_ini(MILL_INI, FileId(1), None, None).0,
         Some(other) => {
-            let (name, level) = other.strip_prefix("check --lint ")?.split_once('=')?;
-            let level = if level == "hint" { Level::Hint } else { Level::Warning };
-            levels.push((Code::find(name)?, level));
+            let name = other.strip_prefix("check --warn ")?;
+            levels.push((Code::find(name)?, Level::Warning));
         }
     }
     let mut options = Options::new(setup);

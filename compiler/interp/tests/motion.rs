@@ -2,12 +2,12 @@
 //! installed, it must give the same.
 
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
 use std::sync::Arc;
 
 use gr_canon::{FileId, Printer, Units, Version};
 use gr_gcode::{Chunk, File};
 use gr_interp::{Files, Interp, Outcome, Setup, read_tools};
+use gr_tests::oracle::{Job, reference};
 
 const TOOLS: &str = "T1 P1 D6.0\nT2 P2 D0.03 Q2\nT3 P3 D0.03 Q6\n";
 
@@ -54,33 +54,15 @@ fn programs() -> Vec<PathBuf> {
     all
 }
 
-/// What the real `rs274` prints, if there is one: output, exit status, messages.
-fn rs274(program: &Path) -> Option<(String, bool, String)> {
-    let home = std::env::temp_dir().join(format!("motion-{}-{:?}", std::process::id(), std::thread::current().id()));
-    std::fs::create_dir_all(&home).ok()?;
-    let (tools, out) = (home.join("t.tbl"), home.join("out"));
-    std::fs::write(&tools, TOOLS).ok()?;
-    let done = Command::new("rs274")
-        .args(["-g", "-t"])
-        .arg(&tools)
-        .arg("-v")
-        .arg(home.join("p.var"))
-        .arg(program)
-        .arg(&out)
-        .env("HOME", &home)
-        .env("LC_ALL", "C")
-        .stdin(Stdio::null())
-        .output();
-    let result = done.ok().and_then(|done| {
-        let text = std::fs::read_to_string(&out).ok()?;
-        Some((text, done.status.success(), String::from_utf8_lossy(&done.stderr).into_owned()))
-    });
-    let _ = std::fs::remove_dir_all(&home);
-    result
+/// What the real `rs274` prints: output, whether it accepts the program, messages.
+fn rs274(real: &Path, program: &str) -> (String, bool, String) {
+    let out = Job { tools: Some(TOOLS.into()), ..Job::new(program) }.reference(real);
+    (out.canon.clone(), out.ok(), out.ended.errors())
 }
 
 #[test]
 fn streams_are_as_recorded_and_as_rs274_gives_them() {
+    let real = reference();
     for path in programs() {
         let name = path.display();
         let text = std::fs::read_to_string(&path).expect("readable");
@@ -92,7 +74,8 @@ fn streams_are_as_recorded_and_as_rs274_gives_them() {
         }
         let recorded = std::fs::read_to_string(&expected).unwrap_or_default();
         assert_eq!(stream, recorded, "{name}; record with RECORD=1");
-        if let Some((theirs, ok, _)) = rs274(&path) {
+        if let Some(real) = &real {
+            let (theirs, ok, _) = rs274(real, &text);
             assert!(ok, "{name}: rs274 refuses it");
             assert_eq!(stream, theirs, "{name}: rs274 differs");
         }
@@ -191,22 +174,17 @@ const FAULTS: &[(&str, &str)] = &[
 
 #[test]
 fn faults_have_the_texts_of_rs274() {
-    let real = rs274(&programs()[0]).is_some();
-    let dir = std::env::temp_dir().join(format!("motion-faults-{}", std::process::id()));
-    std::fs::create_dir_all(&dir).expect("a temporary folder");
+    let real = reference();
     for (program, text) in FAULTS {
         let program = format!("G21 G17 G90 F100\n{program}\nM2\n");
         let (stream, outcome) = run(&program);
         assert_eq!(errors(&outcome), [*text], "{program}");
-        if real {
-            let path = dir.join("fault.ngc");
-            std::fs::write(&path, &program).expect("writable");
-            let (theirs, ok, messages) = rs274(&path).expect("it ran before");
+        if let Some(real) = &real {
+            let (theirs, ok, messages) = rs274(real, &program);
             assert!(!ok && messages.contains(text), "{program}{messages}");
             assert_eq!(stream, theirs, "{program}");
         }
     }
-    let _ = std::fs::remove_dir_all(&dir);
 }
 
 /// Programs that the controller takes in silence, and which we doubt.

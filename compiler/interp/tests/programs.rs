@@ -1,13 +1,13 @@
 //! Small programs: what they must print, the same through the real `rs274` where it is installed, and chunk by
 //! chunk as through the whole.
 
-use std::io::Write as _;
 use std::sync::Arc;
 
 use gr_canon::{At, Call, CallFrame, FileId, FrameId, Printer, Sink, Units, Version};
 use gr_gcode::{Chunk, File};
 use gr_interp::{Budgets, End, Files, Interp, Outcome, Params, Setup, State, read_tools, run_chunk};
 use gr_spec::{Dialect, code};
+use gr_tests::oracle::{Job, reference};
 use proptest::prelude::*;
 
 const TOOLS: &str = "T1 P1 Z1.5 D0.25\nT2 P2 Z1 D0.5\nT9 P3 X0.1 Z0.2 D0.1 Q9\n";
@@ -634,41 +634,8 @@ proptest! {
 }
 
 fn oracle(text: &str) -> Option<(String, bool, String)> {
-    let found = std::process::Command::new("rs274").arg("-h").output().is_ok();
-    if !found {
-        assert!(std::env::var_os("CI").is_none(), "rs274 is missing");
-        return None;
-    }
-    let dir = std::env::temp_dir().join(format!("gr-interp-{}-{:x}", std::process::id(), hash(text)));
-    std::fs::create_dir_all(&dir).ok()?;
-    let write = |name: &str, text: &str| -> std::path::PathBuf {
-        let path = dir.join(name);
-        let mut f = std::fs::File::create(&path).expect("a file in the temporary folder");
-        f.write_all(text.as_bytes()).expect("room on the disk");
-        path
-    };
-    let (program, tools) = (write("main.ngc", text), write("tool.tbl", TOOLS));
-    let out = std::process::Command::new("rs274")
-        .args(["-g", "-t"])
-        .arg(tools)
-        .arg("-v")
-        .arg(dir.join("p.var"))
-        .arg(program)
-        .env("HOME", &dir)
-        .env("LC_ALL", "C")
-        .stdin(std::process::Stdio::null())
-        .output()
-        .ok()?;
-    let _ = std::fs::remove_dir_all(&dir);
-    let errors = String::from_utf8_lossy(&out.stderr).to_string();
-    Some((String::from_utf8_lossy(&out.stdout).to_string(), out.status.success(), errors))
-}
-
-fn hash(text: &str) -> u64 {
-    use std::hash::{DefaultHasher, Hash, Hasher};
-    let mut h = DefaultHasher::new();
-    text.hash(&mut h);
-    h.finish()
+    let out = Job { tools: Some(TOOLS.into()), ..Job::new(text) }.reference(&reference()?);
+    Some((out.canon.clone(), out.ok(), out.ended.errors()))
 }
 
 fn plain(out: &str) -> Vec<String> {

@@ -76,7 +76,7 @@ proptest! {
                 let d = if j.kind == gr_machine::JointKind::Revolute { (a - b) - TURN * ((a - b) / TURN).round() } else { a - b };
                 d.abs() < 1e-5
             });
-            prop_assert!(all.iter().any(|s| same(s) || s.singular), "{}: {joints:?} is not among {all:?}", machine.id);
+            prop_assert!(all.iter().any(same) || all.iter().all(|s| s.singular), "{}: {joints:?} is not among {all:?}", machine.id);
         }
     }
 
@@ -185,9 +185,10 @@ fn home_poses_of_the_publications() {
     assert!(norm(gr_machine::math::sub(home.position, [515.0, 0.0, 712.0])) < 1e-9);
     assert!((home.axis(2)[0] - 1.0).abs() < 1e-12);
     let chain = gr_machine::reference("abb/irb140").unwrap();
-    for q in [[0.0; 6], [0.1, -0.4, 0.3, 0.9, -0.7, 1.3]] {
+    for q in [[0.0; 6], [0.1, -0.4, 0.3, 0.0, 0.0, 0.0]] {
         let (p, _) = arm.kinematics().forward_frame(&q).unwrap().error_to(&chain.kinematics().forward_frame(&q).unwrap());
-        assert!(q != [0.0; 6] || norm(p) < 1e-9, "{p:?}");
+        // The thesis turns the wrist the other way: the same place with a straight one.
+        assert!(norm(p) < 1e-9, "{q:?}: {p:?}");
     }
     let scara = builtin("adept/one").unwrap();
     let zero = scara.kinematics().forward_frame(&[0.0; 4]).unwrap();

@@ -5,7 +5,7 @@
 import assert from "node:assert/strict";
 import { execFileSync, spawn } from "node:child_process";
 import { copyFileSync, mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
-import { createServer } from "node:net";
+import { connect, createServer } from "node:net";
 import { tmpdir } from "node:os";
 import { dirname, join } from "node:path";
 import { after, before, test } from "node:test";
@@ -58,6 +58,33 @@ async function retry(what, attempt, seconds = 30) {
   }
 }
 
+/** Starts code-server; another may take the free port first, then it ends and the next port is tried. */
+async function start(options, environment) {
+  const more = ["--disable-telemetry", "--disable-update-check", "--disable-workspace-trust", workspace];
+  for (let tries = 0; tries < 5; tries++) {
+    const port = await freePort();
+    writeFileSync(join(folder, "config.yaml"), `bind-addr: 127.0.0.1:${port}\nauth: none\ncert: false\n`);
+    server = spawn(node, [entry, ...options, ...more], { env: environment, stdio: "ignore", detached: true });
+    let ended = false;
+    server.on("exit", () => {
+      ended = true;
+    });
+    await retry("code-server's port", async () => ended || (await answers(port)), 120);
+    if (!ended) return port;
+  }
+  throw new Error("code-server does not start");
+}
+
+/** Whether somebody listens at a port. */
+const answers = (port) =>
+  new Promise((resolve) => {
+    const socket = connect(port, "127.0.0.1");
+    socket.on("connect", () => resolve(true));
+    socket.on("error", () => resolve(false));
+    socket.on("close", () => resolve(false));
+    setTimeout(() => socket.destroy(), 1000);
+  });
+
 before(async () => {
   assert.ok(robot, "GCC_ROBOT_BIN names the program");
   mkdirSync(shots, { recursive: true });
@@ -91,24 +118,14 @@ before(async () => {
   // To VS Code, code-server is a remote machine: settings of the machine are its own.
   mkdirSync(join(user, "Machine"));
   writeFileSync(join(user, "Machine/settings.json"), JSON.stringify({ "gccRobot.server.path": robot }));
-  const port = await freePort();
-  writeFileSync(join(folder, "config.yaml"), `bind-addr: 127.0.0.1:${port}\nauth: none\ncert: false\n`);
   const options = ["--user-data-dir", user, "--extensions-dir", join(folder, "extensions")];
   const environment = { ...process.env, HOME: folder, VSCODE_PROXY_URI: "" };
   const said = execFileSync(node, [entry, ...options, "--install-extension", vsix, "--force"], { env: environment });
   assert.match(String(said), /successfully installed/);
-  const all = [
-    ...options,
-    "--config",
-    join(folder, "config.yaml"),
-    "--disable-telemetry",
-    "--disable-update-check",
-    "--disable-workspace-trust",
-  ];
-  server = spawn(node, [entry, ...all, workspace], { env: environment, stdio: "ignore", detached: true });
+  const port = await start([...options, "--config", join(folder, "config.yaml")], environment);
   chrome = await browser();
   page = await chrome.newPage({ viewport: { width: 1400, height: 860 }, colorScheme: "light" });
-  await retry("code-server", () => page.goto(`http://127.0.0.1:${port}/?folder=${workspace}`));
+  await retry("code-server", () => page.goto(`http://127.0.0.1:${port}/?folder=${workspace}`), 120);
   await page.waitForSelector(".monaco-workbench .explorer-viewlet, .monaco-workbench .part.editor", { timeout: 60000 });
 });
 

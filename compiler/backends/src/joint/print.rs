@@ -2,15 +2,20 @@ use super::plan::{JointProgram, Rounding, shown};
 use std::fmt::Write as _;
 
 impl JointProgram {
-    /// The G-code: one G01 per point, the joints in degrees (mm), F in degrees (mm) per second.
+    /// The G-code: one G01 per point, the joints in degrees (mm), F in degrees (mm) per second. Where the arm only stands,
+    /// as at the first point, there is no feed: G00, for controls refuse F0. The thesis writes it.
     pub fn gcode(&self) -> String {
         let mut out = String::new();
         for point in &self.points {
-            out.push_str("G01");
+            let stands = point.speed == 0.0 && !self.options.reference;
+            out.push_str(if stands { "G00" } else { "G01" });
             for ((value, kind), word) in point.joints.iter().zip(&self.kinds).zip(&self.words) {
                 let _ = write!(out, " {word}{}", self.number(shown(*value, *kind)));
             }
-            let _ = writeln!(out, " F{}", self.number(point.speed));
+            match stands {
+                true => out.push('\n'),
+                false => _ = writeln!(out, " F{}", self.feed(point.speed)),
+            }
         }
         out
     }
@@ -56,6 +61,16 @@ impl JointProgram {
             }
         };
         self.trimmed(format!("{value:.decimals$}"))
+    }
+
+    /// A feed; too slow for the decimals it gets as many as it needs.
+    fn feed(&self, speed: f64) -> String {
+        let text = self.number(speed);
+        if text != "0" || self.options.reference {
+            return text;
+        }
+        let decimals = (1..15).find(|d| speed * libm::pow(10.0, f64::from(*d)) >= 100.0).unwrap_or(15);
+        self.trimmed(format!("{speed:.*}", decimals as usize))
     }
 
     fn trimmed(&self, text: String) -> String {

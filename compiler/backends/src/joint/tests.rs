@@ -200,6 +200,10 @@ fn tables_of_points() {
     insta::assert_snapshot!("cartesian", made.cartesian_csv());
     insta::assert_snapshot!("joints", made.joint_csv());
     let ours = build("G01 X50 Y50 C-60 F1000\n", &arm(), &Options::default()).unwrap();
+    let feeds = |p: &super::JointProgram| p.gcode().split_whitespace().filter(|w| *w == "F0" || *w == "F0,0").count();
+    assert_eq!((feeds(&ours), feeds(&made)), (0, 1), "only the thesis has a feed of nothing");
+    let slow = build("G01 X50 Y50 C-60 F0.01\n", &arm(), &Options { interval: 10.0, ..Options::default() }).unwrap();
+    assert_eq!(feeds(&slow), 0);
     insta::assert_snapshot!("own", format!("{}{}", ours.gcode(), ours.cartesian_csv()));
 }
 

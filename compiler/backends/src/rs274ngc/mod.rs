@@ -177,5 +177,3 @@ pub struct Emitted {
     pub notes: Vec<Diagnostic>,
 }
 
-#[cfg(test)]
-mod tests;

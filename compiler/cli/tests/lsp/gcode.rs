@@ -376,17 +376,19 @@ fn actions_for_cycles_compensation_units_and_ends() {
 
 #[test]
 fn fixes_of_diagnostics() {
-    let text = "G21 G90 F100 S100 M3\nG1 XO\nM2\n";
-    let mut c = Client::new(&[("a.ngc", text)], json!({}));
-    let uri = c.open("a.ngc", None);
+    let text = include_str!("../../../../docs/examples/stepnc/mistakes.p21");
+    let mut c = Client::new(&[("a.p21", text)], json!({}));
+    let uri = c.open("a.p21", None);
     let found = c.diagnostics(&uri);
-    let with_fix = found.iter().find(|d| d["data"]["fixes"].as_u64().unwrap_or(0) > 0);
-    // Whatever diagnostics carry is offered at their place.
-    if let Some(d) = with_fix {
-        let params = json!({ "textDocument": { "uri": uri }, "range": d["range"], "context": { "diagnostics": [d], "only": ["quickfix"] } });
-        let actions = c.request("textDocument/codeAction", params);
-        assert!(actions.as_array().is_some_and(|a| a.iter().any(|a| a["kind"] == "quickfix" && !a["diagnostics"].is_null())), "{actions}");
-    }
+    let d = found.iter().find(|d| d["code"] == "E0401").expect("the misspelt entity");
+    assert_eq!(d["data"]["fixes"], 1, "{d}");
+    let params = json!({ "textDocument": { "uri": uri }, "range": d["range"], "context": { "diagnostics": [d], "only": ["quickfix"] } });
+    let actions = c.request("textDocument/codeAction", params);
+    let fix = actions.as_array().and_then(|a| a.iter().find(|a| a["kind"] == "quickfix" && a["diagnostics"][0]["code"] == "E0401"));
+    let fix = fix.unwrap_or_else(|| panic!("{actions}"));
+    assert_eq!((fix["title"].as_str(), fix["isPreferred"].as_bool()), (Some("write PLANAR_POCKET_BOTTOM_CONDITION"), Some(true)));
+    let edited = c.edited(&uri, &fix["edit"]);
+    assert_eq!(edited, text.replacen("PLANAR_POCKET_BOTOM_CONDITION", "PLANAR_POCKET_BOTTOM_CONDITION", 1));
     c.shut_down();
 }
 

@@ -1,0 +1,180 @@
+//! Findings whose rows in the registry have no example, since they need more than a program: files around it, a machine,
+//! a target, an option. Each is raised here by the command that people meet it in.
+
+use std::path::Path;
+use std::process::Command;
+
+const PART: &str = "G21 G90 F100\nG0 X1 Y1 Z5\nG1 X10\nG1 Y5\nM2\n";
+const TOOL: &str = "G21 G90 F1000\nT1 M6 G43 H1\n";
+
+fn root() -> std::path::PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
+}
+
+fn shipped(path: &str) -> String {
+    std::fs::read_to_string(root().join(path)).unwrap_or_else(|e| panic!("{path}: {e}"))
+}
+
+/// The shipped cell with something replaced.
+fn cell(old: &str, new: &str) -> String {
+    let text = shipped("docs/examples/irb2400-cell.toml");
+    assert!(text.contains(old), "{old}");
+    text.replacen(old, new, 1)
+}
+
+/// A small STEP-NC part, some statements replaced by others with the same number.
+fn plan(statements: &[&str]) -> String {
+    let mut text = shipped("tests/linuxcnc/quick.p21");
+    for new in statements {
+        let head = &new[..=new.find('=').expect("#number=")];
+        let at = text.find(&format!("\n{head}")).map(|n| n + 1).unwrap_or_else(|| text.find("ENDSEC;\nEND-ISO").expect("the end"));
+        let end = if text[at..].starts_with(head) { at + text[at..].find('\n').expect("a line") + 1 } else { at };
+        text.replace_range(at..end, &format!("{new}\n"));
+    }
+    text
+}
+
+/// Runs a command in a folder with some files: which codes it tells, and its exit status.
+fn codes(files: &[(&str, String)], command: &str) -> (Vec<String>, Option<i32>) {
+    let folder = tempfile::tempdir().expect("a folder");
+    for (name, text) in files {
+        std::fs::write(folder.path().join(name), text).expect("written");
+    }
+    let out = Command::new(env!("CARGO_BIN_EXE_gcc-robot"))
+        .args(command.split(' '))
+        .args(if command.starts_with("filter") { &[][..] } else { &["--color", "never"] })
+        .current_dir(folder.path())
+        .output()
+        .expect("the command runs");
+    let text = String::from_utf8_lossy(&out.stderr).into_owned() + &String::from_utf8_lossy(&out.stdout);
+    let mut found: Vec<String> = text.match_indices("[E").filter_map(|(i, _)| text.get(i + 1..i + 6)).map(str::to_string).collect();
+    found.retain(|c| gr_spec::Code::find(c).is_some());
+    (found, out.status.code())
+}
+
+/// Exactly one finding of this code among those told, and the exit status that its severity asks for.
+fn told(code: &str, files: &[(&str, String)], command: &str) {
+    let (found, status) = codes(files, command);
+    assert_eq!(found.iter().filter(|c| *c == code).count(), 1, "{command}: {found:?}, exit {status:?}");
+    let error = gr_spec::Code::find(code).expect("a code").def().severity == gr_spec::Severity::Error;
+    if error {
+        assert!(matches!(status, Some(1..=3)), "{code}: exit {status:?}");
+    } else {
+        assert_eq!(status, Some(0), "{code}: {found:?}");
+    }
+}
+
+fn file(name: &str, text: &str) -> (&'static str, String) {
+    (Box::leak(name.to_string().into_boxed_str()), text.to_string())
+}
+
+#[test]
+fn files_that_cannot_be_had() {
+    let part = [file("a.ngc", PART)];
+    std::fs::metadata("/proc/self/mem").expect("Linux");
+    told("E0820", &[], "check nothing.ngc");
+    told("E0821", &[], "check /proc/self/mem");
+    told("E0822", &[], "build . --target canon");
+    told("E0824", &part, "build a.ngc --target canon -o a.ngc/x");
+    told("E0839", &part, "build a.ngc --target canon -o a.ngc");
+}
+
+#[test]
+fn names_that_nothing_has() {
+    let part = [file("a.ngc", PART)];
+    told("E0834", &part, "check --dialect nothing a.ngc");
+    told("E0835", &part, "build a.ngc --machine nobody --target rapid -o o/");
+    told("E0804", &part, "check --warn foo/bar a.ngc");
+    told("E0805", &part, "check --warn E0203 a.ngc");
+}
+
+#[test]
+fn tables_and_settings() {
+    let part = file("a.ngc", PART);
+    told("E0829", &[part.clone(), file("a.ini", "[TRAJ]\nwhat is this\n")], "check -i a.ini a.ngc");
+    let many: String = (1..=1100).map(|n| format!("T{n} P{n} Z1\n")).collect();
+    told("E0837", &[part, file("a.tbl", &many)], "check --tools a.tbl a.ngc");
+    let ini = file("a.ini", "[EMCIO]\nTOOL_TABLE = a.tbl\n[TRAJ]\nLINEAR_UNITS = mm\n");
+    let tools = file("a.tbl", "T1 P1 Z50 D6\nT2 P2 Z60 D6\nT3 P3 Z60 D5\n");
+    told("E0844", &[ini, tools, file("a.p21", &plan(&[]))], "filter -i a.ini a.p21");
+}
+
+#[test]
+fn axes_and_remaps_of_the_ini_file() {
+    let ini = file("a.ini", "[AXIS_A]\nWRAPPED_ROTARY = 1\n[TRAJ]\nLINEAR_UNITS = mm\n");
+    told("E0258", &[ini, file("a.ngc", "G21 G90 F100\nG0 A400\nM2\n")], "check -i a.ini a.ngc");
+    let ini = file("a.ini", "[RS274NGC]\nREMAP = M405 modalgroup=6 argspec=PQ ngc=sub405\nSUBROUTINE_PATH = .\n");
+    let sub = file("sub405.ngc", "o<sub405> sub\no<sub405> endsub\n");
+    told("E0259", &[ini, sub, file("a.ngc", "G21\nM405 P1\nM2\n")], "check -i a.ini a.ngc");
+}
+
+#[test]
+fn exchange_files_and_plans() {
+    let deep = format!("#7=CARTESIAN_POINT('',{}{});", "(".repeat(10_001), ")".repeat(10_001));
+    for (code, statements) in [
+        ("E0318", vec![deep.as_str()]),
+        ("E0440", vec!["#66=MILLING_TOOL_DIMENSION(5.,59.,$,3.,0.,$,$);"]),
+        ("E0442", vec!["#26=TOLERANCED_LENGTH_MEASURE(1.,#44);"]),
+        ("E0486", vec!["#56=MILLING_TECHNOLOGY(0.04,.TCP.,$,200.,$,.F.,.F.,.F.,$);"]),
+        (
+            "E0490",
+            vec![
+                "#2=WORKPLAN('main',(#90,#91),$,$,$);",
+                "#90=WORKPLAN('one',(#10,#11),$,#3,$);",
+                "#91=WORKPLAN('two',(#12),$,#92,$);",
+                "#92=SETUP('turned',$,#9,(#5));",
+            ],
+        ),
+        (
+            "E0491",
+            vec![
+                "#3=SETUP('vise',#90,#9,(#5));",
+                "#90=AXIS2_PLACEMENT_3D('origin',#91,#60,#61);",
+                "#91=CARTESIAN_POINT('',(5.,6.,7.));",
+            ],
+        ),
+    ] {
+        let files = [file("a.p21", &plan(&statements))];
+        let (found, status) = codes(&files, "check a.p21");
+        let error = gr_spec::Code::find(code).expect("a code").def().severity == gr_spec::Severity::Error;
+        // A plan says some things of each place it holds at.
+        assert!(found.iter().any(|c| c == code), "{code}: {found:?}");
+        assert_eq!(status == Some(0), !error, "{code}: {found:?}");
+    }
+}
+
+#[test]
+fn what_a_written_program_cannot_carry() {
+    let input = file("a.ngc", "G21 G90 F100\nM66 P0 L0\nG0 X#5399\nM2\n");
+    told("E0602", &[input], "build a.ngc --target rs274ngc -o a.nc");
+    let arc = file("a.ngc", "G21 G90 G17 F100\nG0 X0.1234 Y0.5678 Z0\nG3 X10.7777 Y3.3333 R7.123\nM2\n");
+    told("E0603", std::slice::from_ref(&arc), "build a.ngc --target rs274ngc --decimals 1 -o a.nc");
+    told("E0604", &[arc], "build a.ngc --target rs274ngc --to grbl --arcs ijk-absolute -o a.nc");
+    told("E0605", &[file("a.ngc", "G21 G90\nG10 L2 P2 X10\nG55 G0 X1\nM2\n")], "build a.ngc --target rs274ngc -o a.nc");
+    told("E0614", &[file("a.ngc", PART)], "build a.ngc --target rs274ngc --from-line 4 -o a.nc");
+}
+
+#[test]
+fn what_a_robot_cannot_do() {
+    let shipped = file("cell.toml", &shipped("docs/examples/irb2400-cell.toml"));
+    let part = file("a.ngc", &format!("{TOOL}G0 X10 Y10 Z25\nG1 Z5\nM2\n"));
+    let rapid = "build a.ngc --machine cell.toml --target rapid -o o/";
+    let turn = file("a.ngc", &format!("{TOOL}G0 X10 Y10 Z25\nG1 A10\nM2\n"));
+    told("E0509", &[turn.clone(), file("cell.toml", &cell("id =", "orientation = \"fixed\"\nid ="))], rapid);
+    told("E0539", &[turn, file("cell.toml", &cell("id =", "orientation = \"abc-euler-xyz\"\nid ="))], rapid);
+    let frame = "[[frame]]\nname = \"G55\"\nposition = [900, -100, 400]\n\n[home]";
+    let (found, _) = codes(&[part.clone(), file("cell.toml", &cell("[home]", frame))], rapid);
+    assert!(!found.is_empty() && found.iter().all(|c| c == "E0522"), "{found:?}");
+    let table = format!("{rapid} --tools a.tbl");
+    told("E0525", &[part.clone(), shipped.clone(), file("a.tbl", "T1 P1 Z50 D10\n")], &table);
+    let wide = file("a.ngc", &format!("{TOOL}G0 X-400 Y-500 Z25\nG0 X-400 Y700\nG1 Z20\nM2\n"));
+    told("E0526", &[wide, shipped.clone()], rapid);
+    let stopped = file("a.ngc", "G21 G90 G95 F0.1 S4000 M3\nT1 M6 G43 H1\nG0 X10 Y10 Z25\nM5\nG1 Z5\nM2\n");
+    told("E0528", &[stopped, shipped.clone()], rapid);
+    told("E0534", std::slice::from_ref(&part), "build a.ngc --machine comau/tricept806 --target pdl2 -o o/");
+    let slow = file("a.ngc", "G21 G90 F0.0001\nT1 M6 G43 H1\nG0 X40 Y10 Z25\nG1 X400\nM2\n");
+    told("E0537", &[slow, shipped.clone()], "build a.ngc --machine cell.toml --target setpoints -o o/");
+    told("E0704", &[part, shipped], &format!("{rapid} --compensate"));
+    let huge = file("a.ngc", "G21 G90 F100\nG0 X0 Y0 Z0\nG1 X9000\nG1 Y9000\nM2\n");
+    told("E0705", &[huge], "place a.ngc --machine abb/irb2400");
+}
