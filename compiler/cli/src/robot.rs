@@ -337,6 +337,9 @@ pub fn joint_gcode(motion: &Motion, goal: &Goal<'_>, texts: &dyn Sources, name: 
     if o.interval.is_some_and(|t| !(t > 0.0)) {
         return Err("--interval must be above zero".into());
     }
+    if o.round == Some(crate::emit::RoundArg::Truncate) {
+        return Err("--round truncate is for the planar arm and for --reference ufmg2008; here every number is the nearest one".into());
+    }
     let (planned, corrected) = match own_plan(motion, goal, texts, name)? {
         Ok(planned) => planned,
         Err(found) => return Ok(Err(found)),
@@ -353,8 +356,9 @@ pub fn joint_gcode(motion: &Motion, goal: &Goal<'_>, texts: &dyn Sources, name: 
         Err(e) => return Ok(Err(vec![too_many(&e, texts)])),
     };
     let table = TableOptions { decimals: o.decimals.unwrap_or(6), comma: o.decimal_comma };
+    let (words, found) = gcode(&planned.program, &path, table.decimals, texts);
     let mut artifacts = vec![
-        Artifact::new("", gcode(&planned.program, &path, table.decimals).into_bytes()),
+        Artifact::new("", words.into_bytes()),
         Artifact::new("-cartesian.csv", cartesian_csv(&path, table).into_bytes()),
         Artifact::new("-joint.csv", joint_csv(&planned.program, &path, table).into_bytes()),
     ];
@@ -363,7 +367,8 @@ pub fn joint_gcode(motion: &Motion, goal: &Goal<'_>, texts: &dyn Sources, name: 
         summary += &c.summary;
         artifacts.push(c.table);
     }
-    Ok(Ok(Made { artifacts, summary, notes: planned.warnings }))
+    let notes = planned.warnings.into_iter().chain(found).collect();
+    Ok(Ok(Made { artifacts, summary, notes }))
 }
 
 /// Set-points for a joint controller: a table, and the same as bytes beside it.
@@ -381,9 +386,12 @@ pub fn setpoints(motion: &Motion, goal: &Goal<'_>, texts: &dyn Sources, name: &s
     };
     let made = match setpoints(&planned.program, &SetpointOptions { interval, smoothing, ..default }) {
         Ok(made) => made,
-        Err(e) => return Ok(Err(vec![too_many(&e, texts)])),
+        Err(e) => return Ok(Err(vec![e.finding(&planned.program.machine, texts)])),
     };
     let mut artifacts = vec![Artifact::new("", made.csv().into_bytes()), Artifact::new(".bin", made.bytes())];
+    if !made.events.is_empty() {
+        artifacts.push(Artifact::new("-events.csv", made.events_csv(&planned.program).into_bytes()));
+    }
     let seconds = made.rows.len().saturating_sub(1) as f64 * interval;
     let mut summary = format!("{}  {} set-points, {} with acceleration\n", summary(&planned), made.rows.len(), duration(seconds));
     if let Some(c) = corrected {
@@ -392,6 +400,7 @@ pub fn setpoints(motion: &Motion, goal: &Goal<'_>, texts: &dyn Sources, name: &s
     }
     let mut notes = planned.warnings;
     notes.extend(corners_kept(&planned.program, texts));
+    notes.extend(made.findings(&planned.program, texts));
     Ok(Ok(Made { artifacts, summary, notes }))
 }
 

@@ -119,3 +119,18 @@ fn setups_of_a_job() {
     assert_eq!(bad.status.code(), Some(2));
     assert!(text(&bad.stderr).contains("needs `from_line` or `workingsteps`"), "{}", text(&bad.stderr));
 }
+
+/// What set-points can't say stands beside them; an option that has no effect is refused.
+#[test]
+fn joint_targets_drop_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("part.csv");
+    let made = run(&["build", PART, "--machine", CELL, "--target", "setpoints", "-o", out.to_str().unwrap()]);
+    assert!(made.status.success(), "{}", text(&made.stderr));
+    assert!(text(&made.stderr).contains("E0546"), "{}", text(&made.stderr));
+    let events = std::fs::read_to_string(folder.path().join("part-events.csv")).unwrap();
+    assert!(events.contains("\"T2 M6\",\"ChangeTool\"") && events.contains("\"S12000\",\"aoSpindleSpeed = 12000\""), "{events}");
+    let bad = run(&["build", PART, "--machine", CELL, "--target", "joint-gcode", "--round", "truncate", "-o", out.to_str().unwrap()]);
+    assert_eq!(bad.status.code(), Some(2));
+    assert!(text(&bad.stderr).contains("every number is the nearest one"), "{}", text(&bad.stderr));
+}

@@ -293,6 +293,9 @@ impl<S: Sink> Interp<'_, S> {
             5061..=5070 if self.m.stand_ins & 2 != 0 => "a probe (G38)",
             _ => return,
         };
+        if index == 5399 {
+            self.mark_runtime("input");
+        }
         let shown = [format!("#{index}"), source.to_string()];
         let place = self.place;
         let same = |f: &crate::Finding| {

@@ -284,7 +284,7 @@ impl<S: Sink> Interp<'_, S> {
             self.m.tool_changed = 0;
         }
         if self.m.input_wanted != 0 {
-            self.mark_runtime("input");
+            // Whoever reads it marks what follows: a wait alone changes nothing.
             self.m.stand_ins |= 1;
             let old = self.params.get(5399);
             if self.m.input_wanted == 1 {

@@ -143,7 +143,22 @@ pub struct Zones {
     pub max: Option<f64>,
 }
 
+/// The number in a signal's name: `5`, `DO[5]`, `OT#(5)`, `$OUT[5]`, `out_5`.
+pub fn signal_number(name: &str) -> Option<u32> {
+    let mut groups = name.split(|c: char| !c.is_ascii_digit()).filter(|g| !g.is_empty());
+    let (one, more) = (groups.next()?, groups.next());
+    if more.is_some() { None } else { one.parse().ok() }
+}
+
 impl Cell {
+    /// Speed of rapids in a line, mm/s: without one in the file, that of teaching by hand (ISO 10218-1).
+    pub fn line_rapid(&self) -> f64 {
+        self.rapid_speed.unwrap_or(250.0)
+    }
+    /// Share of the joints' greatest speed at which joint moves go, above 0 to 1.
+    pub fn joint_share(&self) -> f64 {
+        (self.joint_speed.unwrap_or(100.0) / 100.0).clamp(0.001, 1.0)
+    }
     /// The part's frame in the base.
     pub fn part_in_base(&self) -> Frame {
         self.table.then(&self.part)

@@ -48,7 +48,7 @@ mod ur;
 mod urdf;
 
 pub use cartesian::Cartesian;
-pub use cell::{Cell, Controller, Coupling, External, Rapid, Signal, Spindle, ToolData, Zones};
+pub use cell::{Cell, Controller, Coupling, External, Rapid, Signal, Spindle, ToolData, Zones, signal_number};
 pub use five_axis::{Carrier, FiveAxis, Rotary};
 pub use identify::{Fit, identify};
 pub use keys::json_schema;
@@ -109,6 +109,17 @@ pub struct Joint {
 }
 
 impl Joint {
+    /// Greatest speed; a calm one where the file gives none, rad/s or mm/s.
+    pub fn top_speed(&self) -> f64 {
+        self.speed.unwrap_or(match self.kind {
+            JointKind::Revolute => std::f64::consts::FRAC_PI_2,
+            JointKind::Prismatic => 200.0,
+        })
+    }
+    /// Greatest speed of a rapid.
+    pub fn top_rapid(&self) -> f64 {
+        self.rapid.unwrap_or_else(|| self.top_speed())
+    }
     /// Whether a value lies within the limits, with a little room for rounding.
     pub fn allows(&self, value: f64) -> bool {
         const ROOM: f64 = 1e-9;

@@ -4,7 +4,7 @@
 use gr_ir::Turn;
 use gr_machine::{Machine, Signal};
 
-use crate::Action;
+use crate::{Action, Word};
 
 /// What a word becomes.
 pub(crate) struct Made {
@@ -25,6 +25,8 @@ pub(crate) struct Cells {
     turning: Turn,
     coolant: bool,
     speed: f64,
+    /// Speed that the operator was asked to set.
+    told: f64,
 }
 
 impl Cells {
@@ -38,6 +40,7 @@ impl Cells {
             turning: Turn::Stop,
             coolant: false,
             speed: 0.0,
+            told: 0.0,
         }
     }
 
@@ -56,31 +59,45 @@ impl Cells {
     }
 
     /// The output or routine of a word, then its wait.
-    pub fn word(&self, word: &str, value: Option<f64>, more: &str) -> Made {
-        match self.io.get(word) {
-            Some(signal) => Made { actions: steps(word, value, signal.clone()), by_hand: None },
+    pub fn word(&self, word: Word, value: Option<f64>) -> Made {
+        match self.row(&word) {
+            Some(signal) => Made { actions: steps(word, value, signal), by_hand: None },
             None if self.own_words => {
-                // An output's number belongs to its word, a speed doesn't.
-                let number = more.split(" Q").next().filter(|m| m.starts_with(" P")).unwrap_or("");
-                let signal = Signal::default();
-                Made { actions: vec![Action::Signal { word: format!("{word}{number}"), value, signal }], by_hand: None }
+                Made { actions: vec![Action::Signal { word, value, signal: Signal::default() }], by_hand: None }
             }
-            None => {
-                let text = format!("{word}{more}");
-                let actions = vec![Action::Message(text), Action::Pause { optional: false }];
-                Made { actions, by_hand: Some(word.to_string()) }
-            }
+            None => by_hand(&word),
         }
     }
 
-    fn spindle(&self, word: &str, speed: f64) -> Made {
-        let more = if speed > 0.0 && word != "M5" { format!(" S{speed}") } else { String::new() };
-        if self.by_hand {
-            let actions = vec![Action::Message(format!("{word}{more}")), Action::Pause { optional: false }];
-            return Made { actions, by_hand: Some(word.to_string()) };
+    /// What the machine file says about a word: a row for its own number comes first.
+    pub fn row(&self, word: &Word) -> Option<Signal> {
+        self.io.get(&word.key()).or_else(|| self.io.get(&word.code)).cloned()
+    }
+
+    /// The controller knows the program's words itself.
+    pub fn own_words(&self) -> bool {
+        self.own_words
+    }
+
+    fn spindle(&self, turn: Turn, speed: f64) -> Made {
+        let word = Word::new(turn_word(turn));
+        let runs = turn != Turn::Stop;
+        let word = if runs && speed > 0.0 { word.with('S', speed) } else { word };
+        if self.by_hand { by_hand(&word) } else { self.word(word, runs.then_some(speed)) }
+    }
+
+    /// Starts and stops the spindle; an output that is on or off leaves the speed to the operator.
+    fn turned(&mut self, turn: Turn, speed: f64) -> Made {
+        let made = self.spindle(turn, speed);
+        let output = self.io.get(turn_word(turn)).is_some_and(|s| s.routine.is_none());
+        let unsaid = turn != Turn::Stop && output && !self.by_hand && !self.own_words && !self.io.contains_key("S");
+        if !unsaid || speed == self.told {
+            return made;
         }
-        let value = (word != "M5").then_some(speed);
-        self.word(word, value, &more)
+        self.told = speed;
+        let mut asked = by_hand(&Word::new("S").with('S', speed));
+        asked.actions.extend(made.actions);
+        asked
     }
 
     pub fn speed(&mut self, speed: f64, turning: Turn) -> Made {
@@ -90,14 +107,14 @@ impl Cells {
             return Made::NOTHING;
         }
         if !self.by_hand && self.io.contains_key("S") {
-            let mut made = self.word("S", Some(speed), "");
+            let mut made = self.word(Word::new("S").with('S', speed), Some(speed));
             if turning != Turn::Stop {
                 made.actions.extend(self.io.get(turn_word(turning)).and_then(wait));
             }
             return made;
         }
         // Without an output of its own the speed goes with the word that starts the spindle.
-        if turning == Turn::Stop { Made::NOTHING } else { self.spindle(turn_word(turning), speed) }
+        if turning == Turn::Stop { Made::NOTHING } else { self.turned(turning, speed) }
     }
 
     pub fn turn(&mut self, turn: Turn, speed: f64) -> Made {
@@ -105,20 +122,20 @@ impl Cells {
             return Made::NOTHING;
         }
         self.turning = turn;
-        self.spindle(turn_word(turn), speed)
+        self.turned(turn, speed)
     }
 
     pub fn coolant(&mut self, word: &str, on: bool, any: bool) -> Made {
         if on {
             self.coolant = true;
-            return self.word(word, None, "");
+            return self.word(word.into(), None);
         }
         // M9 comes as two switches; one word does both.
         if any || !self.coolant {
             return Made::NOTHING;
         }
         self.coolant = false;
-        self.word("M9", None, "")
+        self.word("M9".into(), None)
     }
 
     /// Spindle and coolant at the end of a program.
@@ -139,30 +156,27 @@ impl Cells {
             (false, false) => ("M65", "M63"),
         };
         let numbered = |w: &str| self.io.get(&format!("{w}P{index}")).cloned();
-        let word = format!("{own} P{index}");
+        let word = Word::numbered(own, 'P', index);
         if let Some(signal) = numbered(own).or_else(|| numbered(other)) {
-            return Made { actions: steps(&word, None, signal), by_hand: None };
+            return Made { actions: steps(word, None, signal), by_hand: None };
         }
         let opposite = if on { ["M63", "M65"] } else { ["M62", "M64"] };
         if let Some(signal) = opposite.into_iter().find_map(numbered).filter(|s| s.signal.is_some()) {
             let value = Some(if on { 1.0 } else { 0.0 });
-            return Made { actions: steps(&word, None, Signal { value, ..signal }), by_hand: None };
+            return Made { actions: steps(word, None, Signal { value, ..signal }), by_hand: None };
         }
-        let mut made = self.word(own, Some(f64::from(index)), &format!(" P{index}"));
-        made.by_hand = made.by_hand.map(|w| format!("{w}P{index}"));
-        made
+        self.word(word, Some(f64::from(index)))
     }
 
     /// M67, M68.
     pub fn analog(&self, index: i32, value: f64, synced: bool) -> Made {
         let (own, other) = if synced { ("M67", "M68") } else { ("M68", "M67") };
-        let numbered = |w: &str| self.io.get(&format!("{w}P{index}")).cloned();
-        if let Some(signal) = numbered(own).or_else(|| numbered(other)) {
-            return Made { actions: steps(&format!("{own} P{index}"), Some(value), signal), by_hand: None };
+        let word = Word::numbered(own, 'E', index).with('Q', value);
+        let other = self.io.get(&Word::numbered(other, 'E', index).key());
+        if let (None, Some(signal)) = (self.io.get(&word.key()), other) {
+            return Made { actions: steps(word, Some(value), signal.clone()), by_hand: None };
         }
-        let mut made = self.word(own, Some(value), &format!(" P{index} Q{value}"));
-        made.by_hand = made.by_hand.map(|w| format!("{w}P{index}"));
-        made
+        self.word(word, Some(value))
     }
 
     /// Name of the input that M66 waits for.
@@ -180,13 +194,19 @@ fn turn_word(turn: Turn) -> &'static str {
     }
 }
 
+/// The operator does it.
+fn by_hand(word: &Word) -> Made {
+    let actions = vec![Action::Message(word.to_string()), Action::Pause { optional: false }];
+    Made { actions, by_hand: Some(word.key()) }
+}
+
 /// An output or routine without its wait, then the wait.
-fn steps(word: &str, value: Option<f64>, signal: Signal) -> Vec<Action> {
+fn steps(word: Word, value: Option<f64>, signal: Signal) -> Vec<Action> {
     let after = wait(&signal);
     let plain = Signal { wait: None, seconds: None, ..signal };
     let mut out = Vec::new();
     if plain.signal.is_some() || plain.routine.is_some() {
-        out.push(Action::Signal { word: word.to_string(), value, signal: plain });
+        out.push(Action::Signal { word, value, signal: plain });
     }
     out.extend(after);
     out

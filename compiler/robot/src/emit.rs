@@ -8,8 +8,8 @@ use gr_text::code;
 
 use crate::choose::{Chain, Node, unwrap};
 use crate::gather::{Findings, Gathered, Item, Move, Way};
-use crate::path::Mount;
-use crate::plan::{path_of, spun};
+use crate::path::{Mount, Path};
+use crate::plan::spun;
 use crate::solver::{Branches, Joints, Limits, Solver};
 use crate::{Action, MAX_JOINTS, RobotProgram, Step, Summary, Target, Zone};
 
@@ -91,7 +91,7 @@ impl<'a> Emit<'a> {
         if here.is_some() {
             self.summary.rapid_seconds += self.joint_time(&last, home, 1.0);
             let to = self.keep(at_home);
-            let speed = self.joint_share();
+            let speed = self.machine.cell.joint_share();
             self.steps.push(Step { action: Action::Joint { to, speed, zone: Zone::Stop }, source: None });
         }
         self.steps.push(Step { action: Action::End, source: None });
@@ -106,10 +106,6 @@ impl<'a> Emit<'a> {
             steps: self.steps,
         };
         (program, self.summary)
-    }
-
-    fn joint_share(&self) -> f64 {
-        (self.machine.cell.joint_speed.unwrap_or(100.0) / 100.0).clamp(0.001, 1.0)
     }
 
     fn keep(&mut self, target: Target) -> u32 {
@@ -172,7 +168,7 @@ impl<'a> Emit<'a> {
 
     /// Joint values along a move: the end, the middle, and whether any joint is too fast.
     fn follow(&mut self, g: &Gathered, m: &Move, node: &Node, h: &Here, findings: &mut Findings<'_>) -> (Joints, Joints) {
-        let path = path_of(g, h.position, h.turn, m);
+        let path = Path::new(g, h.position, h.turn, m);
         let mount = Mount::new(g, m, node.spin);
         let looks = path.looks();
         // An even number of looks has one in the middle.
@@ -241,7 +237,7 @@ impl<'a> Emit<'a> {
         if self.summary.limit_margin.is_none_or(|(l, ..)| left < l) {
             self.summary.limit_margin = Some((left, joint, source));
         }
-        if let Some(margin) = self.solver.reach_margin(&Frame::IDENTITY, q)
+        if let Some(margin) = self.solver.reach_margin(q)
             && self.summary.reach_margin.is_none_or(|(m, _)| margin < m)
         {
             self.summary.reach_margin = Some((margin, source));

@@ -3,15 +3,15 @@
 //! here.
 
 use gr_ir::geometry::ArcShape;
-use gr_ir::{FeedMode, Note, Op, PathMode, Pose, Program, Source, Sources, State, Stop, Turn, View};
+use gr_ir::{FeedMode, Note, Op, Override, PathMode, Pose, Program, Source, Sources, State, Stop, Turn, View};
 use gr_machine::math::{Frame, M3, dot, euler, norm, product, rot_x, rot_z, rotation_vector, scale, sub, transpose};
 use gr_machine::{Chain, Control, Kind, Machine, Orientation, Rapid};
 use gr_text::{Code, Diagnostic, code};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::PI;
 
 use crate::cell::Cells;
-use crate::{Action, Options, Step, Tool, WorkFrame, Zone};
+use crate::{Action, Options, Step, Tool, Word, WorkFrame, Zone};
 
 /// How a move goes.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -118,8 +118,6 @@ impl<'a> Findings<'a> {
 
 /// Below this a radius counts as reached and a way as none, mm.
 const TINY: f64 = 1e-9;
-/// Speed of rapids in a line where the machine file has none, mm/s.
-const RAPID: f64 = 250.0;
 /// Largest corner where a program has G64 without a tolerance and the machine file no zone, mm.
 const CORNER: f64 = 0.5;
 /// A change of tool direction is cut so that no piece turns further, rad.
@@ -147,6 +145,15 @@ pub(crate) struct Gather<'a> {
     source: Source,
     clamped: Option<usize>,
     workingstep: Option<String>,
+    /// The pallet was exchanged just now: the stop that follows is that of M60.
+    pallet: bool,
+    /// Switches of the panel that the program has set.
+    switches: BTreeMap<&'static str, bool>,
+    /// Frames and tools by what they are.
+    frame_numbers: BTreeMap<(&'static str, [u64; 12]), u16>,
+    /// Frames of each name.
+    named: BTreeMap<&'static str, u32>,
+    tool_numbers: BTreeMap<(u32, String, [u64; 12]), u16>,
 }
 
 impl<'a> Gather<'a> {
@@ -184,6 +191,11 @@ impl<'a> Gather<'a> {
             source: Source::default(),
             clamped: None,
             workingstep: None,
+            pallet: false,
+            switches: BTreeMap::new(),
+            frame_numbers: BTreeMap::new(),
+            named: BTreeMap::new(),
+            tool_numbers: BTreeMap::new(),
         }
     }
 
@@ -194,6 +206,9 @@ impl<'a> Gather<'a> {
                 break;
             }
             self.source = view.source;
+            if !matches!(view.op, Op::Stop(_)) {
+                self.pallet = false;
+            }
             self.op(&view);
         }
         if !self.ended {
@@ -212,8 +227,8 @@ impl<'a> Gather<'a> {
             Op::SyncStart(s) if !s.velocity => self.cannot("a motion locked to the spindle's angle (G33)"),
             Op::IndexerLock(..) => self.cannot("an indexing axis"),
             Op::SpindleOrient { .. } | Op::SpindleWait { .. } if self.control == Control::Position => self.yaws(view),
-            Op::SpindleOrient { angle, .. } => self.word("M19", Some(angle.to_degrees())),
-            Op::SpindleWait { .. } => {}
+            Op::SpindleOrient { spindle, angle, direction } => self.orient(spindle, angle, direction),
+            Op::SpindleWait { timeout, .. } => self.oriented(timeout),
             Op::RunTime(what) => self.findings.say(code::ROBOT_RUN_TIME, Some(view.source), &[what.to_string()]),
             Op::ToolOffset(_) => {
                 for i in 0..3 {
@@ -237,6 +252,10 @@ impl<'a> Gather<'a> {
                 self.act(Action::Dwell(t));
             }
             Op::ToolChange(_) => self.change(state.tool),
+            // What is on is on the first spindle; the others are only told to stop.
+            Op::SpindleSpeed { speed, spindle } if spindle > 0 && speed != 0.0 => self.cannot("a second spindle ($)"),
+            Op::SpindleTurn { turn, spindle } if spindle > 0 && turn != Turn::Stop => self.cannot("a second spindle ($)"),
+            Op::SpindleSpeed { spindle, .. } | Op::SpindleTurn { spindle, .. } if spindle > 0 => {}
             Op::SpindleSpeed { speed, spindle } => self.speed_word(state, spindle, speed),
             Op::SpindleTurn { turn, spindle } => self.turn_word(state, spindle, turn),
             Op::SpindleMode { surface: Some(_), .. } => self.cannot("constant surface speed (G96)"),
@@ -251,7 +270,8 @@ impl<'a> Gather<'a> {
                 self.made(made);
             }
             Op::InputWait { index, digital, wait, timeout } => self.input(index, digital, wait, timeout),
-            Op::UserM { code, p, .. } => self.word(&format!("M{code}"), Some(p)),
+            Op::UserM { code, p, q } => self.user(code, p, q),
+            Op::Override(which, free) => self.switch(which, free),
             Op::Note(Note::Message, text) => self.act(Action::Message(text.to_string())),
             Op::Note(_, text) if text.starts_with("interpreter:") => {}
             Op::Note(_, text) => self.act(Action::Comment(text.to_string())),
@@ -262,8 +282,8 @@ impl<'a> Gather<'a> {
                 self.act(Action::Comment(text.to_string()));
             }
             // The shuttle that M30 and M60 move; M60 stops the program besides.
-            Op::Stop(Stop::Pallet) => {}
-            Op::Stop(stop) => self.act(Action::Pause { optional: stop == Stop::Optional }),
+            Op::Stop(Stop::Pallet) => self.pallet = true,
+            Op::Stop(stop) => self.stop(stop),
             _ => {}
         }
     }
@@ -281,9 +301,95 @@ impl<'a> Gather<'a> {
         }
         made.actions.into_iter().for_each(|a| self.act(a));
     }
-    fn word(&mut self, word: &str, value: Option<f64>) {
-        let made = self.cells.word(word, value, "");
+    fn word(&mut self, word: Word, value: Option<f64>) {
+        let made = self.cells.word(word, value);
         self.made(made);
+    }
+
+    /// M19.
+    fn orient(&mut self, spindle: i32, angle: f64, direction: i32) {
+        if spindle > 0 {
+            return self.cannot("a second spindle ($)");
+        }
+        let degrees = libm::round(angle.to_degrees() * 1e9) / 1e9;
+        let word = Word::new("M19").with('R', degrees);
+        let word = if direction == 0 { word } else { word.with('P', f64::from(direction)) };
+        if degrees != 0.0 && self.on_or_off(&word) {
+            return self.cannot(&format!("the angle of {word} (the row `M19` of the machine file switches an output)"));
+        }
+        self.word(word, Some(degrees));
+    }
+    /// The Q of M19: the program goes on when the spindle stands there.
+    fn oriented(&mut self, timeout: f64) {
+        let last = self.out.items.iter_mut().rev().find_map(|i| match i {
+            Item::Do(Step { action: Action::Signal { word, .. }, .. }) if word.code == "M19" => Some(word),
+            _ => None,
+        });
+        match (last, self.cells.own_words()) {
+            (Some(word), true) => word.arguments.push(('Q', timeout)),
+            // By hand the operator waits; a routine comes back when it is done.
+            _ => match self.cells.row(&Word::new("M19")) {
+                Some(s) if s.routine.is_none() && s.wait.is_none() && s.seconds.is_none() => {
+                    self.cannot("waiting for the spindle to stand, M19 with Q (the row `M19` of the machine file has neither `wait` nor `seconds`),");
+                }
+                _ => {}
+            },
+        }
+    }
+
+    /// M100 to M199; an argument that isn't there comes as -1.
+    fn user(&mut self, code: i32, p: f64, q: f64) {
+        let word = Word::new(format!("M{code}"));
+        let given = |v: f64| (v != -1.0).then_some(v);
+        let word = given(p).map_or(word.clone(), |p| word.with('P', p));
+        let word = given(q).map_or(word.clone(), |q| word.with('Q', q));
+        if !self.cells.own_words() && given(q).is_some() && self.cells.row(&word).is_some() {
+            return self.cannot(&format!("the Q of {word} (a row of the machine file passes on one number)"));
+        }
+        if given(p).is_some() && self.on_or_off(&word) {
+            return self.cannot(&format!("the number of {word} (the row `{}` of the machine file switches an output)", word.code));
+        }
+        self.word(word, given(p));
+    }
+
+    /// A word that becomes an output, where a number has no place.
+    fn on_or_off(&self, word: &Word) -> bool {
+        !self.cells.own_words() && self.cells.row(word).is_some_and(|s| s.routine.is_none() && s.signal.is_some())
+    }
+
+    /// M48 to M53: switches of the operator's panel, which a robot's controller keeps to itself.
+    fn switch(&mut self, which: Override, free: bool) {
+        let (code, usual) = match which {
+            Override::Feed => ("M50", true),
+            Override::Speed(spindle) if spindle > 0 => return,
+            Override::Speed(_) => ("M51", true),
+            Override::Adaptive => ("M52", false),
+            Override::FeedHold => ("M53", true),
+        };
+        let known = self.switches.insert(code, free).unwrap_or(usual);
+        if known == free {
+            return;
+        }
+        let word = Word::new(code).with('P', f64::from(u8::from(free)));
+        if self.cells.own_words() || self.cells.row(&word).is_some() {
+            return self.word(word, Some(f64::from(u8::from(free))));
+        }
+        if free != usual {
+            self.findings.once_each(code::ROBOT_OVERRIDE, Some(self.source), &[word.to_string()]);
+        }
+    }
+
+    /// M0, M1, M60.
+    fn stop(&mut self, stop: Stop) {
+        let pallet = std::mem::take(&mut self.pallet);
+        if !pallet {
+            return self.act(Action::Pause { optional: stop == Stop::Optional });
+        }
+        let row = self.cells.row(&Word::new("M60")).is_some();
+        self.word(Word::new("M60"), None);
+        if row {
+            self.act(Action::Pause { optional: false });
+        }
     }
 
     fn speed_word(&mut self, state: &State, spindle: i32, speed: f64) {
@@ -305,14 +411,24 @@ impl<'a> Gather<'a> {
         self.made(made);
     }
     fn input(&mut self, index: i32, digital: bool, wait: i32, timeout: f64) {
+        let word = Word::numbered("M66", if digital { 'P' } else { 'E' }, index).with('L', f64::from(wait));
+        let word = if timeout > 0.0 { word.with('Q', timeout) } else { word };
+        if self.cells.own_words() {
+            let value = Some(f64::from(index));
+            return self.act(Action::Signal { word, value, signal: gr_machine::Signal::default() });
+        }
+        if wait == 0 {
+            // What is read has an operation of its own where the program depends on it.
+            return self.act(Action::Comment(word.to_string()));
+        }
         if !digital {
             return self.cannot("waiting for an analog input");
         }
         let Some(name) = self.cells.input(index) else {
-            return self.word("M66", Some(f64::from(index)));
+            return self.word(word, Some(f64::from(index)));
         };
         let timeout = (timeout > 0.0).then_some(timeout);
-        // 1 rise, 2 fall, 3 high, 4 low; 0 reads at once, and what is read has its own operation.
+        // 1 rise, 2 fall, 3 high, 4 low.
         let states: &[bool] = match wait {
             1 => &[false, true],
             2 => &[true, false],
@@ -372,22 +488,26 @@ impl<'a> Gather<'a> {
         let frame = placed
             .then(&Frame { turn: rot_z(state.rotation), position: [o[0], o[1], o[2]] })
             .then(&Frame::shift([l[0], l[1], l[2]]));
-        if let Some(last) = self.frame
-            && self.out.frames[usize::from(last)].frame == frame
-            && self.out.frames[usize::from(last)].name.split('_').next() == Some(name)
-        {
-            return Some(last);
+        let key = (name, bits(&frame));
+        let index = match self.frame_numbers.get(&key) {
+            Some(index) => *index,
+            None => {
+                let Ok(index) = u16::try_from(self.out.frames.len()) else {
+                    self.cannot("more than 65536 work frames (every other G92 or G10 makes one)");
+                    return None;
+                };
+                let more = self.named.entry(name).or_insert(0);
+                *more += 1;
+                let name = if *more == 1 { name.to_string() } else { format!("{name}_{more}") };
+                self.out.frames.push(WorkFrame { name, frame });
+                self.frame_numbers.insert(key, index);
+                index
+            }
+        };
+        if self.frame != Some(index) {
+            self.act(Action::UseFrame(index));
+            self.frame = Some(index);
         }
-        let same = self.out.frames.iter().position(|f| f.frame == frame && f.name.split('_').next() == Some(name));
-        let index = same.unwrap_or_else(|| {
-            let more = self.out.frames.iter().filter(|f| f.name.split('_').next() == Some(name)).count();
-            let name = if more == 0 { name.to_string() } else { format!("{name}_{}", more + 1) };
-            self.out.frames.push(WorkFrame { name, frame });
-            self.out.frames.len() - 1
-        });
-        let index = u16::try_from(index).unwrap_or(u16::MAX);
-        self.act(Action::UseFrame(index));
-        self.frame = Some(index);
         Some(index)
     }
 
@@ -420,13 +540,19 @@ impl<'a> Gather<'a> {
                 return None;
             }
         };
-        let tool = Tool { number, name, frame, mass };
-        let same = self.out.tools.iter().position(|t| *t == tool);
-        let index = same.unwrap_or_else(|| {
-            self.out.tools.push(tool);
-            self.out.tools.len() - 1
-        });
-        let index = u16::try_from(index).unwrap_or(u16::MAX);
+        let key = (number, name, bits(&frame));
+        let index = match self.tool_numbers.get(&key) {
+            Some(index) => *index,
+            None => {
+                let Ok(index) = u16::try_from(self.out.tools.len()) else {
+                    self.cannot("more than 65536 tools (every other tool length makes one)");
+                    return None;
+                };
+                self.out.tools.push(Tool { number, name: key.1.clone(), frame, mass });
+                self.tool_numbers.insert(key, index);
+                index
+            }
+        };
         if self.tool != Some(index) {
             self.act(Action::UseTool(index));
             if self.tool.is_some() {
@@ -453,10 +579,7 @@ impl<'a> Gather<'a> {
         let still = if up && !self.planar && self.control != Control::Position { rot_x(PI) } else { euler([0.0; 3]) };
         let some = (0..3).find(|i| words[*i] != 0.0);
         match (&self.machine.orientation, some) {
-            (_, Some(i)) if self.control == Control::Position => {
-                let _ = i;
-                None
-            }
+            (_, Some(_)) if self.control == Control::Position => None,
             (Some(Orientation::AbcEulerXyz), _) => Some(product(&euler(words), &still)),
             (_, None) if self.source_machine.is_none() => Some(still),
             (Some(Orientation::SourceMachine(_)), _) | (None, _) if self.source_machine.is_some() => {
@@ -536,7 +659,7 @@ impl<'a> Gather<'a> {
         let first = !self.out.items.iter().any(|i| matches!(i, Item::Move(_)));
         let here = self.base(frame, position);
         let length = self.at.map_or(0.0, |(p, _)| norm(sub(here, p)));
-        let joint = self.joint_share();
+        let joint = self.machine.cell.joint_share();
         let m = Move {
             way: Way::Joint,
             position,
@@ -575,11 +698,8 @@ impl<'a> Gather<'a> {
         length > TINY && norm(sub(way, scale(z, dot(way, z)))) < 1e-6
     }
 
-    fn joint_share(&self) -> f64 {
-        (self.machine.cell.joint_speed.unwrap_or(100.0) / 100.0).clamp(0.001, 1.0)
-    }
     fn rapid_speed(&self) -> f64 {
-        self.machine.cell.rapid_speed.unwrap_or(RAPID)
+        self.machine.cell.line_rapid()
     }
     fn comes_from_above(&self) -> bool {
         self.options.approach > 0.0 && self.machine.kind == Kind::Robot && self.control != Control::Position && !self.planar
@@ -795,22 +915,27 @@ impl<'a> Gather<'a> {
 
     /// Zones: at most half of both neighbours, none before actions and where a cut and a rapid meet.
     fn zones(&mut self) {
-        let items = &mut self.out.items;
-        for i in 0..items.len() {
-            let next = items[i + 1..].iter().find(|n| !silent(n));
-            let (length, rapid, joint) = match next {
-                Some(Item::Move(n)) => (n.length, n.rapid, n.way == Way::Joint),
-                _ => (0.0, false, false),
+        // Length of the next move, whether it is a rapid, whether all joints go together.
+        let mut next = (0.0, false, false);
+        for item in self.out.items.iter_mut().rev().filter(|i| !silent(i)) {
+            let Item::Move(m) = item else {
+                next = (0.0, false, false);
+                continue;
             };
-            if let Item::Move(m) = &mut items[i]
-                && let Zone::Blend(size) = m.zone
-            {
+            let (length, rapid, joint) = std::mem::replace(&mut next, (m.length, m.rapid, m.way == Way::Joint));
+            if let Zone::Blend(size) = m.zone {
                 let fits = m.rapid == rapid && (m.way == Way::Joint) == joint;
                 let size = size.min(m.length / 2.0).min(length / 2.0);
                 m.zone = if fits && size > 1e-6 { Zone::Blend(size) } else { Zone::Stop };
             }
         }
     }
+}
+
+/// A frame to be looked up by; both zeros are one.
+fn bits(frame: &Frame) -> [u64; 12] {
+    let mut all = frame.turn.iter().flatten().chain(&frame.position).map(|v| (v + 0.0).to_bits());
+    std::array::from_fn(|_| all.next().unwrap_or_default())
 }
 
 /// What makes no stop.

@@ -3,15 +3,16 @@
 
 use std::fmt::Write as _;
 
-use gr_ir::Source;
-use gr_machine::math::{Frame, norm, sub, turn_of};
+use gr_ir::{Source, Sources};
 use gr_machine::JointKind;
+use gr_machine::math::{Frame, norm, product, quaternion_of, sub, transpose, turn_of};
+use gr_text::{Diagnostic, code};
 
 use crate::choose::unwrap;
-use crate::gather::{ArcPiece, Gathered, Move, Way};
+use crate::gather::{ArcPiece, Findings, Gathered, Move, Way};
 use crate::path::{Mount, Path};
 use crate::solver::{Branches, Joints, Limits, Solver};
-use crate::{Action, MAX_JOINTS, RobotProgram, Target, Zone};
+use crate::{Action, MAX_JOINTS, RobotProgram, Step, Target, Zone};
 
 /// What can be chosen.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -28,7 +29,7 @@ pub struct JointOptions {
 
 impl Default for JointOptions {
     fn default() -> JointOptions {
-        JointOptions { tolerance: 0.01, interval: None, joint_speed: None, most: 20_000_000 }
+        JointOptions { tolerance: 0.01, interval: None, joint_speed: None, most: 4_000_000 }
     }
 }
 
@@ -155,7 +156,7 @@ impl Run<'_> {
     /// The same place in another frame.
     fn change_frame(&mut self, frame: u16) {
         let (old, new) = (self.g.frames[usize::from(self.frame)].frame, self.g.frames[usize::from(frame)].frame);
-        self.here.position = new.inverse().apply(old.apply(self.here.position));
+        reframe(&mut self.here, &old, &new);
         self.frame = frame;
     }
 
@@ -220,12 +221,20 @@ impl Run<'_> {
             seconds = seconds.max(self.joint_time(&self.here.joints, &to.joints));
         }
         let looks = path.looks().max(self.options.interval.map_or(1, |t| libm::ceil(seconds / t - 1e-9).clamp(1.0, 1e9) as usize));
+        let room = self.options.most.saturating_sub(self.points);
+        // With an interval every look becomes a position: those that can't be kept aren't worked out.
+        if self.options.interval.is_some() && looks > room {
+            return Err(TooMany { most: self.options.most, source });
+        }
         let tip = self.g.tools.get(usize::from(self.tool)).map_or(Frame::IDENTITY, |t| t.frame);
         let base = self.g.frames[usize::from(self.frame)].frame;
-        let mut cut = Cut { solver: &self.solver, limits: &self.limits, path: &path, mount: &mount, tip, base, branch: to.branch, tolerance: self.options.tolerance, found: Vec::new() };
+        let mut cut = Cut { solver: &self.solver, limits: &self.limits, path: &path, mount: &mount, tip, base, branch: to.branch, tolerance: self.options.tolerance, room, found: Vec::new() };
         let mut q = self.here.joints;
         for k in 1..=looks {
             let (a, b) = ((k - 1) as f64 / looks as f64, k as f64 / looks as f64);
+            if cut.found.len() > room {
+                return Err(TooMany { most: self.options.most, source });
+            }
             let next = if k == looks { to.joints } else { cut.solve(b, &q) };
             cut.between(a, &q, b, &next, 24);
             cut.found.push((b, next));
@@ -243,6 +252,15 @@ impl Run<'_> {
     }
 }
 
+/// The same place and turn, seen from another frame.
+pub(crate) fn reframe(here: &mut Target, old: &Frame, new: &Frame) {
+    here.position = new.inverse().apply(old.apply(here.position));
+    if old.turn != new.turn {
+        let turn = product(&transpose(&new.turn), &product(&old.turn, &turn_of(here.quaternion)));
+        here.quaternion = quaternion_of(&turn);
+    }
+}
+
 struct Cut<'a> {
     solver: &'a Solver,
     limits: &'a Limits,
@@ -252,6 +270,8 @@ struct Cut<'a> {
     base: Frame,
     branch: u8,
     tolerance: f64,
+    /// Positions there is room for.
+    room: usize,
     found: Vec<(f64, Joints)>,
 }
 
@@ -283,7 +303,7 @@ impl Cut<'_> {
 
     /// Positions between two, so that the tolerance holds. Nine tenths of it, as it is looked at three places only.
     fn between(&mut self, a: f64, p: &Joints, b: f64, q: &Joints, left: u32) {
-        if left == 0 || self.off(a, p, b, q) <= 0.9 * self.tolerance {
+        if left == 0 || self.found.len() > self.room || self.off(a, p, b, q) <= 0.9 * self.tolerance {
             return;
         }
         let middle = (a + b) / 2.0;
@@ -314,12 +334,13 @@ impl Cut<'_> {
     }
 }
 
-/// LinuxCNC words of a machine driven in joint mode: G93, so that each line takes its time.
-pub fn gcode(program: &RobotProgram, path: &JointPath, decimals: usize) -> String {
+/// LinuxCNC words of a machine driven in joint mode: G93, so that each line takes its time; and what can't be said.
+pub fn gcode(program: &RobotProgram, path: &JointPath, decimals: usize, sources: &dyn Sources) -> (String, Vec<Diagnostic>) {
     let machine = &program.machine;
     let letters = ['X', 'Y', 'Z', 'A', 'B', 'C', 'U', 'V', 'W'];
     let words: Vec<char> = machine.joints.iter().zip(letters).map(|(j, l)| j.word.unwrap_or(l)).collect();
-    let mut out = format!("({}: joint positions of {}; degrees and mm, inverse time)\nG21 G90 G40 G49 G80\nG61\nG93\n", plain(&program.name), plain(&machine.id));
+    let head = format!("({}: joint positions of {}; degrees and mm, inverse time)\nG21 G90 G40 G49 G80\nG61\nG93\n", plain(&program.name), plain(&machine.id));
+    let mut out = Words { text: head, findings: Findings::new(sources), labels: 0 };
     let mut first = true;
     for event in &path.events {
         match event {
@@ -331,41 +352,60 @@ pub fn gcode(program: &RobotProgram, path: &JointPath, decimals: usize) -> Strin
                 }
                 if first {
                     // The machine stands at home already, or goes there in a second.
-                    let _ = writeln!(out, "{line} F60");
+                    out.line(&format!("{line} F60"));
                 } else if p.seconds > 0.0 {
-                    let _ = writeln!(out, "{line} F{}", significant(60.0 / p.seconds));
+                    out.line(&format!("{line} F{}", significant(60.0 / p.seconds)));
                 }
                 first = false;
             }
-            Event::Do(i) => {
-                if let Some(text) = words_of(&program.steps[*i].action) {
-                    out += &text;
-                    out.push('\n');
-                }
-            }
+            Event::Do(i) => out.action(&program.steps[*i]),
         }
     }
-    out + "G94\nM2\n"
+    out.line("G94\nM2");
+    (out.text, out.findings.take())
 }
 
-fn words_of(action: &Action) -> Option<String> {
-    Some(match action {
-        Action::Dwell(s) => format!("G4 P{}", significant(*s)),
-        Action::Pause { optional } => (if *optional { "M1" } else { "M0" }).to_string(),
-        Action::ChangeTool { number, .. } => format!("T{number} M6"),
-        Action::Message(text) => format!("(MSG, {})", plain(text)),
-        Action::Comment(text) => format!("({})", plain(text)),
-        Action::Signal { word, value, .. } => match (word.as_str(), value) {
-            ("S", Some(v)) => format!("S{}", significant(*v)),
-            ("M3" | "M4", Some(v)) => format!("{word} S{}", significant(*v)),
-            (w, Some(v)) if w.starts_with("M67") || w.starts_with("M68") => {
-                let (code, index) = w.split_once(" P").unwrap_or((w, "0"));
-                format!("{code} E{index} Q{}", significant(*v))
-            }
-            _ => word.clone(),
-        },
-        _ => return None,
-    })
+/// What is no motion, in the words of LinuxCNC.
+struct Words<'a> {
+    text: String,
+    findings: Findings<'a>,
+    labels: u32,
+}
+
+impl Words<'_> {
+    fn line(&mut self, text: &str) {
+        self.text += text;
+        self.text.push('\n');
+    }
+
+    fn action(&mut self, step: &Step) {
+        match &step.action {
+            Action::Dwell(s) => self.line(&format!("G4 P{}", significant(*s))),
+            Action::Pause { optional } => self.line(if *optional { "M1" } else { "M0" }),
+            Action::ChangeTool { number, .. } => self.line(&format!("T{number} M6")),
+            Action::Message(text) => self.line(&format!("(MSG, {})", plain(text).trim_start())),
+            Action::Comment(text) => self.line(&format!("({})", plain(text))),
+            Action::Signal { word, .. } => self.line(&word.to_string()),
+            Action::WaitInput { name, on, timeout } => self.wait(name, *on, *timeout, step.source),
+            // Points are written as such; tool and frame are in them, and the end stands at the end.
+            Action::Joint { .. } | Action::Linear { .. } | Action::Arc { .. } => {}
+            Action::UseTool(_) | Action::UseFrame(_) | Action::End => {}
+        }
+    }
+
+    /// M66 goes on after its time in any case: without a limit it is asked again, and too late is a stop.
+    fn wait(&mut self, name: &str, on: bool, timeout: Option<f64>, source: Option<Source>) {
+        let Some(index) = gr_machine::signal_number(name) else {
+            return self.findings.once_each(code::ROBOT_INPUT_NAME, source, &[name.to_string()]);
+        };
+        self.labels += 1;
+        let (n, level) = (self.labels, if on { 3 } else { 4 });
+        let ask = |seconds: f64| format!("M66 P{index} L{level} Q{}", significant(seconds));
+        match timeout {
+            Some(s) => self.line(&format!("{}\no{n} if [#5399 LT 0]\n(MSG, input {index} did not come)\nM0\no{n} endif", ask(s.max(0.001)))),
+            None => self.line(&format!("o{n} do\n{}\no{n} while [#5399 LT 0]", ask(3600.0))),
+        }
+    }
 }
 
 fn plain(text: &str) -> String {

@@ -39,4 +39,4 @@ pub mod verify;
 
 pub use options::{Options, Planned, Setup, Singularity, Summary};
 pub use plan::plan;
-pub use program::{Action, MAX_JOINTS, RobotProgram, Step, Target, Tool, WorkFrame, Zone};
+pub use program::{Action, MAX_JOINTS, RobotProgram, Step, Target, Tool, Word, WorkFrame, Zone};

@@ -8,13 +8,9 @@ use gr_text::{Diagnostic, code};
 use crate::choose::{Chain, Chooser, Fault, Node, Why, chains};
 use crate::emit::Emit;
 use crate::gather::{Findings, Gather, Gathered, Item, Move, Way};
-use crate::path::{Mount, Path};
+use crate::path::Mount;
 use crate::solver::{Branches, Joints, Limits, Solver};
 use crate::{MAX_JOINTS, Options, Planned, Zone};
-
-/// Speed of a joint the machine file gives none for, rad/s or mm/s.
-const CALM: f64 = std::f64::consts::FRAC_PI_2;
-const CALM_SLIDE: f64 = 200.0;
 
 /// Plans the motion of one machine. With errors there is no result, and the list holds everything that was found.
 pub fn plan(program: &Program, machine: &Machine, sources: &dyn Sources, options: &Options) -> Result<Planned, Vec<Diagnostic>> {
@@ -41,10 +37,9 @@ pub fn plan(program: &Program, machine: &Machine, sources: &dyn Sources, options
 
 /// Greatest speed of each joint in a rapid.
 pub(crate) fn speeds(machine: &Machine) -> Joints {
-    let mut out = [CALM; MAX_JOINTS];
+    let mut out = [std::f64::consts::FRAC_PI_2; MAX_JOINTS];
     for (slot, j) in out.iter_mut().zip(&machine.joints) {
-        let calm = if j.kind == gr_machine::JointKind::Revolute { CALM } else { CALM_SLIDE };
-        *slot = j.rapid.or(j.speed).unwrap_or(calm);
+        *slot = j.top_rapid();
     }
     out
 }
@@ -69,7 +64,7 @@ impl Planner<'_> {
         if let Some(home) = home {
             list = self.nodes(&mut chosen);
             if !self.findings.bad() {
-                chosen = vec![self.chooser().cheapest(&chosen, &home)];
+                chosen = vec![self.chooser(list.len()).cheapest(&chosen, &home)];
             }
         }
         let (Some(home), false) = (home, self.findings.bad()) else { return Err(self.findings.take()) };
@@ -82,8 +77,9 @@ impl Planner<'_> {
         Ok(Planned { program, warnings: self.findings.take(), summary })
     }
 
-    fn chooser(&self) -> Chooser<'_> {
-        let count = chains(&self.g.items).len().max(1);
+    /// Chooses among the configurations of so many chains.
+    fn chooser(&self, chains: usize) -> Chooser<'_> {
+        let count = chains.max(1);
         Chooser { g: &self.g, solver: &self.solver, limits: &self.limits, speeds: self.speeds, kept: (2_000_000 / count).clamp(8, 48) }
     }
 
@@ -157,10 +153,10 @@ impl Planner<'_> {
     /// Nodes of all chains; a chain without any is a finding, or is divided where that was asked for.
     fn nodes(&mut self, out: &mut Vec<Vec<Node>>) -> Vec<Chain> {
         let mut list = chains(&self.g.items);
-        let mut k = 0;
+        let (mut k, mut count) = (0, list.len());
         while k < list.len() {
             let chain = list[k];
-            let found = self.chooser().nodes(chain);
+            let found = self.chooser(count).nodes(chain);
             match found {
                 Ok(nodes) => {
                     out.push(nodes);
@@ -169,6 +165,7 @@ impl Planner<'_> {
                 Err(fault) => {
                     if self.without_ours(chain, &fault) || self.divided(chain, &fault) {
                         list = chains(&self.g.items);
+                        count = list.len();
                         continue;
                     }
                     self.tell(chain, &fault);
@@ -220,7 +217,7 @@ impl Planner<'_> {
         let axis: M3 = self.g.turns[m.turn as usize];
         let sign = if self.machine.kind == Kind::Robot { -1.0 } else { 1.0 };
         let up = [0, 1, 2].map(|i| m.position[i] + sign * axis[i][2] * height);
-        let speed = self.machine.cell.rapid_speed.unwrap_or(100.0);
+        let speed = self.machine.cell.line_rapid();
         let lift = Move { way: Way::Line, position: up, speed, zone: Zone::Stop, length: height, rapid: true, ..m };
         let change = Move { way: Way::Joint, speed: 0.5, length: 0.0, ..lift };
         let back = Move { position: m.position, ..lift };
@@ -307,9 +304,4 @@ fn amount(v: &gr_machine::Violation) -> String {
 /// The tool's turn with its own spin.
 pub(crate) fn spun(turn: &M3, free: bool, spin: f64) -> M3 {
     if free && spin != 0.0 { product(turn, &rot_z(spin)) } else { *turn }
-}
-
-/// The path of a move from the place before it.
-pub(crate) fn path_of(g: &Gathered, from: [f64; 3], turn: u32, m: &Move) -> Path {
-    Path::new(g, from, turn, m)
 }

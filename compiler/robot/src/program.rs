@@ -52,6 +52,60 @@ pub enum Zone {
     Blend(f64),
 }
 
+/// A word of the program with its arguments, as the control it was written for reads it: `M3 S8000`, `M67 E1 Q0.5`.
+#[derive(Clone, PartialEq, Debug, Default)]
+pub struct Word {
+    /// `M3`, `S`, `M67`, `M101` …
+    pub code: String,
+    /// Letter and number of the output or input, for M62 to M68.
+    pub index: Option<(char, i32)>,
+    /// Further arguments: letter and value, in the order they are written.
+    pub arguments: Vec<(char, f64)>,
+}
+
+impl Word {
+    /// A word without arguments.
+    pub fn new(code: impl Into<String>) -> Word {
+        Word { code: code.into(), ..Word::default() }
+    }
+    /// A word for one output or input.
+    pub fn numbered(code: &str, letter: char, index: i32) -> Word {
+        Word { index: Some((letter, index)), ..Word::new(code) }
+    }
+    /// With one more argument.
+    pub fn with(mut self, letter: char, value: f64) -> Word {
+        self.arguments.push((letter, value));
+        self
+    }
+    /// Its name in `[io]` of a machine file: `M62P3`.
+    pub fn key(&self) -> String {
+        self.index.map_or_else(|| self.code.clone(), |(_, i)| format!("{}P{i}", self.code))
+    }
+}
+
+impl From<&str> for Word {
+    fn from(code: &str) -> Word {
+        Word::new(code)
+    }
+}
+
+impl std::fmt::Display for Word {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        // S is code and letter of its number at once.
+        let bare = self.arguments.first().is_some_and(|(l, _)| self.code == l.to_string());
+        if !bare {
+            f.write_str(&self.code)?;
+        }
+        if let Some((letter, index)) = self.index {
+            write!(f, " {letter}{index}")?;
+        }
+        for (i, (letter, value)) in self.arguments.iter().enumerate() {
+            write!(f, "{}{letter}{value}", if bare && i == 0 { "" } else { " " })?;
+        }
+        Ok(())
+    }
+}
+
 /// One thing the machine does. Targets are indices into [`RobotProgram::targets`]; a move starts where the one before
 /// it ended.
 #[derive(Clone, PartialEq, Debug)]
@@ -107,8 +161,8 @@ pub enum Action {
     /// A signal or routine of the cell for a word of the program (M3, M8, S …).
     Signal {
         /// The word: `M3`.
-        word: String,
-        /// Number behind it, where there is one (S in rev/min, analog value).
+        word: Word,
+        /// Number that goes with it, where there is one (S in rev/min, analog value).
         value: Option<f64>,
         /// What the machine file says it does.
         signal: Signal,

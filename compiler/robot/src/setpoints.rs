@@ -10,13 +10,14 @@
 
 use std::fmt::Write as _;
 
-use gr_ir::Source;
+use gr_ir::{Source, Sources};
 use gr_machine::JointKind;
 use gr_machine::math::turn_of;
+use gr_text::{Diagnostic, code};
 
 use crate::choose::unwrap;
 use crate::gather::{ArcPiece, Gathered, Move, Way};
-use crate::joints::TooMany;
+use crate::joints::{TooMany, reframe};
 use crate::path::{Mount, Path};
 use crate::solver::{Branches, Joints, Limits, Solver};
 use crate::{Action, MAX_JOINTS, RobotProgram, Target, Zone};
@@ -34,7 +35,7 @@ pub struct SetpointOptions {
 
 impl Default for SetpointOptions {
     fn default() -> SetpointOptions {
-        SetpointOptions { interval: 0.004, smoothing: 0.0, most: 20_000_000 }
+        SetpointOptions { interval: 0.004, smoothing: 0.0, most: 3_000_000 }
     }
 }
 
@@ -49,6 +50,49 @@ pub struct Setpoint {
     pub acceleration: [f64; MAX_JOINTS],
 }
 
+/// Something that is no motion: the machine stands still for it.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Event {
+    /// The set-point at which it is due.
+    pub row: usize,
+    /// Its step in the program.
+    pub step: usize,
+}
+
+/// Why there are no set-points.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub enum Fault {
+    /// More than allowed.
+    TooMany(TooMany),
+    /// A joint gains speed faster than it can, however slowly it goes: rad/s² or mm/s².
+    Acceleration {
+        /// Which.
+        joint: usize,
+        /// Asked for.
+        value: f64,
+        /// Allowed.
+        limit: f64,
+        /// Where.
+        source: Option<Source>,
+    },
+}
+
+impl Fault {
+    /// As a finding.
+    pub fn finding(&self, machine: &gr_machine::Machine, sources: &dyn Sources) -> Diagnostic {
+        let (code, source, args) = match self {
+            Fault::TooMany(many) => (code::ROBOT_TOO_MANY_POINTS, many.source, vec![many.most.to_string()]),
+            Fault::Acceleration { joint, value, limit, source } => {
+                let joint = &machine.joints[*joint];
+                let shown = |v: f64| format!("{}/s²", joint.show(v));
+                (code::ROBOT_ACCELERATION, *source, vec![joint.name.clone(), shown(*value), shown(*limit)])
+            }
+        };
+        let (file, span) = sources.place(source.unwrap_or_default());
+        Diagnostic::new(code, file, span, &args)
+    }
+}
+
 /// A stream of set-points.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Setpoints {
@@ -58,14 +102,16 @@ pub struct Setpoints {
     pub joints: usize,
     /// The set-points, the start first.
     pub rows: Vec<Setpoint>,
+    /// What else is done, in order.
+    pub events: Vec<Event>,
     kinds: Vec<JointKind>,
     names: Vec<String>,
 }
 
 /// A joint without an acceleration in the machine file reaches its speed in this time, s.
 const RISE: f64 = 0.25;
-/// Speed of a joint the machine file gives none for, rad/s and mm/s.
-const CALM: (f64, f64) = (std::f64::consts::FRAC_PI_2, 200.0);
+/// A joint that is still too fast at this share of its acceleration jumps.
+const SLOWEST: f64 = 0.005;
 
 /// A move as joints over its own time.
 struct Piece {
@@ -76,6 +122,7 @@ struct Piece {
     /// None: all joints evenly.
     path: Option<(Path, Mount)>,
     stop: bool,
+    source: Option<Source>,
     /// Greatest rate, and greatest change of rate per second.
     rate: f64,
     change: f64,
@@ -98,15 +145,20 @@ struct Ramp {
 }
 
 /// Makes the set-points of a program.
-pub fn setpoints(program: &RobotProgram, options: &SetpointOptions) -> Result<Setpoints, TooMany> {
+pub fn setpoints(program: &RobotProgram, options: &SetpointOptions) -> Result<Setpoints, Fault> {
     let mut made = Maker::new(program, options);
     made.pieces();
     let mut slower = 1.0;
     loop {
-        let out = made.stream(slower)?;
-        let over = made.over(&out.rows);
-        if over <= 1.0 + 1e-6 || slower < 0.05 {
+        let out = made.stream(slower).map_err(Fault::TooMany)?;
+        let (over, row, joint) = made.over(&out.rows);
+        if over <= 1.0 + 1e-6 {
             return Ok(out);
+        }
+        if slower < SLOWEST {
+            let limit = made.acceleration[joint];
+            let source = made.source_at(slower, row as f64 * options.interval);
+            return Err(Fault::Acceleration { joint, value: over * limit, limit, source });
         }
         slower /= over.min(4.0) * 1.02;
     }
@@ -122,6 +174,8 @@ struct Maker<'a> {
     list: Vec<Piece>,
     /// Waits: before which piece, s.
     waits: Vec<(usize, f64)>,
+    /// What else is done: before which piece, after which part of the wait there, which step.
+    events: Vec<(usize, f64, usize)>,
     source: Option<Source>,
 }
 
@@ -129,7 +183,7 @@ impl<'a> Maker<'a> {
     fn new(program: &'a RobotProgram, options: &'a SetpointOptions) -> Maker<'a> {
         let (mut speed, mut acceleration) = ([1.0; MAX_JOINTS], [1.0; MAX_JOINTS]);
         for (i, j) in program.machine.joints.iter().enumerate() {
-            speed[i] = j.speed.unwrap_or(if j.kind == JointKind::Revolute { CALM.0 } else { CALM.1 });
+            speed[i] = j.top_speed();
             acceleration[i] = j.acceleration.unwrap_or(speed[i] / RISE);
         }
         Maker {
@@ -141,6 +195,7 @@ impl<'a> Maker<'a> {
             acceleration,
             list: Vec::new(),
             waits: Vec::new(),
+            events: Vec::new(),
             source: None,
         }
     }
@@ -156,13 +211,13 @@ impl<'a> Maker<'a> {
         };
         let (mut tool, mut frame) = (0u16, 0u16);
         let mut here = self.program.home;
-        for step in &self.program.steps {
+        for (i, step) in self.program.steps.iter().enumerate() {
             self.source = step.source;
             match &step.action {
                 Action::UseTool(t) => tool = *t,
                 Action::UseFrame(f) => {
                     let (old, new) = (g.frames[usize::from(frame)].frame, g.frames[usize::from(*f)].frame);
-                    here.position = new.inverse().apply(old.apply(here.position));
+                    reframe(&mut here, &old, &new);
                     frame = *f;
                 }
                 Action::Joint { to, speed, zone } => {
@@ -181,7 +236,10 @@ impl<'a> Maker<'a> {
                     here = self.cut(&mut g, here, *to, Some(arc), *speed, *zone, (tool, frame));
                 }
                 Action::Dwell(s) => self.wait(*s),
-                _ => {}
+                Action::ChangeTool { .. } | Action::Signal { .. } | Action::WaitInput { .. } => self.event(i),
+                Action::Message(_) | Action::Pause { .. } => self.event(i),
+                // A comment says nothing to a machine.
+                Action::Comment(_) | Action::End => {}
             }
         }
     }
@@ -191,6 +249,20 @@ impl<'a> Maker<'a> {
             last.stop = true;
         }
         self.waits.push((self.list.len(), seconds));
+    }
+
+    /// Stands still long enough for one set-point in it: that is where it is done.
+    fn event(&mut self, step: usize) {
+        let k = self.list.len();
+        let waited = self.waited(k);
+        self.events.push((k, waited, step));
+        self.wait(2.0 * self.options.interval);
+    }
+
+    /// How long the machine waits before a piece, s.
+    fn waited(&self, k: usize) -> f64 {
+        let first = self.waits.partition_point(|w| w.0 < k);
+        self.waits[first..].iter().take_while(|w| w.0 == k).map(|w| w.1).sum()
     }
 
     #[allow(clippy::too_many_arguments)]
@@ -233,6 +305,7 @@ impl<'a> Maker<'a> {
             branch: to.branch,
             path,
             stop: zone == Zone::Stop,
+            source: self.source,
             rate: 1.0,
             change: f64::INFINITY,
             ends: [[0.0; MAX_JOINTS]; 2],
@@ -312,12 +385,12 @@ impl<'a> Maker<'a> {
         if rate < 0.02 { 0.0 } else { rate }
     }
 
-    /// The law: ramps of the rate over real time.
-    fn law(&self, slower: f64) -> Vec<Ramp> {
+    /// The law: ramps of the rate over real time; and when each piece before which the machine stands is waited for.
+    fn law(&self, slower: f64) -> (Vec<Ramp>, Vec<f64>) {
         let n = self.list.len();
         let mut join = vec![0.0; n + 1];
         for k in 1..n {
-            let waits = self.waits.iter().any(|w| w.0 == k);
+            let waits = self.waits.binary_search_by_key(&k, |w| w.0).is_ok();
             join[k] = if waits { 0.0 } else { self.junction(&self.list[k - 1], &self.list[k]) * libm::sqrt(slower) };
         }
         let change = |k: usize| self.list[k].change * slower;
@@ -329,8 +402,10 @@ impl<'a> Maker<'a> {
         }
         let mut law = Law { ramps: Vec::new(), at: 0.0, time: 0.0, sum: 0.0 };
         let mut done = 0.0;
+        let mut reached = Vec::with_capacity(n + 1);
         for k in 0..n {
-            let waited: f64 = self.waits.iter().filter(|w| w.0 == k).map(|w| w.1).sum();
+            reached.push(law.at);
+            let waited = self.waited(k);
             let settle = if join[k] == 0.0 { self.options.smoothing } else { 0.0 };
             law.ramp(waited + settle, 0.0, 0.0);
             let p = &self.list[k];
@@ -348,28 +423,41 @@ impl<'a> Maker<'a> {
             done += p.seconds;
             law.time = done;
         }
-        let waited: f64 = self.waits.iter().filter(|w| w.0 >= n).map(|w| w.1).sum();
+        reached.push(law.at);
+        let waited = self.waited(n);
         law.ramp(waited + self.options.smoothing + self.options.interval, 0.0, 0.0);
-        law.ramps
+        (law.ramps, reached)
+    }
+
+    /// The source of what is done at a time.
+    fn source_at(&self, slower: f64, t: f64) -> Option<Source> {
+        let (law, _) = self.law(slower);
+        let time = own_time(&law, t);
+        let starts = self.starts();
+        let k = starts.partition_point(|s| *s <= time).saturating_sub(1);
+        self.list.get(k..)?.iter().find_map(|p| p.source)
+    }
+
+    /// When each piece begins, in its own time.
+    fn starts(&self) -> Vec<f64> {
+        let mut next = 0.0;
+        let start = |p: &Piece| {
+            let at = next;
+            next += p.seconds;
+            at
+        };
+        self.list.iter().map(start).collect()
     }
 
     fn stream(&self, slower: f64) -> Result<Setpoints, TooMany> {
-        let law = self.law(slower);
+        let (law, reached) = self.law(slower);
         let total = law.last().map_or(0.0, |r| r.at + r.seconds);
         let dt = self.options.interval;
         let count = libm::ceil(total / dt);
         if !(count < self.options.most as f64) {
             return Err(TooMany { most: self.options.most, source: self.source });
         }
-        let starts: Vec<f64> = self
-            .list
-            .iter()
-            .scan(0.0, |t, p| {
-                let at = *t;
-                *t += p.seconds;
-                Some(at)
-            })
-            .collect();
+        let starts = self.starts();
         let eps = dt / 4.0;
         let mut rows = Vec::with_capacity(count as usize + 1);
         for k in 0..=count as usize {
@@ -384,7 +472,13 @@ impl<'a> Maker<'a> {
         }
         let names = self.program.machine.joints.iter().map(|j| j.name.clone()).collect();
         let kinds = self.program.machine.joints.iter().map(|j| j.kind).collect();
-        Ok(Setpoints { interval: dt, joints: self.solver.count, rows, kinds, names })
+        // Smoothed, the machine comes to rest so much later.
+        let due = |(piece, waited, step): &(usize, f64, usize)| {
+            let t = reached.get(*piece).map_or(total, |t| t + self.options.smoothing + waited);
+            Event { row: (libm::ceil(t / dt + 0.25).max(0.0) as usize).min(rows.len() - 1), step: *step }
+        };
+        let events = self.events.iter().map(due).collect();
+        Ok(Setpoints { interval: dt, joints: self.solver.count, rows, events, kinds, names })
     }
 
     /// Joints at a real time.
@@ -396,10 +490,43 @@ impl<'a> Maker<'a> {
         self.at(p, ((time - starts[k]) / p.seconds).clamp(0.0, 1.0))
     }
 
-    /// Greatest share of an acceleration limit; speeds keep theirs by the rate.
-    fn over(&self, rows: &[Setpoint]) -> f64 {
-        let each = |r: &Setpoint| (0..self.solver.count).map(|i| r.acceleration[i].abs() / self.acceleration[i]).fold(0.0, f64::max);
-        rows.iter().map(each).fold(0.0, f64::max)
+    /// Greatest share of an acceleration limit, where and of which joint; speeds keep theirs by the rate. A jump may
+    /// fall between two set-points: their second difference has it.
+    fn over(&self, rows: &[Setpoint]) -> (f64, usize, usize) {
+        let mut worst = (0.0, 0, 0);
+        for (k, row) in rows.iter().enumerate() {
+            for i in 0..self.solver.count {
+                let at = |k: usize| rows.get(k).map_or(row.position[i], |r| r.position[i]);
+                let between = (at(k + 1) - 2.0 * row.position[i] + at(k.saturating_sub(1))) / (self.options.interval * self.options.interval);
+                let share = row.acceleration[i].abs().max(between.abs()) / self.acceleration[i];
+                if share > worst.0 {
+                    worst = (share, k, i);
+                }
+            }
+        }
+        worst
+    }
+}
+
+/// An action in words, and what the machine file has for it.
+fn told(action: &Action) -> (String, String) {
+    let row = |s: &gr_machine::Signal, value: Option<f64>| match (&s.routine, &s.signal) {
+        (Some(routine), _) => routine.clone(),
+        (_, Some(signal)) => value.map_or(signal.clone(), |v| format!("{signal} = {v}")),
+        _ => String::new(),
+    };
+    match action {
+        // What the program says goes before what the machine file says.
+        Action::Signal { word, value, signal } if matches!(word.code.as_str(), "S" | "M67" | "M68") => (word.to_string(), row(signal, *value)),
+        Action::Signal { word, signal, .. } => (word.to_string(), row(signal, signal.value)),
+        Action::ChangeTool { number, by } => (format!("T{number} M6"), by.as_ref().map_or(String::new(), |s| row(s, Some(f64::from(*number))))),
+        Action::WaitInput { name, on, timeout } => {
+            let most = timeout.map_or(String::new(), |t| format!(", at most {t} s"));
+            (format!("wait until it is {}{most}", if *on { "on" } else { "off" }), name.clone())
+        }
+        Action::Message(text) => (format!("message: {}", text.trim()), String::new()),
+        Action::Pause { optional } => ((if *optional { "M1" } else { "M0" }).to_string(), String::new()),
+        _ => (String::new(), String::new()),
     }
 }
 
@@ -450,6 +577,41 @@ fn integral(law: &[Ramp], t: f64) -> f64 {
 impl Setpoints {
     fn shown(&self, i: usize, v: f64) -> f64 {
         if self.kinds.get(i) == Some(&JointKind::Revolute) { v.to_degrees() } else { v }
+    }
+
+    /// What is no motion, as a table: number of the set-point, time, line, what, and the signal or routine of the
+    /// machine file for it.
+    pub fn events_csv(&self, program: &RobotProgram) -> String {
+        let cell = |text: String| format!("\"{}\"", text.replace('"', "'").replace(['\n', '\r'], " "));
+        let mut out = String::from("setpoint,t,line,what,signal\n");
+        for event in &self.events {
+            let Some(step) = program.steps.get(event.step) else { continue };
+            let line = step.source.map_or(String::new(), |s| (s.line + 1).to_string());
+            let (what, signal) = told(&step.action);
+            let t = event.row as f64 * self.interval;
+            let _ = writeln!(out, "{},{t:.6},{line},{},{}", event.row, cell(what), cell(signal));
+        }
+        out
+    }
+
+    /// What the player of the set-points has to do besides, as one warning at the first of it.
+    pub fn findings(&self, program: &RobotProgram, sources: &dyn Sources) -> Vec<Diagnostic> {
+        let mut kinds: Vec<String> = Vec::new();
+        for step in self.events.iter().filter_map(|e| program.steps.get(e.step)) {
+            let what = match &step.action {
+                Action::Signal { word, .. } => word.key(),
+                Action::ChangeTool { .. } => "a tool change".into(),
+                Action::WaitInput { .. } => "waiting for an input".into(),
+                Action::Message(_) => "a message to the operator".into(),
+                _ => "a program stop".into(),
+            };
+            if !kinds.contains(&what) && kinds.len() < 50 {
+                kinds.push(what);
+            }
+        }
+        let Some(first) = self.events.first().and_then(|e| program.steps.get(e.step)) else { return Vec::new() };
+        let (file, span) = sources.place(first.source.unwrap_or_default());
+        vec![Diagnostic::new(code::ROBOT_EVENTS, file, span, &[kinds.join(", ")])]
     }
 
     /// As a table: time, then position, velocity and acceleration of each joint, in degrees and mm.

@@ -141,9 +141,8 @@ impl Solver {
     }
 
     /// Distance of the wrist from the border of what the arm can reach, mm.
-    pub fn reach_margin(&self, flange: &Frame, q: &Joints) -> Option<f64> {
+    pub fn reach_margin(&self, q: &Joints) -> Option<f64> {
         let Arm::Opw(k) = &self.arm else { return None };
-        let _ = flange;
         let bend = q[2] * k.signs()[2] - k.offsets()[2] + self.fore.0;
         let (c2, fore) = (self.fore.1, self.fore.2);
         let distance = libm::sqrt((c2 * c2 + fore * fore + 2.0 * c2 * fore * libm::cos(bend)).max(0.0));

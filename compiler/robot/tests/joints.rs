@@ -4,7 +4,7 @@ use gr_ir::{FileId, Texts};
 use gr_machine::Machine;
 use gr_machine::math::{norm, sub};
 use gr_robot::joints::{Event, JointOptions, JointPoint, gcode, joint_path};
-use gr_robot::setpoints::{SetpointOptions, setpoints};
+use gr_robot::setpoints::{Fault, SetpointOptions, setpoints};
 use gr_robot::{Action, Options, RobotProgram, plan};
 
 fn cell() -> Machine {
@@ -60,7 +60,7 @@ fn to_segment(p: [f64; 3], a: [f64; 3], b: [f64; 3]) -> f64 {
 fn times_add_up() {
     let program = planned(PART);
     let path = joint_path(&program, &JointOptions::default()).unwrap();
-    let text = gcode(&program, &path, 6);
+    let text = gcode(&program, &path, 6, &gr_ir::NoSources).0;
     insta::assert_snapshot!("joint_gcode", text.lines().take(30).collect::<Vec<_>>().join("\n"));
     // Of every line of the program: Σ 1/F = length / F.
     let mut lengths: std::collections::BTreeMap<u32, f64> = std::collections::BTreeMap::new();
@@ -137,4 +137,97 @@ fn setpoints_keep_limits() {
         assert_eq!(bytes.len(), 28 + made.rows.len() * 6 * 24);
         assert_eq!(made.csv().lines().count(), made.rows.len() + 1);
     }
+}
+
+const WORDS: &str = "T1 M6\nM3 S8000\nM7\nM19 R90 P1 Q3\nM3 S8000\nG0 X10 Y10 Z30\nM62 P1\nM67 E1 Q0.5\nM68 E0 Q-2\nM66 P2 L3 Q5\nM66 E1 L0\nM101 P1 Q2\nM102\nM50 P0\nM53 P0\nM52 P1\nG1 Z2 F600\nM0\nM1\nM60\nG4 P1.5\n(MSG, look)\nM49\nM48\nG1 X20\nM30\n";
+
+/// What is no motion keeps all its arguments, and LinuxCNC takes them.
+#[test]
+fn words_keep_their_arguments() {
+    let program = planned(WORDS);
+    let path = joint_path(&program, &JointOptions::default()).unwrap();
+    let (text, found) = gcode(&program, &path, 3, &Texts::new([(FileId(0), WORDS)]));
+    let words: Vec<&str> = text.lines().filter(|l| !l.starts_with("G1 ")).collect();
+    insta::assert_snapshot!("own_words", words.join("\n"));
+    // The example's spindle waits for an input with a name.
+    let told: Vec<&str> = found.iter().map(|d| d.message.as_str()).collect();
+    assert_eq!(told, ["the wait for the input `diSpindleAtSpeed` isn't written: LinuxCNC knows inputs by number only"]);
+    assert!(motion_is_good(&text));
+}
+
+fn motion_is_good(text: &str) -> bool {
+    let setup = gr_interp::Setup { tools: gr_interp::assumed_tools(), ..gr_interp::Setup::default() };
+    let program = gr_driver::lower("joints.ngc", text.into(), &setup, None).program;
+    program.steps().any(|s| s.op == gr_ir::Op::End)
+}
+
+/// An input with a number is waited for with M66, which goes on in any case: too late is a stop.
+#[test]
+fn waits_for_numbered_inputs() {
+    let mut program = planned("T1 M6\nG0 X10 Y10 Z30\nG4 P1\nG4 P2\nG1 Z2 F600\nM30\n");
+    let dwells: Vec<usize> = (0..program.steps.len()).filter(|i| matches!(program.steps[*i].action, Action::Dwell(_))).collect();
+    program.steps[dwells[0]].action = Action::WaitInput { name: "DI[3]".into(), on: true, timeout: Some(2.5) };
+    program.steps[dwells[1]].action = Action::WaitInput { name: "in 4".into(), on: false, timeout: None };
+    let path = joint_path(&program, &JointOptions::default()).unwrap();
+    let (text, found) = gcode(&program, &path, 3, &gr_ir::NoSources);
+    assert_eq!(found, []);
+    assert!(motion_is_good(&text));
+    let words: Vec<&str> = text.lines().filter(|l| l.contains("M66") || l.starts_with('o') || l.contains("did not")).collect();
+    insta::assert_snapshot!("numbered_waits", words.join("\n"));
+}
+
+#[test]
+fn too_fine_an_interval_is_told_at_once() {
+    let program = planned(PART);
+    for interval in [1e-9, 1e-300] {
+        let made = joint_path(&program, &JointOptions { interval: Some(interval), ..JointOptions::default() });
+        assert!(made.is_err());
+        assert!(matches!(setpoints(&program, &SetpointOptions { interval, ..SetpointOptions::default() }), Err(Fault::TooMany(_))));
+    }
+}
+
+/// Set-points are motion alone: the rest stands in a table, and the machine stands still there.
+#[test]
+fn events_of_setpoints() {
+    for smoothing in [0.0, 0.05] {
+        let program = planned(WORDS);
+        let made = setpoints(&program, &SetpointOptions { smoothing, ..SetpointOptions::default() }).unwrap();
+        for event in &made.events {
+            let v = made.rows[event.row].velocity.iter().fold(0.0f64, |a, v| a.max(v.abs()));
+            assert!(v < 1e-9, "{v} at {event:?}");
+        }
+        assert!(made.events.windows(2).all(|w| w[0].row <= w[1].row));
+        if smoothing > 0.0 {
+            let texts = Texts::new([(FileId(0), WORDS)]);
+            let told: String = made.findings(&program, &texts).iter().map(|d| format!("{}\n", d.message)).collect();
+            insta::assert_snapshot!("events", format!("{}\n{told}", made.events_csv(&program)));
+        }
+    }
+}
+
+/// A joint that jumps keeps no acceleration however slowly it goes.
+#[test]
+fn a_jump_of_a_joint_is_an_error() {
+    let mut program = planned(PART);
+    let Some(Action::Joint { to, .. }) = program.steps.iter().map(|s| s.action.clone()).find(|a| matches!(a, Action::Joint { .. })) else { panic!() };
+    program.targets[to as usize].joints[0] += 0.3;
+    let Err(fault) = setpoints(&program, &SetpointOptions::default()) else { panic!("a jump goes out") };
+    let finding = fault.finding(&program.machine, &Texts::new([(FileId(0), PART)]));
+    assert_eq!(finding.code, gr_text::code::ROBOT_ACCELERATION);
+    assert!(finding.message.starts_with("joint J1 would have to gain speed at "), "{}", finding.message);
+    let at = finding.primary().1.start as usize;
+    assert!(PART[at..].starts_with("G0 X10 Y10 Z30"), "{}", &PART[at..]);
+}
+
+/// A frame that turns between two cuts: the tool turns along on the way, and no joint jumps.
+#[test]
+fn a_turned_frame_is_no_jump() {
+    let program = planned("T1 M6\nG0 X10 Y10 Z30\nG1 Z20 F600\nG1 X40\nG10 L2 P1 R10\nG1 X80\nG0 Z30\nM30\n");
+    let made = setpoints(&program, &SetpointOptions::default()).unwrap_or_else(|e| panic!("{e:?}"));
+    let step = |w: &[gr_robot::setpoints::Setpoint]| (0..6).map(|i| (w[1].position[i] - w[0].position[i]).abs()).fold(0.0, f64::max);
+    assert!(made.rows.windows(2).map(step).fold(0.0, f64::max) < 0.02);
+    let path = joint_path(&program, &JointOptions { interval: Some(0.02), ..JointOptions::default() }).unwrap();
+    let points: Vec<&JointPoint> = path.points().filter(|p| !p.rapid).collect();
+    let step = |w: &[&JointPoint]| (0..6).map(|i| (w[1].joints[i] - w[0].joints[i]).abs()).fold(0.0, f64::max);
+    assert!(points.windows(2).map(step).fold(0.0, f64::max) < 0.02);
 }

@@ -240,3 +240,40 @@ fn a_change_on_request() {
     let p = plan(&motion(&program), &machine, &texts, &options).unwrap_or_else(|e| panic!("{}", messages(&e, &program)));
     insta::assert_snapshot!("a_change_on_request", self::told(&p));
 }
+
+/// Runs of comments, drills by the thousand and frames without end: time grows with the program only.
+#[test]
+fn long_programs() {
+    let comments = format!("G64 P0.1\nT1 M6\nG0 X0 Y0 Z20\nG1 X50 F600\n{}G1 X60\nM30\n", "(nothing)\n".repeat(200_000));
+    planned(&comments, &cell()).unwrap_or_else(|e| panic!("{}", messages(&e, &comments)));
+    let mut holes = String::from("T1 M6\nG0 X0 Y0 Z20\nG1 X1 F3000\n");
+    (0..10_000).for_each(|i| holes += &format!("G0 X{} Y{}\n", i % 50, i / 50 % 50));
+    planned(&(holes + "M30\n"), &cell()).unwrap();
+}
+
+#[test]
+fn more_frames_than_a_program_holds() {
+    let mut text = String::from("T1 M6\nG0 X1 Y1 Z20\n");
+    (0..70_000).for_each(|i| text += &format!("G10 L2 P1 X{:.3}\nG0 X{:.3}\n", f64::from(i) / 1000.0, f64::from(i % 10) / 10.0));
+    text += "M30\n";
+    let told = faults(&text, &builtin("generic/mill3").unwrap());
+    assert!(told.contains("more than 65536 work frames"), "{}", &told[..told.len().min(300)]);
+}
+
+/// A panel's switches, a second spindle, an angle that is waited for.
+#[test]
+fn what_a_robot_does_not_do() {
+    // Outputs that are on or off only.
+    let mut cell = cell();
+    cell.cell.io.remove("S");
+    let on = gr_machine::Signal { signal: Some("doOrient".into()), value: Some(1.0), ..gr_machine::Signal::default() };
+    cell.cell.io.insert("M19".into(), on.clone());
+    cell.cell.io.insert("M101".into(), on);
+    let mut out = String::new();
+    let rows = ["M3 S8000\nS9000\nS9000 M4", "M19 R90", "M101 P3", "M49", "M50 P0\nM50 P1\nM50 P0", "M52 P1", "M48", "M19 R90 Q2", "M60", "M101 P3 Q4", "M101", "M66 P3 L3 Q2", "M66 P3 L0", "M66 E3 L0", "M67 E1 Q0.5"];
+    for row in rows {
+        let text = format!("T1 M6\nG0 X0 Y0 Z20\n{row}\nG1 X50 F600\nM30\n");
+        out += &format!("{}: {}", row.replace('\n', " "), faults(&text, &cell));
+    }
+    insta::assert_snapshot!("what_a_robot_does_not_do", out);
+}

@@ -262,15 +262,15 @@ impl Body for Writer {
             }
             Op::Message(text) => {
                 let text = cx.ascii(text);
-                self.room(12);
-                for piece in wrapped(&text, 24).iter().take(8) {
+                for piece in wrapped(&text, 24) {
+                    self.room(4);
                     self.line(&format!("  MESSAGE[{}]", piece.replace([';', ']'], ",")));
                 }
             }
             Op::Comment(text) => {
                 let text = cx.ascii(text);
-                self.room(12);
-                for piece in wrapped(&text, 32).iter().take(8) {
+                for piece in wrapped(&text, 32) {
+                    self.room(4);
                     self.line(&format!("  !{}", piece.replace(';', ",")));
                 }
             }

@@ -140,7 +140,8 @@ impl Writer {
 
     fn remark(&mut self, cx: &mut Cx, text: &str) {
         let text = cx.ascii(text);
-        for piece in wrapped(&text, 32).iter().take(8) {
+        for piece in wrapped(&text, 32) {
+            self.room(4);
             self.parts.line(&format!("'{piece}"));
         }
     }
@@ -252,9 +253,9 @@ impl Body for Writer {
                 self.parts.line(&format!("TIMER T={}", fix(s, 2)));
             }
             Op::Message(text) => {
-                self.room(12);
                 let text = cx.ascii(text);
-                for piece in wrapped(&text, 32).iter().take(8) {
+                for piece in wrapped(&text, 32) {
+                    self.room(4);
                     self.parts.line(&format!("MSG \"{}\"", piece.replace('"', "'")));
                 }
             }

@@ -39,8 +39,10 @@ impl Language for Krl {
         let mut names = Names::new(Rule { longest: 20, reserved: RESERVED, upper: false });
         let name = names.give(&program.name, "p");
         let limits = &program.machine.cell.controller;
+        let most = limits.lines.unwrap_or(LINES);
         let mut w = Writer {
-            parts: Parts::new(limits.lines.unwrap_or(LINES).saturating_sub(4), limits.points, limits.bytes, "\r\n"),
+            most,
+            parts: Parts::new(most.saturating_sub(4), limits.points, limits.bytes, "\r\n"),
             home: String::new(),
             angles: [0.0; 3],
             set: [String::new(), String::new(), String::new()],
@@ -55,6 +57,8 @@ impl Language for Krl {
 }
 
 struct Writer {
+    /// Lines of a file at most.
+    most: u64,
     parts: Parts,
     home: String,
     angles: [f64; 3],
@@ -69,7 +73,10 @@ impl Writer {
         let start = "BAS(#INITMOV,0)\r\n$ADVANCE=3\r\n$ORI_TYPE=#VAR\r\n$CIRC_TYPE=#PATH\r\nPTP XHOME\r\n";
         let parts = self.parts.finish();
         let mut main = format!("{head}DEF {name}()\r\n{start}");
-        if let [one] = parts.as_slice() {
+        let lines = |text: &str| text.matches('\n').count() as u64;
+        if let [one] = parts.as_slice()
+            && lines(&main) + lines(one) < self.most
+        {
             main += one;
         } else {
             for (i, part) in parts.iter().enumerate() {
@@ -110,15 +117,12 @@ impl Writer {
     /// Writes a setting where it is not in force.
     fn put(&mut self, slot: usize, text: String) {
         if self.set[slot] != text {
-            self.parts.line(&text);
+            text.split("\r\n").for_each(|line| self.parts.line(line));
             self.set[slot] = text;
         }
     }
 
     fn path(&mut self, speed: f64, zone: Option<f64>) -> &'static str {
-        if self.parts.full(8) {
-            self.parts.cut();
-        }
         self.put(0, format!("$VEL.CP={}", with_point(single(speed / 1000.0))));
         let Some(r) = zone else { return "" };
         self.put(1, format!("$APO.CDIS={}", real(libm::floor(r * 1000.0 + 1e-6) / 1000.0, 3)));
@@ -138,9 +142,6 @@ impl Writer {
     }
 
     fn joint(&mut self, cx: &mut Cx, to: &Target, share: f64) {
-        if self.parts.full(12) {
-            self.parts.cut();
-        }
         let percent = libm::floor(share * 100.0 + 1e-6).clamp(1.0, 100.0);
         let all: Vec<String> = (1..=6).map(|i| format!("$VEL_AXIS[{i}]={percent:.0}")).collect();
         self.put(2, all.join("\r\n"));
@@ -175,6 +176,7 @@ fn with_point(mut text: String) -> String {
 
 impl Body for Writer {
     fn op(&mut self, cx: &mut Cx, op: Op) {
+        self.parts.begin();
         match op {
             Op::Line(number, text) => {
                 let text = cx.ascii(text);
@@ -227,6 +229,7 @@ impl Body for Writer {
             Op::Message(text) | Op::Comment(text) => {
                 let text = cx.ascii(text);
                 for piece in wrapped(&text, 120) {
+                    self.parts.begin();
                     self.parts.line(&format!("; {piece}"));
                 }
             }

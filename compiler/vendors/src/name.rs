@@ -89,12 +89,7 @@ pub(crate) fn plain(name: &str) -> bool {
         && name.chars().all(|c| c.is_ascii_alphanumeric() || matches!(c, '_' | '$' | '.' | ':'))
 }
 
-/// The number in a signal's name: `5`, `DO[5]`, `OT#(5)`, `$OUT[5]`, `out_5`.
-pub(crate) fn number(name: &str) -> Option<u32> {
-    let mut groups = name.split(|c: char| !c.is_ascii_digit()).filter(|g| !g.is_empty());
-    let (one, more) = (groups.next()?, groups.next());
-    if more.is_some() { None } else { one.parse().ok() }
-}
+pub(crate) use gr_machine::signal_number as number;
 
 #[cfg(test)]
 mod tests {

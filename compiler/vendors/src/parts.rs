@@ -9,18 +9,32 @@ pub(crate) struct Parts {
     most: (u64, u64, u64),
     done: Vec<String>,
     end: &'static str,
+    /// Where the statement in work begins: bytes, lines and points before it.
+    began: (usize, u64, u64),
 }
 
 impl Parts {
     /// Parts of at most so many lines, points and bytes; `end` ends a line.
     pub(crate) fn new(lines: u64, points: Option<u64>, bytes: Option<u64>, end: &'static str) -> Parts {
         let most = (lines.max(20), points.unwrap_or(u64::MAX).max(10), bytes.unwrap_or(u64::MAX).max(4000));
-        Parts { text: String::new(), lines: 0, points: 0, most, done: Vec::new(), end }
+        Parts { text: String::new(), lines: 0, points: 0, most, done: Vec::new(), end, began: (0, 0, 0) }
+    }
+    /// A statement begins: its lines stay together. Where they have no room they begin the next part.
+    pub(crate) fn begin(&mut self) {
+        self.began = (self.text.len(), self.lines, self.points);
     }
     /// Ends the line that was appended to `text`.
     pub(crate) fn end_line(&mut self) {
         self.text.push_str(self.end);
         self.lines += 1;
+        let (at, lines, points) = self.began;
+        let over = self.lines > self.most.0 || self.points > self.most.1 || self.text.len() as u64 > self.most.2;
+        if over && at > 0 && at <= self.text.len() {
+            let rest = self.text.split_off(at);
+            self.done.push(std::mem::replace(&mut self.text, rest));
+            (self.lines, self.points) = (self.lines - lines, self.points - points);
+            self.began = (0, 0, 0);
+        }
     }
     /// Appends a line.
     pub(crate) fn line(&mut self, line: &str) {
@@ -42,7 +56,7 @@ impl Parts {
     /// Closes the part in work.
     pub(crate) fn cut(&mut self) {
         self.done.push(std::mem::take(&mut self.text));
-        (self.lines, self.points) = (0, 0);
+        (self.lines, self.points, self.began) = (0, 0, (0, 0, 0));
     }
     /// All parts.
     pub(crate) fn finish(mut self) -> Vec<String> {

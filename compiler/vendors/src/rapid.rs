@@ -30,6 +30,8 @@ const RESERVED: &[&str] = &[
 
 /// Lines of a module: what ABB's reference post processors keep to.
 const LINES: u64 = 5000;
+/// Lines of a module around its statements.
+const FRAME: u64 = 8;
 
 impl Language for Rapid {
     fn id(&self) -> &'static str {
@@ -42,8 +44,10 @@ impl Language for Rapid {
         let tools: Vec<String> = program.tools.iter().map(|t| names.give(&t.name, "t")).collect();
         let frames: Vec<String> = program.frames.iter().map(|f| names.give(&f.name, "w")).collect();
         let limits = &program.machine.cell.controller;
+        let most = limits.lines.unwrap_or(LINES);
         let mut w = Writer {
-            parts: Parts::new(limits.lines.unwrap_or(LINES).saturating_sub(4), limits.points, limits.bytes, "\r\n"),
+            most,
+            parts: Parts::new(most.saturating_sub(FRAME), limits.points, limits.bytes, "\r\n"),
             names,
             tools,
             frames,
@@ -62,6 +66,8 @@ impl Language for Rapid {
 }
 
 struct Writer {
+    /// Lines of a file at most.
+    most: u64,
     parts: Parts,
     names: Names,
     tools: Vec<String>,
@@ -109,7 +115,10 @@ impl Writer {
         let mut files = Vec::new();
         let mut list = vec![format!("{module}.mod")];
         head += &format!("  PROC main()\r\n{start}");
-        if let [one] = parts.as_slice() {
+        let lines = |text: &str| text.matches('\n').count() as u64;
+        if let [one] = parts.as_slice()
+            && lines(&head) + lines(one) + 2 <= self.most
+        {
             head += one;
         } else {
             for (i, part) in parts.iter().enumerate() {
@@ -204,9 +213,6 @@ impl Writer {
     }
 
     fn motion(&mut self, cx: &Cx, word: &str, targets: &[&Target], speed: &str, zone: &str) {
-        if self.parts.full(2) {
-            self.parts.cut();
-        }
         self.parts.text.push_str("    ");
         self.parts.text.push_str(word);
         for (i, t) in targets.iter().enumerate() {
@@ -220,6 +226,7 @@ impl Writer {
 
 impl Body for Writer {
     fn op(&mut self, cx: &mut Cx, op: Op) {
+        self.parts.begin();
         match op {
             Op::Line(number, text) => {
                 let text = cx.ascii(text);
@@ -263,6 +270,7 @@ impl Body for Writer {
             Op::Message(text) => {
                 let text = cx.ascii(text);
                 for piece in wrapped(&text, 80) {
+                    self.parts.begin();
                     self.line(&format!("TPWrite \"{}\";", piece.replace('\\', "/").replace('"', "\"\"")));
                 }
             }

@@ -8,7 +8,7 @@ use crate::{Options, Output};
 use gr_ir::{Source, Sources};
 use gr_machine::math::{about, add, cross, dot, norm, quaternion_of, rotate, scale, sub};
 use gr_machine::{Chain, Kinematics, Machine, Signal};
-use gr_robot::{Action, MAX_JOINTS, RobotProgram, Target, Zone};
+use gr_robot::{Action, MAX_JOINTS, RobotProgram, Target, Word, Zone};
 use gr_text::{Code, Diagnostic, FileId, Findings, Span, code};
 use std::collections::BTreeSet;
 
@@ -408,7 +408,7 @@ impl<'p> Cx<'p> {
 
     fn change(&mut self, body: &mut dyn Body, number: u32, by: Option<&'p Signal>) {
         match by {
-            Some(signal) => self.signal(body, "M6", Some(f64::from(number)), signal),
+            Some(signal) => self.signal(body, &Word::new("M6"), Some(f64::from(number)), signal),
             None => {
                 let name = self.program.tools.iter().find(|t| t.number == number).map(|t| format!(" {}", t.name));
                 let text = format!("Tool {number}{}", name.unwrap_or_default());
@@ -418,22 +418,23 @@ impl<'p> Cx<'p> {
         }
     }
 
-    fn signal(&mut self, body: &mut dyn Body, word: &str, value: Option<f64>, signal: &Signal) {
+    fn signal(&mut self, body: &mut dyn Body, word: &Word, value: Option<f64>, signal: &Signal) {
+        let key = word.key();
         let nothing = signal.routine.is_none() && signal.signal.is_none() && signal.wait.is_none() && signal.seconds.is_none();
         if nothing {
-            self.say(code::VENDOR_SIGNAL_MISSING, &[word.to_string()]);
+            self.say(code::VENDOR_SIGNAL_MISSING, std::slice::from_ref(&key));
         }
         if let Some(name) = &signal.routine {
             body.op(self, Op::Call { name, value: signal.value.or(value) });
         } else if let Some(name) = &signal.signal {
             // What the program says goes before what the machine file says; a tool's number takes several outputs.
-            let value = match (word, value, signal.value) {
+            let value = match (word.code.as_str(), value, signal.value) {
                 ("S" | "M67" | "M68", Some(v), _) => Value::Analog(v),
                 ("M6", Some(v), _) => Value::Group(v as u32),
                 (_, _, Some(v)) if v != 0.0 && v != 1.0 => Value::Analog(v),
                 (_, _, v) => Value::Digital(v != Some(0.0)),
             };
-            body.op(self, Op::Set { name, value, word });
+            body.op(self, Op::Set { name, value, word: &key });
         }
         match (&signal.wait, signal.seconds) {
             (Some(name), timeout) => body.op(self, Op::Wait { name, on: true, timeout }),

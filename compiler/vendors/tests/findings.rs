@@ -129,3 +129,55 @@ fn damaged_programs_do_not_panic() {
         emit(target, &p);
     }
 }
+
+/// An analog output keeps its value, whatever the row of the machine file says a digital one would be.
+#[test]
+fn an_analog_output_stays_analog() {
+    let word = gr_robot::Word::numbered("M67", 'E', 1).with('Q', 0.5);
+    let action = Action::Signal { word, value: Some(0.5), signal: Signal { value: Some(1.0), ..signal("aoFlow") } };
+    let output = one("rapid", action);
+    let text = String::from_utf8(output.files[0].bytes.clone()).unwrap();
+    assert!(text.contains("SetAO aoFlow,0.5;"), "{text}");
+}
+
+/// No file is longer than the machine file allows, whatever the lines are.
+#[test]
+fn parts_keep_their_length() {
+    for target in ["rapid", "krl", "fanuc-ls", "inform"] {
+        let (id, home, names) = robot_of(target);
+        let mut b = Builder::new(machine(id), home);
+        b.program.machine.cell.controller.lines = Some(40);
+        b.program.machine.cell.controller.points = Some(30);
+        for i in 0..40 {
+            b.add(&Move::Joint { by: [0.01, 0.02, 0.03, 0.02, 0.03, 0.01], share: 0.1 + 0.01 * f64::from(i) });
+            b.add(&Move::Line { shift: [1.0, 0.0, 0.0], turn: [0.0; 3], speed: 10.0 + f64::from(i), zone: None });
+            b.add(&Move::Other(Action::Comment("a remark of some length, which has to be wrapped where lines are short and not otherwise".into())));
+            (0..i % 7).for_each(|_| {
+                b.add(&Move::Other(signal_of("M8", None, signal(names[3]))));
+                b.add(&Move::Other(Action::WaitInput { name: names[2].into(), on: true, timeout: Some(2.0) }));
+                b.add(&Move::Other(Action::Message("look".into())));
+            });
+        }
+        let output = run(target, &b, true);
+        assert!(output.files.len() > 3, "{target}: {:?}", output.findings);
+        for file in &output.files {
+            let text = String::from_utf8_lossy(&file.bytes);
+            // The statements: between head and end, or between /MN and /POS, NOP and END.
+            let body: Vec<&str> = match target {
+                "fanuc-ls" => text.lines().skip_while(|l| *l != "/MN").skip(1).take_while(|l| *l != "/POS").filter(|l| !l.starts_with("    :")).collect(),
+                "inform" => text.lines().skip_while(|l| *l != "NOP").take_while(|l| *l != "END").collect(),
+                _ => text.lines().collect(),
+            };
+            assert!(body.len() <= 40 || file.name.ends_with(".pgf") || main_file(target, &text), "{target} {}: {} lines\n{text}", file.name, body.len());
+        }
+    }
+}
+
+/// The file that calls the parts.
+fn main_file(target: &str, text: &str) -> bool {
+    match target {
+        "rapid" => text.contains("PROC main()"),
+        "krl" => text.contains("INITMOV"),
+        _ => text.contains("CALL"),
+    }
+}

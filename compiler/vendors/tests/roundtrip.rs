@@ -148,8 +148,8 @@ impl Compare<'_> {
                     if got != *name && got != digits {
                         return Err(format!("{got} for {name}"));
                     }
-                    let wanted = if word == "S" { *value } else { signal.value }.unwrap_or(1.0);
-                    let scaled = if word == "S" { wanted / 24000.0 } else { wanted };
+                    let wanted = if word.code == "S" { *value } else { signal.value }.unwrap_or(1.0);
+                    let scaled = if word.code == "S" { wanted / 24000.0 } else { wanted };
                     if ![wanted, scaled, 10.0 * scaled].iter().any(|w| (w - v).abs() < 0.006) {
                         return Err(format!("{got} becomes {v}, not {wanted}"));
                     }

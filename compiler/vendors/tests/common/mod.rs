@@ -341,7 +341,7 @@ pub fn sample(target: &str) -> RobotProgram {
     let (id, home, names) = robot_of(target);
     let mut program = realistic(id, home, names);
     for step in &mut program.steps {
-        if NO_ANALOG.contains(&target) && matches!(&step.action, Action::Signal { word, .. } if word == "S") {
+        if NO_ANALOG.contains(&target) && matches!(&step.action, Action::Signal { word, .. } if word.code == "S") {
             step.action = Action::Comment("S12000".into());
         }
         if target == "nachi" && let Action::ChangeTool { by: Some(by), .. } = &mut step.action {
