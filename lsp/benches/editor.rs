@@ -84,6 +84,14 @@ impl Client {
         let changes = json!([{ "range": range, "text": new }]);
         self.notify("textDocument/didChange", json!({ "textDocument": { "uri": uri, "version": self.version }, "contentChanges": changes }));
     }
+    /// Processor time of the server so far, all its threads: what a busy machine leaves comparable.
+    fn processor(&self) -> Duration {
+        let stat = std::fs::read_to_string(format!("/proc/{}/stat", self.child.id())).unwrap_or_default();
+        let behind = stat.rsplit(')').next().unwrap_or("");
+        // utime and stime, in hundredths of a second.
+        let ticks: u64 = behind.split_whitespace().skip(11).take(2).filter_map(|n| n.parse::<u64>().ok()).sum();
+        Duration::from_millis(ticks * 10)
+    }
     /// Resident memory, MiB, now and at most.
     fn memory(&self) -> (u64, u64) {
         let status = std::fs::read_to_string(format!("/proc/{}/status", self.child.id())).unwrap_or_default();
@@ -141,7 +149,7 @@ fn gcode(lines: usize) {
     let began = Instant::now();
     c.open(uri, "gcode", &text);
     c.diagnostics();
-    println!("{:<44} {:15.2} ms", "open → diagnostics", ms(began.elapsed()));
+    println!("{:<44} {:15.2} ms, processor {:.0} ms", "open → diagnostics", ms(began.elapsed()), ms(c.processor()));
     let document = json!({ "textDocument": { "uri": uri } });
     let places = [10, lines / 2, lines - 10];
     for (name, line) in ["start", "middle", "end"].iter().zip(places) {
@@ -173,6 +181,7 @@ fn gcode(lines: usize) {
     println!("{:<44} {now:12} MiB", "resident memory");
     if lines <= 200_000 {
         let mut n = 0;
+        let before = c.processor();
         let times = timed(
             || {
                 n = (n + 1) % 10;
@@ -182,6 +191,7 @@ fn gcode(lines: usize) {
             10,
         );
         show("edit → tool path", times);
+        println!("{:<44} processor {:.0} ms each", "", ms(c.processor() - before) / 10.0);
         show("lenses", timed(|| drop(c.request("textDocument/codeLens", document.clone())), 10));
     }
     let (now, most) = c.memory();
@@ -205,7 +215,7 @@ fn exchange(megabytes: usize) {
     let began = Instant::now();
     c.open(uri, "p21", &text);
     let found = c.request("textDocument/definition", at.clone());
-    println!("{:<44} {:15.2} ms", "open → definition", ms(began.elapsed()));
+    println!("{:<44} {:15.2} ms, processor {:.0} ms", "open → definition", ms(began.elapsed()), ms(c.processor()));
     assert_eq!(found[0]["range"]["start"]["line"], line - 1, "{found}");
     let times = timed(
         || {

@@ -2,6 +2,7 @@
 //! workers, and has diagnostics found when nothing else is waiting.
 
 use std::collections::{BTreeMap, HashMap};
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicI32, Ordering};
@@ -38,6 +39,8 @@ pub enum Message {
     Ask { uri: lsp::Uri, work: Box<dyn FnOnce(Option<View>) + Send> },
     /// A question about the server.
     AskAll { work: Box<dyn FnOnce(&Analysis) + Send> },
+    /// Diagnostics of the lines around the last edit were found; those of the rest follow.
+    Early { uri: lsp::Uri, version: i32, lines: Range<u32>, found: Vec<Diagnostic> },
     /// Diagnostics of a version were found.
     Found { uri: lsp::Uri, version: i32, found: Option<Arc<Vec<Diagnostic>>> },
 }
@@ -46,9 +49,11 @@ pub enum Message {
 pub enum Event {
     /// Diagnostics of a document.
     Diagnostics { uri: lsp::Uri, version: Option<i32>, diagnostics: Vec<lsp::Diagnostic> },
+    /// Diagnostics of a version are out.
+    Analysed { uri: lsp::Uri, version: i32 },
     /// Looking at a big document takes a while: began (true) or ended.
     Busy { uri: lsp::Uri, begins: bool },
-    /// Settings changed what hints and lenses show.
+    /// Files or settings changed what hints, lenses and diagnostics show.
     Refresh,
 }
 
@@ -153,6 +158,7 @@ impl Analysis {
                 let _ = self.reads.send(Box::new(move || work(view)));
             }
             Message::AskAll { work } => work(self),
+            Message::Early { uri, version, lines, found } => self.early(&uri, version, &lines, found, publish),
             Message::Found { uri, version, found } => self.found(&uri, version, found, publish),
         }
     }
@@ -236,6 +242,7 @@ impl Analysis {
             station,
             stale: true,
             found: Arc::default(),
+            focus: 0,
             derived: Arc::default(),
             latest: Arc::new(AtomicI32::new(version)),
             sent_tokens: Arc::default(),
@@ -253,6 +260,8 @@ impl Analysis {
                 }
                 None => 0..document.text.len(),
             };
+            document.focus = change.range.map_or(0, |r| r.start.line);
+            move_along(Arc::make_mut(&mut document.found), &range, change.text.len() as u32);
             Arc::make_mut(&mut document.text).edit(range.clone(), &change.text);
             if let Kind::Gcode(file, _) = document.kind {
                 self.session.edit(file, range, &change.text);
@@ -312,10 +321,14 @@ impl Analysis {
             let settles = matches!(p.extension().and_then(|e| e.to_str()), Some("toml" | "tbl" | "var" | "ini" | "inc"));
             name == "gcc-robot.toml" || settles || self.stations.values().any(|s| s.files.contains(p))
         };
-        if paths.iter().any(known) {
+        let (settles, programs) = (paths.iter().any(known), paths.iter().any(|p| crate::workspace::is_program(p)));
+        if settles {
             self.reload(publish);
         }
-        if paths.iter().any(|p| crate::workspace::is_program(p)) {
+        if settles || programs {
+            publish(Event::Refresh);
+        }
+        if programs {
             self.session.disk_changed();
             self.documents.values_mut().filter(|d| matches!(d.kind, Kind::Gcode(..))).for_each(|d| {
                 d.stale = true;
@@ -359,6 +372,9 @@ impl Analysis {
                     publish(Event::Busy { uri: view.uri.clone(), begins: true });
                 }
                 let (uri, version) = (view.uri.clone(), view.version);
+                if let Ok(Some((lines, found))) = crate::features::early(&view) {
+                    let _ = own.send(Message::Early { uri: uri.clone(), version, lines, found });
+                }
                 let found = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| crate::features::diagnostics(view)));
                 // Cut short by an edit: the edit has made the document stale again.
                 let found = found.unwrap_or(Ok(Vec::new())).ok().map(Arc::new);
@@ -372,7 +388,6 @@ impl Analysis {
     }
 
     fn found(&mut self, uri: &lsp::Uri, version: i32, found: Option<Arc<Vec<Diagnostic>>>, publish: &impl Fn(Event)) {
-        let session = &self.session;
         let Some(document) = self.documents.get_mut(uri) else { return };
         let Some(found) = found else {
             // Cut short although nothing changed in this document: another one was edited.
@@ -383,6 +398,29 @@ impl Analysis {
             return;
         }
         document.found = found;
+        self.publish(uri, publish);
+        publish(Event::Analysed { uri: uri.clone(), version });
+    }
+
+    /// Takes in what was found in some lines, and tells it when it is something new.
+    fn early(&mut self, uri: &lsp::Uri, version: i32, lines: &Range<u32>, found: Vec<Diagnostic>, publish: &impl Fn(Event)) {
+        let Some(document) = self.documents.get_mut(uri).filter(|d| d.version == version) else { return };
+        let Kind::Gcode(own, _) = document.kind else { return };
+        let bytes = document.text.line_start(lines.start)..document.text.line_start(lines.end);
+        let inside = |d: &&Diagnostic| d.primary().0 == own && bytes.contains(&d.primary().1.start);
+        let says = |d: &Diagnostic| (d.primary().1, d.severity, d.message.clone());
+        if document.found.iter().filter(inside).map(says).eq(found.iter().map(says)) {
+            return;
+        }
+        let mut all: Vec<Diagnostic> = document.found.iter().filter(|d| !inside(d)).cloned().chain(found).collect();
+        all.sort_by_key(|d| (d.primary().0, d.primary().1.start));
+        document.found = Arc::new(all);
+        self.publish(uri, publish);
+    }
+
+    /// Tells what is known about a document.
+    fn publish(&self, uri: &lsp::Uri, publish: &impl Fn(Event)) {
+        let (session, Some(document)) = (&self.session, self.documents.get(uri)) else { return };
         let (text, columns) = (&document.text, self.columns);
         let other = |file: gr_text::FileId, span: Span| -> Option<lsp::Location> {
             let path = session.path(file)?;
@@ -395,8 +433,20 @@ impl Analysis {
         };
         let shown = document.found.iter().filter(|d| d.primary().0 == own).take(self.settings.most_problems);
         let diagnostics = shown.map(|d| protocol::diagnostic(d, text, columns, &place)).collect();
-        publish(Event::Diagnostics { uri: uri.clone(), version: Some(version), diagnostics });
+        publish(Event::Diagnostics { uri: uri.clone(), version: Some(document.version), diagnostics });
     }
+}
+
+/// Moves findings as an edit moves their places; those in what was replaced are gone.
+fn move_along(found: &mut Vec<Diagnostic>, replaced: &Range<u32>, new: u32) {
+    let moved = |s: &mut Span| {
+        if s.start >= replaced.end {
+            let to = |v: u32| v - replaced.end + replaced.start + new;
+            *s = Span::new(to(s.start), to(s.end));
+        }
+    };
+    found.retain(|d| d.primary().1.start >= replaced.end || d.primary().1.end <= replaced.start);
+    found.iter_mut().flat_map(|d| d.labels.iter_mut()).for_each(|l| moved(&mut l.span));
 }
 
 /// The file name of a document.

@@ -4,12 +4,15 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicI32, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
+use gr_backends::sheet::ToolRow;
 use gr_driver::{Cancelled, Snapshot};
 use gr_gcode::File;
 use gr_ide::config::Schema;
-use gr_ir::Program;
 use gr_ir::measure::{Rates, Report, report};
-use gr_spec::{Dialect, Family};
+use gr_ir::{Program, Texts};
+use gr_robot::Planned;
+use gr_robot::along::is_planned;
+use gr_spec::Dialect;
 use gr_text::{Diagnostic, FileId, LineIndex, Span};
 use tower_lsp::ls_types as lsp;
 
@@ -18,8 +21,6 @@ use crate::settings::Settings;
 use crate::text::{Columns, Text};
 use crate::workspace::Workspace;
 
-/// Blocks and calls that are run for a tool path while a program is edited.
-const MOST_BLOCKS: u64 = 6_000_000;
 /// Larger open documents are not searched for names from other documents, bytes.
 const MOST_SEARCHED: u32 = 2_000_000;
 
@@ -51,22 +52,32 @@ pub struct Exchange {
 /// A program that was run as a whole.
 pub struct Motion {
     /// Its motion.
-    pub program: Program,
-    /// Names of the files it is made of.
-    pub files: Vec<Box<str>>,
-    /// Sums.
-    pub report: Report,
+    pub program: Arc<Program>,
+    /// The file of the document.
+    pub main: FileId,
+    /// Names of the files it is made of, the document first.
+    pub files: Vec<String>,
+    /// Texts of the others.
+    subs: Vec<(FileId, String)>,
     /// What times are predicted with.
     pub rates: Rates,
     /// Raw part, mm.
     pub stock: Option<[[f64; 3]; 2]>,
+    /// Tools of a process plan.
+    pub tools: Vec<ToolRow>,
 }
+
+/// The plan for the chosen machine, or what keeps it from being made.
+pub type Planning = Result<Planned, Vec<Diagnostic>>;
 
 /// What is worked out at most once for a version of a document.
 #[derive(Default)]
 pub struct Derived {
     exchange: OnceLock<Arc<Exchange>>,
+    /// Of an exchange file.
     motion: OnceLock<Option<Arc<Motion>>>,
+    /// Of the motion that it was made of.
+    planning: Mutex<Option<(Arc<Program>, Arc<Planning>)>>,
     tokens: Mutex<Option<(String, Arc<Vec<lsp::SemanticToken>>)>>,
 }
 
@@ -91,6 +102,8 @@ pub struct View {
     pub settings: Arc<Settings>,
     /// Diagnostics that were found last, and for which version.
     pub found: Arc<Vec<Diagnostic>>,
+    /// The line that was edited last.
+    pub focus: u32,
     /// Worked out once per version.
     pub derived: Arc<Derived>,
     /// Version of the document now.
@@ -141,6 +154,7 @@ impl View {
             station: document.station.clone(),
             settings,
             found: document.found.clone(),
+            focus: document.focus,
             derived: document.derived.clone(),
             latest: document.latest.clone(),
             sent_tokens: document.sent_tokens.clone(),
@@ -192,34 +206,64 @@ impl View {
         });
         made.clone()
     }
-    /// The program's motion, run at most once per version. Release the database first.
-    pub fn motion(&self) -> Option<Arc<Motion>> {
-        self.derived.motion.get_or_init(|| self.run().map(Arc::new)).clone()
-    }
-    fn run(&self) -> Option<Motion> {
-        match self.kind {
-            Kind::Gcode(_, dialect) if dialect.family != Family::Ufmg2008 => {
-                let text: Arc<str> = self.text.to_string().into();
-                let mut setup = self.station.setup_for(dialect);
-                // A loop that does not end must not keep a worker for long: the path ends where the budget does.
-                setup.budgets.blocks = setup.budgets.blocks.min(MOST_BLOCKS);
-                setup.budgets.calls = setup.budgets.calls.min(MOST_BLOCKS);
-                let made = gr_driver::lower(&self.path.to_string_lossy(), text, &setup, None);
-                let rates = gr_driver::rates(&setup);
-                let report = report(&made.program, &rates);
-                let files = made.texts.into_iter().map(|(name, _)| name).collect();
-                Some(Motion { program: made.program, files, report, rates, stock: None })
-            }
-            Kind::Exchange => {
-                let exchange = self.exchange();
-                let plan = self.host.plan(&self.path, &exchange.text, &self.station)?;
-                let rates = gr_driver::rates(&self.station.setup_for(Dialect::linuxcnc()));
-                let report = report(&plan.program, &rates);
-                let files = vec![self.path.to_string_lossy().into()];
-                Some(Motion { program: plan.program, files, report, rates, stock: plan.stock })
-            }
-            _ => None,
+    /// The program's motion. Of G-code the database remembers it: release it afterwards.
+    pub fn motion(&self) -> Result<Option<Arc<Motion>>, Cancelled> {
+        if matches!(self.kind, Kind::Exchange) {
+            return Ok(self.derived.motion.get_or_init(|| self.of_process().map(Arc::new)).clone());
         }
+        let Some((session, main, dialect)) = self.session() else { return Ok(None) };
+        let program = session.motion(main)?;
+        let name = |id: FileId| session.path(id).map_or(String::new(), |p| p.to_string());
+        let others: Vec<FileId> = program.files.iter().map(|f| f.0).filter(|id| *id != main).collect();
+        let text = |id: &FileId| Some((*id, session.contents(*id)?.chunks.iter().map(|c| &*c.text).collect()));
+        Ok(Some(Arc::new(Motion {
+            main,
+            files: std::iter::once(main).chain(others.iter().copied()).map(name).collect(),
+            subs: others.iter().filter_map(text).collect(),
+            rates: gr_driver::rates(&self.station.setup_for(dialect)),
+            stock: None,
+            tools: Vec::new(),
+            program,
+        })))
+    }
+    fn of_process(&self) -> Option<Motion> {
+        let plan = self.host.plan(&self.path, &self.exchange().text, &self.station)?;
+        Some(Motion {
+            program: Arc::new(plan.program),
+            main: FileId(0),
+            files: vec![self.path.to_string_lossy().into()],
+            subs: Vec::new(),
+            rates: gr_driver::rates(&self.station.setup_for(Dialect::linuxcnc())),
+            stock: plan.stock,
+            tools: plan.tools,
+        })
+    }
+    /// Sums over the motion of a document.
+    pub fn report(&self, motion: &Motion) -> Result<Arc<Report>, Cancelled> {
+        match self.session() {
+            Some((session, file, _)) => session.stats(file),
+            None => Ok(Arc::new(report(&motion.program, &motion.rates))),
+        }
+    }
+    /// What a build for the chosen machine would make of the motion; none when there is no such machine, or when it
+    /// needs no plan. Worked out once for the same motion: release the database first.
+    pub fn planning(&self, motion: &Motion) -> Option<Arc<Planning>> {
+        let machine = self.station.machine.as_ref().filter(|m| is_planned(m))?;
+        let mut known = self.derived.planning.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, planning)) = known.as_ref().filter(|(p, _)| Arc::ptr_eq(p, &motion.program)) {
+            return Some(planning.clone());
+        }
+        let own = self.text.to_string();
+        let texts = std::iter::once((motion.main, own.as_str())).chain(motion.subs.iter().map(|(id, t)| (*id, t.as_str())));
+        let planning = Arc::new(gr_robot::plan(&motion.program, machine, &Texts::new(texts), &gr_robot::Options::default()));
+        *known = Some((motion.program.clone(), planning.clone()));
+        Some(planning)
+    }
+    /// Whether the plan is there, or soon is: see [`View::planning`].
+    pub fn plans_quickly(&self, motion: &Motion) -> bool {
+        const QUICK: u32 = 100_000;
+        let known = self.derived.planning.try_lock();
+        self.text.len() <= QUICK || known.is_ok_and(|k| k.as_ref().is_some_and(|(p, _)| Arc::ptr_eq(p, &motion.program)))
     }
     /// Remembers tokens that are sent; gives the ones sent before.
     pub fn swap_tokens(&self, id: &str, tokens: &Arc<Vec<lsp::SemanticToken>>) -> Option<(String, Arc<Vec<lsp::SemanticToken>>)> {
@@ -267,8 +311,10 @@ pub struct Document {
     pub station: Arc<Station>,
     /// Diagnostics have to be found anew.
     pub stale: bool,
-    /// Diagnostics that were found last.
+    /// Diagnostics that were found last; edits since have moved them.
     pub found: Arc<Vec<Diagnostic>>,
+    /// The line that was edited last: what is visible is around it.
+    pub focus: u32,
     /// Worked out once per version.
     pub derived: Arc<Derived>,
     /// `version`, for the views.

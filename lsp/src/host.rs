@@ -135,8 +135,6 @@ pub trait Host: Send + Sync {
     fn check_project(&self, path: &Path, text: &str) -> Vec<Diagnostic>;
     /// Everything that is to be said about a STEP-NC file.
     fn check_exchange(&self, path: &Path, text: &str, station: &Station) -> Vec<Diagnostic>;
-    /// What the chosen machine has to say about a program without errors; places are in file 0.
-    fn check_machine(&self, path: &Path, text: &str, dialect: &'static Dialect, station: &Station) -> Vec<Diagnostic>;
     /// The motion of a STEP-NC file, and its raw part's box in mm.
     fn plan(&self, path: &Path, text: &str, station: &Station) -> Option<Plan>;
     /// Whether nobody says what control a `.gcode` file is for.
@@ -151,6 +149,8 @@ pub struct Plan {
     pub program: gr_ir::Program,
     /// Raw part: smallest and largest X Y Z, mm.
     pub stock: Option<[[f64; 3]; 2]>,
+    /// Its tools.
+    pub tools: Vec<gr_backends::sheet::ToolRow>,
 }
 
 /// No project files, machines or targets: for tests of the server alone.
@@ -174,9 +174,6 @@ impl Host for Plain {
     }
     fn check_exchange(&self, _: &Path, text: &str, _: &Station) -> Vec<Diagnostic> {
         gr_step::diagnostics(text, gr_text::FileId(0))
-    }
-    fn check_machine(&self, _: &Path, _: &str, _: &'static Dialect, _: &Station) -> Vec<Diagnostic> {
-        Vec::new()
     }
     fn plan(&self, _: &Path, _: &str, _: &Station) -> Option<Plan> {
         None

@@ -8,6 +8,7 @@
 //! | `documents` | open documents and the views that requests work on |
 //! | `features` | from requests to features and back |
 //! | `protocol` | shapes of the protocol, and of our own requests |
+//! | `machine` | joint values of the chosen machine |
 //! | `text` | text, positions, edits |
 //! | `frames` | takes messages that are none out of the stream |
 
@@ -16,7 +17,7 @@ mod documents;
 mod features;
 mod frames;
 pub mod host;
-mod machine;
+pub mod machine;
 pub mod protocol;
 mod server;
 mod settings;

@@ -29,6 +29,7 @@ struct Abilities {
     progress: bool,
     hint_refresh: bool,
     lens_refresh: bool,
+    diagnostic_refresh: bool,
     pulls: bool,
 }
 
@@ -146,12 +147,12 @@ async fn speak(client: Client, abilities: Arc<Mutex<Abilities>>, mut outbox: mps
             Event::Diagnostics { uri, version, diagnostics } => {
                 // A client that asks for diagnostics itself would show these twice.
                 if !can().pulls {
-                    client.publish_diagnostics(uri.clone(), diagnostics, version).await;
+                    client.publish_diagnostics(uri, diagnostics, version).await;
                 }
-                if let Some(version) = version {
-                    let uri = uri.as_str().to_string();
-                    client.send_notification::<custom::AnalysedNotification>(custom::Analysed { uri, version }).await;
-                }
+            }
+            Event::Analysed { uri, version } => {
+                let uri = uri.as_str().to_string();
+                client.send_notification::<custom::AnalysedNotification>(custom::Analysed { uri, version }).await;
             }
             Event::Busy { uri, begins: true } if can().progress => {
                 count += 1;
@@ -182,6 +183,10 @@ async fn speak(client: Client, abilities: Arc<Mutex<Abilities>>, mut outbox: mps
                     }
                     if can.lens_refresh {
                         let _ = client.code_lens_refresh().await;
+                    }
+                    // Only who asks for diagnostics itself must be told to ask again.
+                    if can.pulls && can.diagnostic_refresh {
+                        let _ = client.workspace_diagnostic_refresh().await;
                     }
                 });
             }
@@ -288,6 +293,7 @@ impl LanguageServer for Backend {
             progress: can("/window/workDoneProgress"),
             hint_refresh: can("/workspace/inlayHint/refreshSupport"),
             lens_refresh: can("/workspace/codeLens/refreshSupport"),
+            diagnostic_refresh: can("/workspace/diagnostics/refreshSupport") || can("/workspace/diagnostic/refreshSupport"),
             pulls: options.get("pullDiagnostics").and_then(Value::as_bool).unwrap_or(false),
         };
         let folders = params.workspace_folders.unwrap_or_default();
@@ -483,7 +489,7 @@ impl LanguageServer for Backend {
 }
 
 impl Backend {
-    async fn preview(&self, p: custom::PreviewParams) -> Result<Option<custom::Preview>> {
+    async fn preview(&self, p: custom::PreviewParams) -> Result<Option<Value>> {
         self.ask_again(p.text_document.uri.clone(), move |v| features::preview(v, &p)).await
     }
     async fn output(&self, p: custom::OutputParams) -> Result<Option<custom::Output>> {

@@ -16,8 +16,6 @@ pub use html::page as preview_page;
 pub use path::Class;
 pub use trace::Trace;
 
-use crate::sheet::ToolRow;
-
 /// What the picture shows.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Default)]
 pub enum Show {
@@ -49,8 +47,6 @@ pub struct Options {
     pub rapids: bool,
     /// Page: the program, shown beside the path; may be empty.
     pub text: String,
-    /// Page: tools for the marks of their changes.
-    pub tools: Vec<ToolRow>,
     /// Rapid rates, and what the machine can do.
     pub rates: Rates,
 }
@@ -64,7 +60,6 @@ impl Default for Options {
             title: String::new(),
             rapids: true,
             text: String::new(),
-            tools: Vec::new(),
             rates: Rates::default(),
         }
     }
@@ -87,10 +82,9 @@ pub fn svg(program: &Program, options: &Options) -> String {
 }
 
 /// A page of its own, with the path inside: turn, zoom, play, measure, hide; the program stands beside it.
-pub fn html(program: &Program, options: &Options) -> String {
-    let trace = Trace::new(program, &trace::TraceOptions { tools: options.tools.clone(), rates: options.rates, ..trace::TraceOptions::default() });
+pub fn html(trace: &Trace, options: &Options) -> String {
     let text = (!options.text.is_empty()).then_some(options.text.as_str());
-    html::page(&options.title, Some(trace.json(&options.title)), text)
+    html::page(&options.title, Some(trace.json(&options.title, &trace.key(), false)), text)
 }
 
 fn limit(pixels: u32) -> u32 {

@@ -167,7 +167,7 @@ fn svg_and_html_are_whole() {
     for class in ["rapid", "feed", "arc"] {
         assert!(svg.contains(&format!("<path class=\"{class}\"")), "{class}");
     }
-    let page = plot::html(&part(), &options);
+    let page = plot::html(&plot::Trace::new(&part(), &Default::default()), &options);
     assert!(!page.contains("@@") && page.contains("a&lt;b&gt;.ngc") && page.contains("\"count\":"));
 }
 
@@ -177,7 +177,7 @@ fn an_empty_program_gives_an_empty_picture() {
     let empty = Program::default();
     assert!(plot::png(&empty, &options).is_ok());
     assert!(plot::svg(&empty, &options).contains("no motion"));
-    assert!(plot::html(&empty, &options).contains("\"count\":0"));
+    assert!(plot::html(&plot::Trace::new(&empty, &Default::default()), &options).contains("\"count\":0"));
     assert!(sheet::sheet(&empty, &sheet::Options::default()).text().contains("Time     0:00:00"));
 }
 
@@ -194,6 +194,6 @@ fn a_trace_says_where_each_point_comes_from() {
 
 #[test]
 fn data_cannot_end_its_element() {
-    let page = plot::html(&part(), &plot::Options { text: "(</script>)".into(), ..Default::default() });
+    let page = plot::html(&plot::Trace::new(&part(), &Default::default()), &plot::Options { text: "(</script>)".into(), ..Default::default() });
     assert!(page.contains("(\\u003c/script>)") && page.matches("</script>").count() == 2);
 }

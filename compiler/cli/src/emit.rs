@@ -3,12 +3,14 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
+use gr_backends::plot::trace::{Trace, TraceOptions};
 use gr_backends::rs274ngc;
 use gr_backends::{Texts, joint};
 use gr_canon::{Printer, Units};
 use gr_ir::{Program, Source};
 use gr_machine::Machine;
 use gr_planner::Tool;
+use gr_robot::along::is_planned;
 use gr_text::{Diagnostic, FileId, Span};
 
 use crate::options::UnitArg;
@@ -381,7 +383,7 @@ fn of_motion(mut motion: Motion, unit: &Unit, goal: &Goal<'_>) -> Result<Built, 
     }
     let made: Result<(Vec<Artifact>, Vec<Diagnostic>), Vec<Diagnostic>> = match goal.target {
         "stepnc" => stepnc(&motion, unit, goal.options, &name),
-        "motion" => Ok((one(gr_ir::text::print(&motion.program, true).into_bytes()), Vec::new())),
+        "motion" => Ok((one_text(&motion.program, gr_ir::text::print(&motion.program, true)), Vec::new())),
         "rs274ngc" => normalised(&motion, unit, goal.options, &name)?,
         "joint-gcode" => joints(&motion, goal)?,
         "json" => dumped(|out| gr_backends::dump::json(&motion.program, out)),
@@ -389,7 +391,10 @@ fn of_motion(mut motion: Motion, unit: &Unit, goal: &Goal<'_>) -> Result<Built, 
             let options = gr_backends::dump::CsvOptions { tolerance: goal.options.arc_tolerance, rates: gr_driver::rates(&unit.setup), ..Default::default() };
             dumped(|out| gr_backends::dump::csv(&motion.program, &options, out))
         }
-        "svg" | "png" | "html" => one_picture(&motion.program, unit, goal.target, &name)?,
+        "svg" | "png" | "html" => {
+            let trace = (goal.target == "html").then(|| traced(&motion, unit, goal.machine));
+            one_picture(&motion.program, trace.as_ref(), unit, goal.target, &name)?
+        }
         "sheet" | "sheet-json" | "sheet-html" => Ok((one(sheet(&motion, unit, goal.target, &name)), Vec::new())),
         other => return Err(format!("the target {other} can't be made by this version")),
     };
@@ -427,19 +432,32 @@ fn restart(motion: &mut Motion, line: u32, safe_z: Option<f64>) {
     }
 }
 
-fn one_picture(program: &Program, unit: &Unit, kind: &str, name: &str) -> Result<Made, String> {
+fn one_picture(program: &Program, trace: Option<&Trace>, unit: &Unit, kind: &str, name: &str) -> Result<Made, String> {
     let options = gr_backends::plot::Options { title: name.to_string(), rates: gr_driver::rates(&unit.setup), ..gr_backends::plot::Options::default() };
-    Ok(Ok((one(picture(program, kind, &options)?), Vec::new())))
+    Ok(Ok((one(picture(program, trace, kind, &options)?), Vec::new())))
 }
 
-/// A picture of this kind: svg, png or html.
-pub fn picture(program: &Program, kind: &str, options: &gr_backends::plot::Options) -> Result<Vec<u8>, String> {
-    Ok(match kind {
-        "png" => gr_backends::plot::png(program, options)?,
-        "svg" => gr_backends::plot::svg(program, options).into_bytes(),
-        "html" => gr_backends::plot::html(program, options).into_bytes(),
-        other => return Err(format!("pictures are .svg, .png or .html, not .{other}")),
+/// A picture of this kind: svg, png, or html, which shows a trace.
+pub fn picture(program: &Program, trace: Option<&Trace>, kind: &str, options: &gr_backends::plot::Options) -> Result<Vec<u8>, String> {
+    Ok(match (kind, trace) {
+        ("png", _) => gr_backends::plot::png(program, options)?,
+        ("svg", _) => gr_backends::plot::svg(program, options).into_bytes(),
+        ("html", Some(trace)) => gr_backends::plot::html(trace, options).into_bytes(),
+        (other, _) => return Err(format!("pictures are .svg, .png or .html, not .{other}")),
     })
+}
+
+/// The path for a page: with tools, raw part and, where one was chosen, the machine.
+pub fn traced(motion: &Motion, unit: &Unit, machine: Option<&Machine>) -> Trace {
+    let options = TraceOptions { tools: tool_rows(motion, unit), rates: gr_driver::rates(&unit.setup), ..TraceOptions::default() };
+    let mut trace = Trace::new(&motion.program, &options);
+    trace.stock = motion.plan.as_ref().and_then(|p| p.stock);
+    trace.machine = machine.map(|m| {
+        let planned = is_planned(m).then(|| gr_robot::plan(&motion.program, m, &texts(motion), &gr_robot::Options::default()));
+        let planned = planned.as_ref().map(|p| p.as_ref().map_err(|found| gr_lsp::machine::reason(found)));
+        gr_lsp::machine::along(m, planned, &trace)
+    });
+    trace
 }
 
 /// The tool table for a setup sheet and a preview.
@@ -474,6 +492,29 @@ fn sheet(motion: &Motion, unit: &Unit, kind: &str, name: &str) -> Vec<u8> {
         _ => sheet.text(),
     };
     text.into_bytes()
+}
+
+/// The motion's text: a line for each operation behind a head.
+fn one_text(program: &Program, text: String) -> Vec<Artifact> {
+    let mut sources = Vec::new();
+    let mut cursor = program.cursor();
+    while let Some(view) = cursor.next() {
+        sources.push(Some(view.source));
+    }
+    let head = text.lines().count().saturating_sub(sources.len());
+    let lines = main_lines(program, std::iter::repeat_n(None, head).chain(sources));
+    vec![Artifact { lines, ..Artifact::new("", text.into_bytes()) }]
+}
+
+/// Lines of the main file that lines of an output come from; of blocks of other files the line that called them.
+pub fn main_lines(program: &Program, sources: impl IntoIterator<Item = Option<Source>>) -> Vec<u32> {
+    let line = |source: Source| {
+        if source.file == FileId(0) {
+            return Some(source.line);
+        }
+        program.call_stack(source).find(|f| f.file == FileId(0)).map(|f| f.line)
+    };
+    sources.into_iter().map(|s| s.and_then(line).unwrap_or(u32::MAX)).collect()
 }
 
 fn one(bytes: Vec<u8>) -> Vec<Artifact> {
@@ -669,7 +710,7 @@ fn joints(motion: &Motion, goal: &Goal<'_>) -> Result<Made, String> {
 fn plan(program: &Program, machine: &Machine, options: &joint::Options, place: &dyn Fn(Source) -> (FileId, Span)) -> Made {
     let made = joint::compile(program, machine, options, place)?;
     let artifacts = vec![
-        Artifact::new("", made.gcode().into_bytes()),
+        Artifact { lines: main_lines(program, made.sources()), ..Artifact::new("", made.gcode().into_bytes()) },
         Artifact::new("-cartesian.csv", made.cartesian_csv().into_bytes()),
         Artifact::new("-joint.csv", made.joint_csv().into_bytes()),
     ];

@@ -53,6 +53,8 @@ pub struct Plan {
     pub tools: Vec<Tool>,
     /// The numbers are the program's own: a tool table goes with it.
     pub own_table: bool,
+    /// Lowest and highest corner of the raw part in the first setup, mm, where the file says it.
+    pub stock: Option<[[f64; 3]; 2]>,
 }
 
 /// What is wrong with a text that is no exchange file at all, whatever its name says.
@@ -147,7 +149,8 @@ pub fn motion(unit: &Unit) -> Result<(Motion, Checked), Checked> {
     let checked = with_source(&unit.name(), unit, found);
     match planned {
         Some(p) => {
-            let plan = Plan { tools: p.tools, own_table: unit.tools.is_none() };
+            let stock = p.process.steps().iter().find_map(|s| s.stock);
+            let plan = Plan { tools: p.tools, own_table: unit.tools.is_none(), stock };
             Ok((moving(unit, p.program, plan), checked))
         }
         None => Err(checked),
@@ -231,7 +234,7 @@ pub fn ufsc2016(unit: &Unit) -> Result<(Motion, Checked), Checked> {
         Ok(points) => {
             let lines = LineIndex::new(unit.text.as_bytes());
             let program = ufsc2016::program(&points, &process, &lines, FILE, &unit.name());
-            Ok((moving(unit, program, Plan { tools, own_table: true }), checked))
+            Ok((moving(unit, program, Plan { tools, own_table: true, stock: None }), checked))
         }
         Err(faults) => {
             checked.found.extend(faults);

@@ -5,6 +5,7 @@ use gr_accuracy::compensate::{self, Correction};
 use gr_ir::Sources;
 use gr_machine::math::norm;
 use gr_machine::{Kind, Machine};
+use gr_robot::along::is_planned;
 use gr_robot::{Options, Planned, plan};
 use gr_text::Diagnostic;
 use gr_text::figures::{duration, number};
@@ -122,13 +123,17 @@ pub fn build(motion: &Motion, goal: &Goal<'_>, texts: &dyn Sources, name: &str) 
     let choice = gr_vendors::Options { decimals: goal.options.decimals, allow_unverified: goal.options.robot.allow_unverified };
     let output = language.emit(&planned.program, texts, &choice);
     let mut summary = summary(&planned);
-    let mut notes = planned.warnings;
+    let mut notes = planned.warnings.clone();
     notes.extend(output.findings);
     if notes.iter().any(|d| d.severity == gr_text::Severity::Error) {
         return Ok(Err(notes));
     }
     let several = output.files.len() > 1;
-    let artifact = |f: gr_vendors::OutputFile| Artifact { name: several.then_some(f.name), ..Artifact::new("", f.bytes) };
+    let source = |n: &Option<u32>| planned.program.steps.get((*n)? as usize)?.source;
+    let artifact = |f: gr_vendors::OutputFile| {
+        let lines = crate::emit::main_lines(&motion.program, f.steps.iter().map(source));
+        Artifact { name: several.then_some(f.name), lines, ..Artifact::new("", f.bytes) }
+    };
     let mut artifacts: Vec<Artifact> = output.files.into_iter().map(artifact).collect();
     if let Some(c) = corrected {
         summary += &c.summary;
@@ -238,11 +243,6 @@ fn robot(goal: &Goal<'_>) -> Result<Machine, String> {
     Err(format!("the target {} is for robots; {} is none", goal.target, machine.id))
 }
 
-/// Whether `check --machine` asks the machine too.
-pub fn is_checked(machine: &Machine) -> bool {
-    machine.kind == Kind::Robot && !matches!(machine.chain, gr_machine::Chain::Planar3r(_) | gr_machine::Chain::Incomplete { .. })
-}
-
 /// What the machine has to say about a program.
 pub fn check(motion: &Motion, machine: &Machine, texts: &dyn Sources) -> Vec<Diagnostic> {
     match plan(&motion.program, machine, texts, &Options::default()) {
@@ -290,7 +290,7 @@ fn short(v: f64) -> String {
 /// Adds to the findings of a program what the robot has to say, when the program itself is good.
 pub fn ask(name: &str, text: &str, machine: &Machine, setup: &gr_interp::Setup, checked: &mut crate::commands::check::Checked) {
     let bad = checked.found.iter().any(|d| d.severity == gr_text::Severity::Error);
-    if bad || !is_checked(machine) {
+    if bad || !is_planned(machine) {
         return;
     }
     let motion = crate::pipeline::motion_of(name, text.to_string(), setup);
@@ -327,7 +327,7 @@ fn too_many(found: &gr_robot::joints::TooMany, texts: &dyn Sources) -> Diagnosti
 
 /// Whether joint-gcode goes through the planner: every robot but the planar arm, which has its own way.
 pub fn plans_joints(goal: &Goal<'_>) -> bool {
-    matches!(goal.options.reference, None | Some(crate::emit::Reference::Usp2009)) && goal.machine.is_some_and(is_checked)
+    matches!(goal.options.reference, None | Some(crate::emit::Reference::Usp2009)) && goal.machine.is_some_and(is_planned)
 }
 
 /// Joint positions as LinuxCNC words with inverse time, and both tables.
@@ -356,9 +356,9 @@ pub fn joint_gcode(motion: &Motion, goal: &Goal<'_>, texts: &dyn Sources, name: 
         Err(e) => return Ok(Err(vec![too_many(&e, texts)])),
     };
     let table = TableOptions { decimals: o.decimals.unwrap_or(6), comma: o.decimal_comma };
-    let (words, found) = gcode(&planned.program, &path, table.decimals, texts);
+    let (text, sources, found) = gcode(&planned.program, &path, table.decimals, texts);
     let mut artifacts = vec![
-        Artifact::new("", words.into_bytes()),
+        Artifact { lines: crate::emit::main_lines(&motion.program, sources), ..Artifact::new("", text.into_bytes()) },
         Artifact::new("-cartesian.csv", cartesian_csv(&path, table).into_bytes()),
         Artifact::new("-joint.csv", joint_csv(&planned.program, &path, table).into_bytes()),
     ];

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use gr_canon::{CallFrame, FrameId};
 use gr_gcode::{Chunk, File, Form, Scan};
 use gr_spec::{Code, Severity, code};
-use gr_text::{Diagnostic, FileId, Frame, Span};
+use gr_text::{Diagnostic, FileId, Fix, Frame, Span};
 
 use crate::db::{Database, Db, Document, scanned, shape};
 use crate::layout::{Layout, bytes, layout};
@@ -307,7 +307,31 @@ impl Source {
         for (place, text) in places.filter(|(place, _)| place.end <= span.start || place.start >= span.end) {
             d = d.label(file, place, text);
         }
+        d.fixes.extend(self.fix(found, span).map(|(title, span, text)| Fix { title, edits: vec![(file, span, text)] }));
         d
+    }
+    /// What puts a slip of the pen right, where there is one way only.
+    fn fix(&self, found: &Found, span: Span) -> Option<(String, Span, String)> {
+        let written = |s: Span| self.chunk.text.get((s.start.checked_sub(self.start)?) as usize..s.end.checked_sub(self.start)? as usize);
+        let end = self.line_span().end;
+        let here = Span::new(end, end);
+        Some(match found.code {
+            code::SYNTAX_BAD_CHARACTER if written(span)? == "," => {
+                let digit = |s: Option<&str>| s.is_some_and(|s| s.bytes().all(|b| b.is_ascii_digit()));
+                let between = digit(written(Span::new(span.start.checked_sub(1)?, span.start))) && digit(written(Span::new(span.end, span.end + 1)));
+                (between.then(|| "Write a decimal point".to_string())?, span, ".".into())
+            }
+            code::COMMENT_UNCLOSED => ("Close the comment".into(), here, ")".into()),
+            code::EXPRESSION_UNKNOWN_FUNCTION => {
+                let digit = match written(span)? {
+                    "O" | "o" => "0",
+                    "l" | "I" => "1",
+                    _ => return None,
+                };
+                (format!("Write the digit {digit}"), span, digit.into())
+            }
+            _ => return None,
+        })
     }
     /// From the first to the last word with one of these letters.
     fn words(&self, letters: &[u8]) -> Option<Span> {

@@ -12,6 +12,9 @@ use crate::db::{Db, Document};
 use crate::layout::layout;
 use crate::library::Library;
 
+/// Blocks and calls that are run for the motion of an open file.
+const MOST_BLOCKS: u64 = 6_000_000;
+
 /// What a file adds up to, as far as it runs.
 #[salsa::tracked(returns(clone), no_eq)]
 pub(crate) fn stats(db: &dyn Db, document: Document) -> Arc<Report> {
@@ -26,6 +29,11 @@ pub(crate) fn motion(db: &dyn Db, document: Document) -> Arc<Program> {
     // Subroutine files are read again when they may have changed.
     let _ = run.disk_revision(db);
     let setup = &run.options(db).setup;
+    // A loop that does not end must not fill the memory: the path ends where the budget does.
+    let mut setup = setup.clone();
+    setup.budgets.blocks = setup.budgets.blocks.min(MOST_BLOCKS);
+    setup.budgets.calls = setup.budgets.calls.min(MOST_BLOCKS);
+    let setup = &setup;
     if let Some(program) = crate::ufmg::motion(db, document) {
         return Arc::new(program);
     }

@@ -13,6 +13,7 @@
 //! | `kinematics` | the trait, poses, errors |
 //! | `planar`, `cartesian`, `scara`, `opw`, `ur`, `five_axis`, `prp`, `tricept`, `serial` | one kind of kinematics each |
 //! | `cell` | tools, frames, signals: what surrounds the joints |
+//! | `figure` | a machine as lines, for pictures |
 //! | `differential` | Jacobian, manipulability, condition |
 //! | `parameters` | the geometry as named numbers, and the machine with other numbers |
 //! | `quality` | accuracy, stiffness, identified geometry, as the file says them |
@@ -27,6 +28,7 @@
 mod cartesian;
 mod cell;
 pub mod differential;
+mod figure;
 mod five_axis;
 mod identify;
 mod keys;

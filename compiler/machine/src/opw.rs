@@ -1,5 +1,5 @@
 use crate::kinematics::{Kinematics, KinematicsError, Solution, checked};
-use crate::math::Frame;
+use crate::math::{Frame, V3};
 
 /// Six-joint arm with a spherical wrist and an ortho-parallel base, in closed form with all eight solutions.
 ///
@@ -78,6 +78,18 @@ impl Opw {
             up + c4 * turn[2][2],
         ];
         Frame { turn, position }
+    }
+
+    /// Points from the base to the flange: foot, shoulder, elbow, end of the forearm's crank, wrist.
+    pub(crate) fn figure(&self, joints: &[f64; 6], flange: &Frame) -> Vec<V3> {
+        let [a1, a2, b, c1, c2, _, c4] = self.lengths;
+        let q = |i: usize| libm::sincos(joints[i] * self.signs[i] - self.offsets[i]);
+        let ((s1, k1), (s2, k2), (s3, k3)) = (q(0), q(1), q(2));
+        let (s23, k23) = (s2 * k3 + k2 * s3, k2 * k3 - s2 * s3);
+        let at = |out: f64, up: f64| [k1 * out - s1 * b, s1 * out + k1 * b, up];
+        let (out, up) = (a1 + c2 * s2, c1 + c2 * k2);
+        let crank = at(out + a2 * k23, up - a2 * s23);
+        vec![[0.0; 3], [0.0, 0.0, c1], at(a1, c1), at(out, up), crank, crate::figure::before(flange, c4), flange.position]
     }
 
     /// All joint values for a flange, in −π … π of the joint's own scale plus offset.

@@ -54,6 +54,18 @@ impl TwoLegs {
         [(p[0] + arm) * c - p[1] * s - u[0], (p[0] + arm) * s + p[1] * c - u[1], p[2] + height - u[2]]
     }
 
+    /// The column with the arm, then the legs.
+    pub(crate) fn figure(&self, flange: &crate::math::Frame) -> Vec<Vec<V3>> {
+        let [x, y, z] = flange.position;
+        let at = [libm::hypot(x, y), libm::atan2(y, x), z];
+        let mut out = vec![vec![[0.0; 3], [0.0, 0.0, z], flange.position]];
+        out.extend((0..2).map(|i| {
+            let (foot, leg) = (self.shape.base[i], self.leg(i, at));
+            vec![foot, [0, 1, 2].map(|k| foot[k] + leg[k]), flange.position]
+        }));
+        out
+    }
+
     /// Leg lengths and height from arm length, yaw and height.
     pub fn lengths(&self, at: V3) -> V3 {
         [norm(self.leg(0, at)), norm(self.leg(1, at)), at[2]]

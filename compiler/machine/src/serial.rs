@@ -90,6 +90,13 @@ impl Serial {
         (here.then(&self.tip), axes)
     }
 
+    /// The base, a point on each joint's axis, the flange.
+    pub(crate) fn figure(&self, joints: &[f64]) -> Vec<V3> {
+        let (flange, axes) = self.walk(joints);
+        let inner = axes.into_iter().map(|(_, point)| point);
+        std::iter::once([0.0; 3]).chain(inner).chain([flange.position]).collect()
+    }
+
     /// Velocity of the flange (mm, then rad) per unit of each joint: one column per joint.
     pub fn jacobian(&self, joints: &[f64]) -> Result<Vec<[f64; 6]>, KinematicsError> {
         let (flange, axes) = self.walk(checked(joints, self.links.len())?);

@@ -108,6 +108,19 @@ impl Tricept {
         good.then_some(at)
     }
 
+    /// The tube with the wrist, then the legs.
+    pub(crate) fn figure(&self, flange: &Frame) -> Vec<Vec<V3>> {
+        let centre = crate::figure::before(flange, self.shape.flange_offset);
+        let far = norm(centre);
+        let u = scale(centre, 1.0 / far.max(f64::MIN_POSITIVE));
+        let turn = Tricept::platform(libm::atan2(u[1], -u[2]), libm::atan2(-u[0], libm::hypot(u[1], u[2])));
+        let platform = Frame { turn, position: scale(u, far - self.shape.wrist_offset) };
+        let ratio = self.shape.platform_radius / self.shape.base_radius;
+        let mut out = vec![vec![[0.0; 3], platform.position, centre, flange.position]];
+        out.extend((0..3).map(|i| vec![self.base(i), platform.apply(scale(self.base(i), ratio)), platform.position]));
+        out
+    }
+
     /// The frame of the wrist's first axis: its z points out along the tube.
     fn wrist(&self, [a, b, tube]: V3) -> Frame {
         let turn = product(&Tricept::platform(a, b), &rot_x(std::f64::consts::PI));

@@ -1,5 +1,5 @@
 use crate::kinematics::{Kinematics, KinematicsError, Solution, checked};
-use crate::math::{Frame, add, cross, dot, norm, scale, sub};
+use crate::math::{Frame, V3, add, cross, dot, norm, scale, sub};
 use crate::opw::turn;
 
 /// Six-joint arm whose second, third and fourth axes are parallel and whose wrist is offset (Universal Robots and
@@ -67,6 +67,21 @@ impl ParallelWrist {
                 out.push(Solution { joints, branch: branch + elbow * 2, singular: pole || bend <= 1e-6 });
             }
         }
+    }
+
+    /// Points from the base to the flange: shoulder, elbow, and the offsets of the wrist.
+    pub(crate) fn figure(&self, q: &[f64], flange: &Frame) -> Vec<V3> {
+        let [d1, a2, a3, d4, _, d6] = self.lengths;
+        let (s1, k1) = libm::sincos(q[0]);
+        let link = |angle: f64, l: f64| {
+            let (s, k) = libm::sincos(angle);
+            [l * k * k1, l * k * s1, l * s]
+        };
+        let shoulder = [0.0, 0.0, d1];
+        let elbow = add(shoulder, link(q[1], a2));
+        let wrist = add(elbow, link(q[1] + q[2], a3));
+        let beside = add(wrist, scale([s1, -k1, 0.0], d4));
+        vec![[0.0; 3], shoulder, elbow, wrist, beside, crate::figure::before(flange, d6), flange.position]
     }
 
     /// Whether the solution leads back to the frame; at the pole of the wrist an inexact one can turn up.

@@ -334,13 +334,17 @@ impl Cut<'_> {
     }
 }
 
-/// LinuxCNC words of a machine driven in joint mode: G93, so that each line takes its time; and what can't be said.
-pub fn gcode(program: &RobotProgram, path: &JointPath, decimals: usize, sources: &dyn Sources) -> (String, Vec<Diagnostic>) {
+/// A text; where each of its lines comes from, none for lines of its own; and what can't be said.
+pub type Written = (String, Vec<Option<Source>>, Vec<Diagnostic>);
+
+/// LinuxCNC words of a machine driven in joint mode: G93, so that each line takes its time.
+pub fn gcode(program: &RobotProgram, path: &JointPath, decimals: usize, sources: &dyn Sources) -> Written {
     let machine = &program.machine;
     let letters = ['X', 'Y', 'Z', 'A', 'B', 'C', 'U', 'V', 'W'];
     let words: Vec<char> = machine.joints.iter().zip(letters).map(|(j, l)| j.word.unwrap_or(l)).collect();
     let head = format!("({}: joint positions of {}; degrees and mm, inverse time)\nG21 G90 G40 G49 G80\nG61\nG93\n", plain(&program.name), plain(&machine.id));
-    let mut out = Words { text: head, findings: Findings::new(sources), labels: 0 };
+    let from = vec![None; head.lines().count()];
+    let mut out = Words { text: head, from, findings: Findings::new(sources), labels: 0 };
     let mut first = true;
     for event in &path.events {
         match event {
@@ -352,40 +356,44 @@ pub fn gcode(program: &RobotProgram, path: &JointPath, decimals: usize, sources:
                 }
                 if first {
                     // The machine stands at home already, or goes there in a second.
-                    out.line(&format!("{line} F60"));
+                    out.line(&format!("{line} F60"), p.source);
                 } else if p.seconds > 0.0 {
-                    out.line(&format!("{line} F{}", significant(60.0 / p.seconds)));
+                    out.line(&format!("{line} F{}", significant(60.0 / p.seconds)), p.source);
                 }
                 first = false;
             }
             Event::Do(i) => out.action(&program.steps[*i]),
         }
     }
-    out.line("G94\nM2");
-    (out.text, out.findings.take())
+    out.line("G94\nM2", None);
+    (out.text, out.from, out.findings.take())
 }
 
 /// What is no motion, in the words of LinuxCNC.
 struct Words<'a> {
     text: String,
+    /// Of each line.
+    from: Vec<Option<Source>>,
     findings: Findings<'a>,
     labels: u32,
 }
 
 impl Words<'_> {
-    fn line(&mut self, text: &str) {
+    fn line(&mut self, text: &str, source: Option<Source>) {
         self.text += text;
         self.text.push('\n');
+        self.from.extend(text.lines().map(|_| source));
     }
 
     fn action(&mut self, step: &Step) {
+        let from = step.source;
         match &step.action {
-            Action::Dwell(s) => self.line(&format!("G4 P{}", significant(*s))),
-            Action::Pause { optional } => self.line(if *optional { "M1" } else { "M0" }),
-            Action::ChangeTool { number, .. } => self.line(&format!("T{number} M6")),
-            Action::Message(text) => self.line(&format!("(MSG, {})", plain(text).trim_start())),
-            Action::Comment(text) => self.line(&format!("({})", plain(text))),
-            Action::Signal { word, .. } => self.line(&word.to_string()),
+            Action::Dwell(s) => self.line(&format!("G4 P{}", significant(*s)), from),
+            Action::Pause { optional } => self.line(if *optional { "M1" } else { "M0" }, from),
+            Action::ChangeTool { number, .. } => self.line(&format!("T{number} M6"), from),
+            Action::Message(text) => self.line(&format!("(MSG, {})", plain(text).trim_start()), from),
+            Action::Comment(text) => self.line(&format!("({})", plain(text)), from),
+            Action::Signal { word, .. } => self.line(&word.to_string(), from),
             Action::WaitInput { name, on, timeout } => self.wait(name, *on, *timeout, step.source),
             // Points are written as such; tool and frame are in them, and the end stands at the end.
             Action::Joint { .. } | Action::Linear { .. } | Action::Arc { .. } => {}
@@ -402,8 +410,8 @@ impl Words<'_> {
         let (n, level) = (self.labels, if on { 3 } else { 4 });
         let ask = |seconds: f64| format!("M66 P{index} L{level} Q{}", significant(seconds));
         match timeout {
-            Some(s) => self.line(&format!("{}\no{n} if [#5399 LT 0]\n(MSG, input {index} did not come)\nM0\no{n} endif", ask(s.max(0.001)))),
-            None => self.line(&format!("o{n} do\n{}\no{n} while [#5399 LT 0]", ask(3600.0))),
+            Some(s) => self.line(&format!("{}\no{n} if [#5399 LT 0]\n(MSG, input {index} did not come)\nM0\no{n} endif", ask(s.max(0.001))), source),
+            None => self.line(&format!("o{n} do\n{}\no{n} while [#5399 LT 0]", ask(3600.0)), source),
         }
     }
 }

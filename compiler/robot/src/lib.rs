@@ -18,11 +18,13 @@
 //! | `reference` | the solver of a publication |
 //! | `joints` | moves cut to joint positions by tolerance; joint-space G-code |
 //! | `setpoints` | positions, velocities, accelerations at a fixed rate |
+//! | `along` | joint values along a path somebody else cut into points |
 //! | `verify` | joint values against targets: table, CSV, pictures |
 
 // Joints are walked by index; a value that is not a number must fail the test.
 #![allow(clippy::neg_cmp_op_on_partial_ord, clippy::needless_range_loop)]
 
+pub mod along;
 mod cell;
 mod choose;
 mod emit;

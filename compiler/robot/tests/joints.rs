@@ -60,7 +60,8 @@ fn to_segment(p: [f64; 3], a: [f64; 3], b: [f64; 3]) -> f64 {
 fn times_add_up() {
     let program = planned(PART);
     let path = joint_path(&program, &JointOptions::default()).unwrap();
-    let text = gcode(&program, &path, 6, &gr_ir::NoSources).0;
+    let (text, sources, _) = gcode(&program, &path, 6, &gr_ir::NoSources);
+    assert_eq!(text.lines().count(), sources.len());
     insta::assert_snapshot!("joint_gcode", text.lines().take(30).collect::<Vec<_>>().join("\n"));
     // Of every line of the program: Σ 1/F = length / F.
     let mut lengths: std::collections::BTreeMap<u32, f64> = std::collections::BTreeMap::new();

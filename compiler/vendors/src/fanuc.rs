@@ -204,6 +204,7 @@ fn stop(zone: Option<f64>) -> &'static str {
 
 impl Body for Writer {
     fn op(&mut self, cx: &mut Cx, op: Op) {
+        self.parts.step = cx.step;
         match op {
             Op::Line(number, text) => {
                 self.room(8);

@@ -166,6 +166,7 @@ fn whole(name: &str, text: &str, (positions, count, user): &(String, u32, usize)
 
 impl Body for Writer {
     fn op(&mut self, cx: &mut Cx, op: Op) {
+        self.parts.step = cx.step;
         match op {
             Op::Line(number, text) => {
                 self.room(12);

@@ -177,6 +177,7 @@ fn with_point(mut text: String) -> String {
 impl Body for Writer {
     fn op(&mut self, cx: &mut Cx, op: Op) {
         self.parts.begin();
+        self.parts.step = cx.step;
         match op {
             Op::Line(number, text) => {
                 let text = cx.ascii(text);

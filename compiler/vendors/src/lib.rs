@@ -7,6 +7,7 @@
 //! | `orient` | how makers write a turn, as mathematics |
 //! | `posture` | how an arm stands, by geometry |
 //! | `name`, `number` | names and numbers as text |
+//! | `marks` | which step of the program a line is written for |
 //! | `parts` | programs cut to what a controller takes |
 //! | one file per language | its text |
 
@@ -16,6 +17,7 @@ mod fanuc;
 mod inform;
 mod kawasaki;
 mod krl;
+mod marks;
 mod melfa;
 mod nachi;
 mod name;
@@ -44,11 +46,15 @@ pub struct OutputFile {
     pub name: String,
     /// Content.
     pub bytes: Vec<u8>,
+    /// The step of the program (index into its steps) that each line is written for; none for lines of the file's own.
+    pub steps: Vec<Option<u32>>,
 }
 
 impl OutputFile {
+    /// `text` has its lines marked: see `marks`.
     fn new(name: String, text: String) -> OutputFile {
-        OutputFile { name, bytes: text.into_bytes() }
+        let (text, steps) = marks::taken(&text);
+        OutputFile { name, bytes: text.into_bytes(), steps }
     }
 }
 

@@ -9,32 +9,41 @@ pub(crate) struct Parts {
     most: (u64, u64, u64),
     done: Vec<String>,
     end: &'static str,
-    /// Where the statement in work begins: bytes, lines and points before it.
-    began: (usize, u64, u64),
+    /// The step that lines are written for.
+    pub step: Option<u32>,
+    /// Bytes of marks in `text`.
+    marks: usize,
+    /// Where the statement in work begins: bytes, lines, points and bytes of marks before it.
+    began: (usize, u64, u64, usize),
 }
 
 impl Parts {
     /// Parts of at most so many lines, points and bytes; `end` ends a line.
     pub(crate) fn new(lines: u64, points: Option<u64>, bytes: Option<u64>, end: &'static str) -> Parts {
         let most = (lines.max(20), points.unwrap_or(u64::MAX).max(10), bytes.unwrap_or(u64::MAX).max(4000));
-        Parts { text: String::new(), lines: 0, points: 0, most, done: Vec::new(), end, began: (0, 0, 0) }
+        Parts { text: String::new(), lines: 0, points: 0, most, done: Vec::new(), end, step: None, marks: 0, began: (0, 0, 0, 0) }
     }
     /// A statement begins: its lines stay together. Where they have no room they begin the next part.
     pub(crate) fn begin(&mut self) {
-        self.began = (self.text.len(), self.lines, self.points);
+        self.began = (self.text.len(), self.lines, self.points, self.marks);
     }
     /// Ends the line that was appended to `text`.
     pub(crate) fn end_line(&mut self) {
+        self.marks += crate::marks::put(&mut self.text, self.step);
         self.text.push_str(self.end);
         self.lines += 1;
-        let (at, lines, points) = self.began;
-        let over = self.lines > self.most.0 || self.points > self.most.1 || self.text.len() as u64 > self.most.2;
+        let (at, lines, points, marks) = self.began;
+        let over = self.lines > self.most.0 || self.points > self.most.1 || self.bytes() > self.most.2;
         if over && at > 0 && at <= self.text.len() {
             let rest = self.text.split_off(at);
             self.done.push(std::mem::replace(&mut self.text, rest));
-            (self.lines, self.points) = (self.lines - lines, self.points - points);
-            self.began = (0, 0, 0);
+            (self.lines, self.points, self.marks) = (self.lines - lines, self.points - points, self.marks - marks);
+            self.began = (0, 0, 0, 0);
         }
+    }
+    /// Bytes of the part in work.
+    fn bytes(&self) -> u64 {
+        self.text.len().saturating_sub(self.marks) as u64
     }
     /// Appends a line.
     pub(crate) fn line(&mut self, line: &str) {
@@ -51,12 +60,12 @@ impl Parts {
     }
     /// Whether the next statements (at most so many lines and two points) still have room.
     pub(crate) fn full(&self, lines: u64) -> bool {
-        self.lines + lines > self.most.0 || self.points + 2 > self.most.1 || self.text.len() as u64 + 400 > self.most.2
+        self.lines + lines > self.most.0 || self.points + 2 > self.most.1 || self.bytes() + 400 > self.most.2
     }
     /// Closes the part in work.
     pub(crate) fn cut(&mut self) {
         self.done.push(std::mem::take(&mut self.text));
-        (self.lines, self.points, self.began) = (0, 0, (0, 0, 0));
+        (self.lines, self.points, self.marks, self.began) = (0, 0, 0, (0, 0, 0, 0));
     }
     /// All parts.
     pub(crate) fn finish(mut self) -> Vec<String> {
@@ -74,12 +83,14 @@ pub(crate) struct Lines {
     count: u64,
     indent: &'static str,
     remark: &'static str,
+    /// Bytes of marks in `text`.
+    marks: usize,
 }
 
 impl Lines {
     /// With so much in front of each line, and what begins a remark.
     pub(crate) fn new(indent: &'static str, remark: &'static str) -> Lines {
-        Lines { text: String::new(), count: 0, indent, remark }
+        Lines { text: String::new(), count: 0, indent, remark, marks: 0 }
     }
     /// Appends a line, with the number of the source line where one is due.
     pub(crate) fn line(&mut self, cx: &mut crate::walk::Cx, text: &str) {
@@ -88,11 +99,12 @@ impl Lines {
         if let Some(line) = cx.remark {
             self.text.push_str(&format!(" {} {line}", self.remark));
         }
+        self.marks += crate::marks::put(&mut self.text, cx.step);
         self.text.push_str("\r\n");
         self.count += 1;
         let limits = &cx.machine.cell.controller;
         let over = |most: Option<u64>, now: u64| most.is_some_and(|m| now > m);
-        if over(limits.lines, self.count) || over(limits.bytes, self.text.len() as u64) {
+        if over(limits.lines, self.count) || over(limits.bytes, (self.text.len() - self.marks) as u64) {
             let most = limits.lines.unwrap_or(0).max(limits.bytes.unwrap_or(0));
             let args = ["more".to_string(), "lines or bytes".into(), most.to_string(), cx.traits.title.into()];
             cx.say(gr_text::code::VENDOR_PROGRAM_TOO_LONG, &args);

@@ -227,6 +227,7 @@ impl Writer {
 impl Body for Writer {
     fn op(&mut self, cx: &mut Cx, op: Op) {
         self.parts.begin();
+        self.parts.step = cx.step;
         match op {
             Op::Line(number, text) => {
                 let text = cx.ascii(text);

@@ -58,6 +58,7 @@ impl Writer {
         if let Some(line) = cx.remark {
             let _ = write!(self.text, "  # {line}");
         }
+        crate::marks::put(&mut self.text, cx.step);
         self.text.push('\n');
     }
 

@@ -243,6 +243,7 @@ pub(crate) fn escape(text: &str) -> String {
 
 impl Body for Writer {
     fn op(&mut self, cx: &mut Cx, op: Op) {
+        self.parts.step = cx.step;
         match op {
             Op::Line(number, text) => {
                 let text = cx.ascii(text).replace("]]>", "]] >");

@@ -107,6 +107,8 @@ pub(crate) struct Cx<'p> {
     pub length: f64,
     /// Where the tool was before this motion.
     pub before: Option<Target>,
+    /// The step of the program that is being written, where it comes from the source.
+    pub step: Option<u32>,
     /// Something has moved since home.
     moved: bool,
     at: Option<Source>,
@@ -147,6 +149,7 @@ pub(crate) fn walk<'p>(
         next_length: None,
         length: 0.0,
         before: None,
+        step: None,
         moved: false,
         at: None,
         sources,
@@ -191,6 +194,7 @@ impl<'p> Cx<'p> {
         let mut last = None;
         for (i, step) in program.steps.iter().enumerate() {
             self.at = step.source;
+            self.step = step.source.and_then(|_| u32::try_from(i).ok());
             let line = step.source.map(|s| (s.file, s.line));
             let new = line.is_some() && line != last;
             last = line.or(last);

@@ -12,6 +12,8 @@ export interface Marks {
   tool: [number, number, number] | null;
   points: [number, number, number][];
   until: number;
+  /** Frames of the machine are named. */
+  frames: boolean;
 }
 
 /** 1, 2 or 5 times a power of ten, not smaller than `v`. */
@@ -41,10 +43,22 @@ export class Labels {
       g.fillStyle = css(theme.axes[axis]);
       g.fillText("XYZ"[axis], x, y);
     }
+    if (marks.frames) this.frames(g, scene, camera, theme);
     this.tools(g, scene, camera, theme, marks.until);
     for (const place of marks.points) this.ring(g, camera.project(...place), css(theme.measure), 5);
     if (marks.tool) this.cone(g, camera.project(...marks.tool), css(theme.mark));
     this.scale(g, camera, theme);
+  }
+
+  /** Names of base, table and part, beside their origins. */
+  private frames(g: CanvasRenderingContext2D, scene: Scene, camera: Camera, theme: Theme) {
+    g.font = "11px sans-serif";
+    g.textAlign = "left";
+    g.fillStyle = theme.text;
+    for (const frame of scene.machine?.frames ?? []) {
+      const [x, y] = camera.project(...frame.origin);
+      g.fillText(frame.name, x + 8, y + 10);
+    }
   }
 
   private tools(g: CanvasRenderingContext2D, scene: Scene, camera: Camera, theme: Theme, until: number) {

@@ -7,7 +7,7 @@ import { Labels } from "./labels";
 import { Listing } from "./listing";
 import { type Hit, pick } from "./pick";
 import { type Picture, Renderer } from "./renderer";
-import { type Box, KINDS, nothing, pointAt, pointsOf, type Scene, toolAt } from "./scene";
+import { type Box, figureAt, KINDS, nothing, pointAt, pointsOf, type Scene, toolAt } from "./scene";
 import style from "./style.css";
 import { css, DARK, LIGHT, type Theme } from "./theme";
 
@@ -61,7 +61,9 @@ export class Preview extends HTMLElement {
     this.line = line;
     this.chose(line);
   });
+  private all: HTMLButtonElement | null = null;
   private shown = 0xff;
+  private machineShown = true;
   /** Pairs of places. */
   private marked = new Float32Array();
   private markedLine = -1;
@@ -175,11 +177,18 @@ export class Preview extends HTMLElement {
   private build() {
     const bar = make("div", { className: "bar" });
     const views = make("span");
+    const all = make("button", { textContent: "machine", title: "path and machine", hidden: true });
+    all.onclick = () => {
+      this.camera.fit(wholeExtent(this.scene));
+      this.draw(false);
+    };
+    this.all = all;
     for (const view of Object.keys(VIEWS)) {
       const button = make("button", { textContent: view });
       button.onclick = () => this.look(view);
       views.append(button, " ");
     }
+    views.append(all);
     const light = make("button", { textContent: "◐", title: "light or dark", ariaLabel: "light or dark" });
     light.onclick = () => {
       this.chosenTheme = this.theme === LIGHT ? "dark" : "light";
@@ -362,7 +371,24 @@ export class Preview extends HTMLElement {
       label.append(box, bar, name);
       return label;
     });
-    this.legend.replaceChildren(...boxes);
+    this.legend.replaceChildren(...boxes, this.machineBox());
+  }
+
+  /** The machine can be hidden too. */
+  private machineBox(): HTMLElement | string {
+    const machine = this.scene.machine;
+    if (this.all) this.all.hidden = !machine?.figure.lines.length;
+    if (!machine) return "";
+    const box = make("input", { type: "checkbox", checked: this.machineShown });
+    box.onchange = () => {
+      this.machineShown = box.checked;
+      this.draw(false);
+    };
+    const bar = make("i");
+    bar.style.background = css(this.theme.machine);
+    const label = make("label", { title: [machine.title, machine.note].filter(Boolean).join("\n") });
+    label.append(box, bar, machine.note ? `${machine.id} (!)` : machine.id);
+    return label;
   }
 
   private paintTheme() {
@@ -463,7 +489,7 @@ export class Preview extends HTMLElement {
       places[3 + a] = axis;
       return { places, color: this.theme.axes[a] };
     });
-    const extras = axes;
+    const extras = [...axes, ...this.machineLines()];
     if (this.scene.stock) extras.push({ places: edges(this.scene.stock), color: this.theme.stock });
     const [a, b] = this.points;
     if (b) extras.push({ places: Float32Array.from([...a.place, ...b.place]), color: this.theme.measure });
@@ -478,6 +504,23 @@ export class Preview extends HTMLElement {
       mark: this.theme.mark,
       extras,
     };
+  }
+
+  /** The machine where the tool is: at the chosen line, else at the time shown. */
+  private machineLines(): Picture["extras"] {
+    const machine = this.scene.machine;
+    if (!machine || !this.machineShown) return [];
+    const marked = this.markedLine < 0 ? [] : pointsOf(this.scene, this.markedLine);
+    const resting = this.seconds >= this.end();
+    const point = resting ? (marked.at(-1) ?? this.scene.count - 1) : pointAt(this.scene, this.seconds);
+    const axis = 1.5 * this.axisLength();
+    const frames = machine.frames.flatMap((f) =>
+      f.axes.map((a, i) => ({
+        places: Float32Array.from([...f.origin, ...f.origin.map((v, k) => v + axis * a[k])]),
+        color: this.theme.axes[i],
+      })),
+    );
+    return [...frames, { places: figureAt(this.scene, point), color: this.theme.machine }];
   }
 
   private axisLength(): number {
@@ -505,6 +548,7 @@ export class Preview extends HTMLElement {
       tool: this.toolPlace(),
       points: this.points.map((hit) => hit.place),
       until: this.until(),
+      frames: this.machineShown,
     });
     if (!this.renderer) return;
     const whole = this.renderer.quick(this.picture(), now);
@@ -537,6 +581,18 @@ function extent(scene: Scene): Box | null {
   if (!bounds || !stock) return bounds ?? stock;
   const join = (of: (...v: number[]) => number, i: 0 | 1) => bounds[i].map((v, a) => of(v, stock[i][a])) as Box[0];
   return [join(Math.min, 0), join(Math.max, 1)];
+}
+
+/** The same with the machine, at the beginning, and its frames. */
+function wholeExtent(scene: Scene): Box | null {
+  const all = extent(scene);
+  const figure = figureAt(scene, 0);
+  const places = (scene.machine?.frames ?? []).map((f) => [...f.origin]);
+  for (let i = 0; i < figure.length; i += 3) places.push([...figure.subarray(i, i + 3)]);
+  places.push(...(all ?? []));
+  if (!places.length) return null;
+  const of = (join: (...v: number[]) => number) => [0, 1, 2].map((a) => join(...places.map((p) => p[a]))) as Box[0];
+  return [of(Math.min), of(Math.max)];
 }
 
 /** The twelve edges of a box. */

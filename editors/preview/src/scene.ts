@@ -20,9 +20,17 @@ export interface Machine {
   /** `deg` or `mm`, per joint. */
   units: string[];
   limits: [number | null, number | null][];
+  /** Base, table and part in the frame of the path. */
+  frames: { name: string; origin: Place; axes: [Place, Place, Place] }[];
+  /** What is to be said about the joint values; may be empty. */
+  note: string;
+  /** Points of each line of the figure, and at every how many points of the path it is known. */
+  figure: { lines: number[]; every: number };
 }
 
-export type Box = [[number, number, number], [number, number, number]];
+export type Place = [number, number, number];
+
+export type Box = [Place, Place];
 
 /** Everything but the long lists. */
 export interface Facts {
@@ -50,7 +58,7 @@ export interface Answer extends Omit<Facts, "machine"> {
   lines: string;
   times: string;
   feeds: string;
-  machine: (Machine & { values: string }) | null;
+  machine: (Omit<Machine, "figure"> & { values: string; figure: Machine["figure"] & { points: string } }) | null;
 }
 
 /** A path that can be drawn. Point `i` is joined to point `i - 1`, unless its kind is `JUMP`. */
@@ -67,6 +75,8 @@ export interface Scene extends Facts {
   feeds: Float32Array;
   /** Joint values, joints × points; NaN where the machine can't reach. */
   joints: Float32Array;
+  /** Points of the machine's figures, X Y Z each; NaN where it can't be drawn. */
+  figures: Float32Array;
 }
 
 export const JUMP = 255;
@@ -98,6 +108,7 @@ export function decode(answer: Answer): Scene {
     times: floats(answer.times),
     feeds: floats(answer.feeds),
     joints: machine ? floats(machine.values) : new Float32Array(),
+    figures: machine ? floats(machine.figure.points) : new Float32Array(),
   };
 }
 
@@ -122,6 +133,7 @@ export function nothing(): Scene {
     times: new Float32Array(),
     feeds: new Float32Array(),
     joints: new Float32Array(),
+    figures: new Float32Array(),
   };
 }
 
@@ -149,4 +161,20 @@ export function pointsOf(scene: Scene, line: number): number[] {
 /** The last tool change at or before a point. */
 export function toolAt(scene: Scene, point: number): Tool | undefined {
   return scene.tools.findLast((tool) => tool.point <= point);
+}
+
+/** The machine's figure at a point of the path: pairs of places, as lines are drawn; empty when it isn't known. */
+export function figureAt(scene: Scene, point: number): Float32Array<ArrayBuffer> {
+  const { lines, every } = scene.machine?.figure ?? { lines: [], every: 1 };
+  const size = 3 * lines.reduce((sum, n) => sum + n, 0);
+  const start = size * Math.round(point / every);
+  const one = scene.figures.subarray(Math.min(start, scene.figures.length - size));
+  if (!size || one.length < size || Number.isNaN(one[0])) return new Float32Array();
+  const out: number[] = [];
+  let at = 0;
+  for (const n of lines) {
+    for (let i = 0; i < n - 1; i++) out.push(...one.subarray(at + 3 * i, at + 3 * i + 6));
+    at += 3 * n;
+  }
+  return Float32Array.from(out);
 }

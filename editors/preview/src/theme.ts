@@ -9,6 +9,7 @@ export interface Theme {
   faint: Color;
   mark: Color;
   stock: Color;
+  machine: Color;
   axes: [Color, Color, Color];
   tool: Color;
   measure: Color;
@@ -23,6 +24,7 @@ export const LIGHT: Theme = {
   faint: rgb(216, 220, 228),
   mark: rgb(214, 20, 60),
   stock: rgb(150, 140, 120),
+  machine: rgb(110, 118, 135),
   axes: [rgb(200, 40, 40), rgb(30, 130, 50), rgb(40, 70, 200)],
   tool: rgb(40, 44, 52),
   measure: rgb(90, 40, 160),
@@ -35,6 +37,7 @@ export const DARK: Theme = {
   faint: rgb(66, 70, 80),
   mark: rgb(255, 90, 120),
   stock: rgb(140, 130, 110),
+  machine: rgb(165, 172, 190),
   axes: [rgb(235, 90, 90), rgb(90, 200, 110), rgb(110, 140, 255)],
   tool: rgb(230, 230, 235),
   measure: rgb(200, 160, 255),

@@ -224,6 +224,24 @@ test("stock, joints and their limits are shown when they are known", async () =>
       [null, null],
     ],
     values: Buffer.from(values.buffer).toString("base64"),
+    frames: [
+      {
+        name: "base",
+        origin: [-20, -8, 0],
+        axes: [
+          [1, 0, 0],
+          [0, 1, 0],
+          [0, 0, 1],
+        ],
+      },
+    ],
+    // An arm of one bone at each point: from the base straight up in Y.
+    figure: {
+      lines: [2],
+      every: 1,
+      points: Buffer.from(new Float32Array(Array(n).fill([-20, -8, 0, -20, 48, 0]).flat()).buffer).toString("base64"),
+    },
+    note: "",
   };
   data.path.stock = [
     [-30, -10, -5],
@@ -236,6 +254,12 @@ test("stock, joints and their limits are shown when they are known", async () =>
   const shown = await show(`file://${path}`);
   await look(shown, "top");
   assert.ok(has(await colors(shown, [70, 20, 5], 2), [150, 140, 120]), "an edge of the stock");
+  assert.ok(has(await colors(shown, [-20, 35, 0], 2), [110, 118, 135]), "the arm");
+  assert.ok(has(await colors(shown, [-17, -8, 0], 2), [200, 40, 40]), "the X axis of its base");
+  await shown.getByLabel("test/two").uncheck();
+  await shown.waitForTimeout(200);
+  await settled(shown);
+  assert.ok(!has(await colors(shown, [-20, 35, 0], 2), [110, 118, 135]), "the arm is hidden");
   const names = await shown.getByLabel("curve").locator("option").allTextContents();
   assert.deepEqual(names, ["no curve", "feed, mm/min", "A1, deg", "A1 speed, deg/s", "A2, mm", "A2 speed, mm/s"]);
   await shown.getByLabel("curve").selectOption("A1");

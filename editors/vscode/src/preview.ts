@@ -23,6 +23,7 @@ function scene(path: Path) {
     times: new Float32Array(bytes(times)),
     feeds: new Float32Array(bytes(feeds)),
     joints: machine ? new Float32Array(bytes(machine.values)) : new Float32Array(),
+    figures: machine ? new Float32Array(bytes(machine.figure.points)) : new Float32Array(),
   };
 }
 

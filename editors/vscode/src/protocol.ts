@@ -18,7 +18,7 @@ export interface Path {
   lines: string;
   times: string;
   feeds: string;
-  machine: { values: string } | null;
+  machine: { values: string; figure: { points: string } } | null;
 }
 
 export const preview = new RequestType<

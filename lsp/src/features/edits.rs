@@ -10,7 +10,7 @@ use gr_text::{Diagnostic, Span};
 use tower_lsp::ls_types as lsp;
 
 use super::{Answer, Failure, doc, exchange_doc, text_edits};
-use crate::documents::{Kind, View};
+use crate::documents::{Kind, Motion, View};
 use crate::protocol::{self, action_kind};
 
 /// Actions for a place, of the kinds that are asked for.
@@ -138,6 +138,8 @@ fn gcode_actions(view: &mut View, at: Span) -> Answer<Vec<Action>> {
     // Before M2 the state is what it leaves on; behind the last block, what it left.
     let ends = doc.line(count.saturating_sub(1)).is_some_and(|l| l.has_code(b'm', 20) || l.has_code(b'm', 300));
     let end = last.map(|s| if ends { s.before } else { s.after });
+    let calls = names::calls(doc).into_iter().find(|c| c.line == line);
+    let motion = if calls.is_some() && traced.is_some() { view.motion()? } else { None };
     view.release();
     let run = traced.as_ref().map(|t| (&t.before, &t.after, &t.program));
     let mut found = gcode::actions::actions(doc, at, Context { run, end: end.as_ref() });
@@ -145,18 +147,16 @@ fn gcode_actions(view: &mut View, at: Span) -> Answer<Vec<Action>> {
         let ran: Vec<(u32, &gr_interp::Modal, &Program)> = traced.iter().map(|t| (t.line, &t.before, &t.program)).collect();
         found.extend(gcode::actions::write_out_compensation(doc, lines.clone(), &ran));
     }
-    if let Some(t) = &traced {
-        found.extend(expand_call(view, doc, line, &t.before));
+    if let (Some(t), Some(call), Some(motion)) = (&traced, &calls, &motion) {
+        found.extend(expand_call(motion, doc, call, &t.before));
     }
     Ok(found)
 }
 
 /// Writes the moves that the subroutine called here makes, in place of the call.
-fn expand_call(view: &View, doc: gcode::Doc<'_>, line: u32, before: &gr_interp::Modal) -> Option<Action> {
-    let call = names::calls(doc).into_iter().find(|c| c.line == line)?;
-    let motion = view.motion()?;
-    let moves = called_from(&motion.program, line)?;
-    let of = doc.line(line)?;
+fn expand_call(motion: &Motion, doc: gcode::Doc<'_>, call: &names::CallSite, before: &gr_interp::Modal) -> Option<Action> {
+    let moves = called_from(&motion.program, motion.main, call.line)?;
+    let of = doc.line(call.line)?;
     let words = of.words();
     let first = words.iter().find(|w| w.form != gr_gcode::Form::Comment && w.letter != b'n')?;
     let last = words.iter().rfind(|w| w.form != gr_gcode::Form::Comment)?;
@@ -167,9 +167,9 @@ fn expand_call(view: &View, doc: gcode::Doc<'_>, line: u32, before: &gr_interp::
 }
 
 /// The operations of the first call from a line of the main file; none when there are too many.
-fn called_from(program: &Program, line: u32) -> Option<Program> {
+fn called_from(program: &Program, main: FileId, line: u32) -> Option<Program> {
     const MOST: usize = 5_000;
-    let calls = program.frames.iter().find(|f| f.file == FileId(0) && f.line == line && f.pass == 0)?.id;
+    let calls = program.frames.iter().find(|f| f.file == main && f.line == line && f.pass == 0)?.id;
     let inside = |frame: gr_ir::FrameId| {
         let mut at = frame;
         for _ in 0..64 {

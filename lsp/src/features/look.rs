@@ -8,11 +8,13 @@ use gr_ide::gcode::hints::Ran;
 use gr_ide::gcode::hover::{Facts, Run};
 use gr_ide::gcode::names;
 use gr_ide::{Hint, HintKind, Item, Lens, Token, config, gcode, p21};
+use gr_ir::Source;
+use gr_robot::along::PathPoint;
 use gr_text::Span;
 use tower_lsp::ls_types as lsp;
 
-use super::{Answer, MOST_BLOCKS, MOST_BLOCKS_VISIBLE, doc, exchange_doc, joints};
-use crate::documents::{Kind, View};
+use super::{Answer, MOST_BLOCKS, MOST_BLOCKS_VISIBLE, doc, exchange_doc};
+use crate::documents::{Kind, Motion, View};
 use crate::protocol::{TOKEN_TYPES, markdown, symbol, symbol_kind, token_type};
 use crate::text::Text;
 
@@ -46,8 +48,10 @@ fn gcode_hover(view: &mut View, offset: u32) -> Answer<Option<gr_ide::Hover>> {
     let wanted: Vec<Parameter> = parameter.iter().cloned().collect();
     let Some(line) = doc.line_at(offset) else { return Ok(None) };
     let traced = trace_line(view, line.line, &wanted)?;
+    let moves = traced.as_ref().is_some_and(|t| t.program.steps().any(|s| s.op.moves()));
+    let motion = if moves && view.station.machine.is_some() { view.motion()? } else { None };
     view.release();
-    let run = traced.map(|t| run_of(view, t, parameter.is_some()));
+    let run = traced.map(|t| run_of(view, t, motion.as_deref(), parameter.is_some()));
     let written = parameter.and_then(|p| names::last_write(doc, &p, line.line));
     let written = written.and_then(|l| doc.line(l)).map(|l| (l.line, l.text()));
     let setup = &view.station.setup;
@@ -55,13 +59,34 @@ fn gcode_hover(view: &mut View, offset: u32) -> Answer<Option<gr_ide::Hover>> {
     Ok(gcode::hover::hover(doc, offset, facts))
 }
 
-fn run_of(view: &View, t: Traced, valued: bool) -> Run {
+fn run_of(view: &View, t: Traced, motion: Option<&Motion>, valued: bool) -> Run {
     let value = valued.then(|| (t.values.first().copied().flatten(), t.values_after.first().copied().flatten()));
-    let moves = t.program.steps().any(|s| s.op.moves());
-    let end = t.program.steps().filter(|s| s.op.moves()).last().map(|s| s.end.xyz());
-    let joints = end.filter(|_| moves).and_then(|xyz| joints(view, xyz, None));
-    let shown = joints.zip(view.station.machine.as_ref()).map(|(j, m)| crate::machine::show(m, &j)).unwrap_or_default();
-    Run { before: t.before, after: t.after, program: t.program, value, cycle: t.cycle, joints: shown }
+    let joints = motion.and_then(|m| joints(view, &t, m)).unwrap_or_default();
+    Run { before: t.before, after: t.after, program: t.program, value, cycle: t.cycle, joints }
+}
+
+/// Joint values of the chosen machine at the end of a block, in words: those that a build would have, or why they are
+/// not known.
+fn joints(view: &View, t: &Traced, motion: &Motion) -> Option<String> {
+    let machine = view.station.machine.as_ref()?;
+    let shown = |q: &[f64]| crate::machine::show(machine, q).join(", ");
+    if !gr_robot::along::is_planned(machine) {
+        let place = t.program.steps().filter(|s| s.op.moves()).last()?.end.xyz();
+        let point = PathPoint { place: place.map(|v| v as f32), source: Source::default(), joined: false };
+        let found = gr_robot::along::nearest(machine, &[point]).into_iter().next().flatten()?;
+        return Some(format!("joints at the end (of several solutions the nearest): {}", shown(&found.joints)));
+    }
+    if view.text.len() > super::MOST_FOR_A_ROBOT {
+        return Some(format!("joints: not known, {}", super::TOO_LARGE));
+    }
+    if !view.plans_quickly(motion) {
+        return Some("joints: still being worked out".into());
+    }
+    let planning = view.planning(motion)?;
+    Some(match &*planning {
+        Ok(planned) => format!("joints at the end: {}", shown(&gr_robot::along::at_line(&planned.program, motion.main, t.line)?)),
+        Err(found) => format!("joints: not known, {}", crate::machine::reason(found)),
+    })
 }
 
 /// Remarks inside of the visible text.
@@ -304,18 +329,20 @@ pub fn lenses(mut view: View) -> Answer<Vec<lsp::CodeLens>> {
     }
     let found: Vec<Lens> = match view.kind {
         Kind::Gcode(..) => {
+            let motion = view.motion()?;
+            let report = motion.as_ref().map(|m| view.report(m)).transpose()?;
             let Some(tables) = view.program()? else { return Ok(Vec::new()) };
             let doc = doc(&tables);
             let subs = names::subs(doc);
             let elsewhere = if subs.is_empty() { Vec::new() } else { calls_elsewhere(&view) };
             let count = |label: &str| elsewhere.iter().filter(|l| *l == label).count();
-            let motion = view.motion();
-            gcode::lenses::lenses(doc, motion.as_ref().map(|m| (&m.program, &m.report, &m.rates)), &count)
+            let ran = motion.as_ref().zip(report.as_ref()).map(|(m, r)| (&*m.program, m.main, &**r, &m.rates));
+            gcode::lenses::lenses(doc, ran, &count)
         }
         Kind::Exchange => {
             let exchange = view.exchange();
-            let motion = view.motion();
-            p21::lenses::lenses(exchange_doc(&exchange), &exchange.lines, motion.as_ref().map(|m| &m.report))
+            let report = view.motion()?.map(|m| view.report(&m)).transpose()?;
+            p21::lenses::lenses(exchange_doc(&exchange), &exchange.lines, report.as_deref())
         }
         _ => Vec::new(),
     };

@@ -18,7 +18,7 @@ use gr_ide::gcode;
 use gr_text::{Diagnostic, FileId, Severity, Span, code};
 use tower_lsp::ls_types as lsp;
 
-use crate::documents::{Kind, View};
+use crate::documents::{Kind, Motion, View};
 
 /// Why a request has no answer.
 #[derive(Clone, Debug, PartialEq)]
@@ -48,8 +48,9 @@ pub fn diagnostics(mut view: View) -> Answer<Vec<Diagnostic>> {
                 syntax_only(&tables, file, dialect)
             } else {
                 let mut found = session.check(file)?.diagnostics;
+                let motion = if asks_machine(&view, &found) { view.motion()? } else { None };
                 view.release();
-                found.extend(of_machine(&view, &found, file, dialect));
+                found.extend(motion.into_iter().flat_map(|m| of_machine(&view, &m)));
                 found
             }
         }
@@ -76,25 +77,43 @@ pub fn diagnostics(mut view: View) -> Answer<Vec<Diagnostic>> {
     Ok(found.into_iter().filter_map(|d| view.station.harden(d)).collect())
 }
 
+/// In documents above this the lines around an edit are looked at first, bytes.
+const EARLY_ABOVE: u32 = 500_000;
+/// So many of them.
+const EARLY_LINES: u32 = 2_000;
+
+/// What is to be said about the lines around the last edit of a big program, while the rest is not yet known.
+pub fn early(view: &View) -> Answer<Option<(std::ops::Range<u32>, Vec<Diagnostic>)>> {
+    let Some((session, file, _)) = view.session() else { return Ok(None) };
+    if view.version <= 1 || view.text.len() < EARLY_ABOVE || undeclared(view) {
+        return Ok(None);
+    }
+    let from = view.focus.saturating_sub(EARLY_LINES / 2);
+    let lines = from..from + EARLY_LINES;
+    let found = session.check_range(file, lines.clone())?;
+    Ok(Some((lines, found.into_iter().filter(|d| d.primary().0 == file).filter_map(|d| view.station.harden(d)).collect())))
+}
+
 /// Programs above this are not planned for a robot while they are edited, bytes.
 const MOST_FOR_A_ROBOT: u32 = 1_000_000;
+/// … in words.
+const TOO_LARGE: &str = "the program is too large to be planned while it is edited";
 
-/// What the chosen machine can't do, when the program itself is good.
-fn of_machine(view: &View, found: &[Diagnostic], file: FileId, dialect: &'static gr_spec::Dialect) -> Vec<Diagnostic> {
-    let bad = found.iter().any(|d| d.severity == Severity::Error);
-    if bad || view.station.machine.is_none() || view.text.len() > MOST_FOR_A_ROBOT || view.is_overtaken() {
-        return Vec::new();
-    }
-    let more = view.host.check_machine(&view.path, &view.text.to_string(), dialect, &view.station);
-    let own = more.into_iter().filter(|d| d.primary().0 == FileId(0));
-    own.map(|mut d| {
-        d.labels.retain(|l| l.file == FileId(0));
-        d.labels.iter_mut().for_each(|l| l.file = file);
-        d.trace.clear();
-        d.fixes.clear();
-        d
-    })
-    .collect()
+/// Whether the chosen machine is asked what it can't do: when the program itself is good.
+fn asks_machine(view: &View, found: &[Diagnostic]) -> bool {
+    let good = found.iter().all(|d| d.severity != Severity::Error);
+    let machine = view.station.machine.as_ref().is_some_and(|m| gr_robot::along::is_planned(m));
+    good && machine && view.text.len() <= MOST_FOR_A_ROBOT && !view.is_overtaken()
+}
+
+/// What the chosen machine has to say about the document.
+fn of_machine(view: &View, motion: &Motion) -> Vec<Diagnostic> {
+    let Some(planning) = view.planning(motion) else { return Vec::new() };
+    let found = match &*planning {
+        Ok(planned) => &planned.warnings,
+        Err(found) => found,
+    };
+    found.iter().filter(|d| d.primary().0 == motion.main).cloned().collect()
 }
 
 /// A `.gcode` file of which nobody says what control it is for: mostly a printer's. Its spelling alone is looked at.
@@ -137,10 +156,4 @@ fn exchange_doc(exchange: &crate::documents::Exchange) -> gr_ide::p21::Doc<'_> {
 /// Edits of one file as the protocol has them.
 fn text_edits(view: &View, edits: Vec<gr_ide::Edit>) -> Vec<lsp::TextEdit> {
     edits.into_iter().map(|e| lsp::TextEdit { range: view.range(e.span), new_text: e.text }).collect()
-}
-
-/// Joint values of the chosen machine at a pose, as people read them.
-fn joints(view: &View, xyz: [f64; 3], near: Option<&[f64]>) -> Option<Vec<f64>> {
-    let machine = view.station.machine.as_ref()?;
-    crate::machine::joints(machine, xyz, near)
 }

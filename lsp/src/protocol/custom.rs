@@ -30,92 +30,6 @@ pub struct PreviewParams {
     pub most_points: Option<u32>,
 }
 
-/// The tool path. Point `i` is joined to point `i - 1`, unless its kind is [`JUMP`]. Its arrays are those of
-/// `gr_backends::plot::Trace`, which makes them of motion for the pages of `gcc-robot preview`.
-#[derive(Serialize, Clone, Debug, Default, PartialEq)]
-#[serde(rename_all = "camelCase")]
-pub struct Preview {
-    /// The document.
-    pub uri: String,
-    /// Its version.
-    pub version: i32,
-    /// Names this path; send it as `have` next time.
-    pub key: String,
-    /// The client's path is this one: no arrays are sent.
-    pub unchanged: bool,
-    /// Number of points.
-    pub count: u32,
-    /// f32 × 3 per point: X Y Z in mm, in the work frame that the program moves in first.
-    pub positions: String,
-    /// u8 per point: how it was reached. 0 rapid, 1 straight feed, 2 arc or spline, 3 probe or tap, 255 jump.
-    pub kinds: String,
-    /// u32 per point: line of the block (from 0) in `files[0]`; for blocks of other files the calling line.
-    pub lines: String,
-    /// f32 per point: seconds since the beginning, as predicted.
-    pub times: String,
-    /// f32 per point: feed in mm/min; 0 for rapids.
-    pub feeds: String,
-    /// Files of the program; the first is the document.
-    pub files: Vec<String>,
-    /// Tool changes in order.
-    pub tools: Vec<PreviewTool>,
-    /// Smallest and largest X Y Z of all points.
-    pub bounds: Option<[[f32; 3]; 2]>,
-    /// The same of points reached at feed.
-    pub cut: Option<[[f32; 3]; 2]>,
-    /// The raw part, where the program says (STEP-NC).
-    pub stock: Option<[[f32; 3]; 2]>,
-    /// Estimated time, s.
-    pub seconds: f64,
-    /// … of which rapids.
-    pub rapid_seconds: f64,
-    /// Way at feed, mm.
-    pub cut_length: f64,
-    /// Way in rapids, mm.
-    pub rapid_length: f64,
-    /// The path has more points than were sent.
-    pub truncated: bool,
-    /// The machine that was chosen, and its joints along the path.
-    pub machine: Option<PreviewMachine>,
-}
-
-/// A kind: the point begins a new line.
-pub const JUMP: u8 = 255;
-
-/// A tool change.
-#[derive(Serialize, Clone, Debug, Default, PartialEq)]
-#[serde(rename_all = "camelCase")]
-pub struct PreviewTool {
-    /// First point with this tool.
-    pub point: u32,
-    /// Its number.
-    pub number: i32,
-    /// Diameter, mm; none = unknown.
-    pub diameter: Option<f64>,
-    /// Comment of the tool table.
-    pub comment: String,
-    /// Line of the change.
-    pub line: u32,
-}
-
-/// The machine along the path.
-#[derive(Serialize, Clone, Debug, Default, PartialEq)]
-#[serde(rename_all = "camelCase")]
-pub struct PreviewMachine {
-    /// Its id.
-    pub id: String,
-    /// For people.
-    pub title: String,
-    /// Joint names in order.
-    pub joints: Vec<String>,
-    /// `deg` or `mm`, per joint.
-    pub units: Vec<String>,
-    /// Limits per joint, in the same unit; none = unlimited.
-    pub limits: Vec<[Option<f64>; 2]>,
-    /// f32 × joints per point; NaN where the machine can't reach.
-    pub values: String,
-}
-
 /// `gccRobot/output`: what a target makes of the document as it is in the editor.
 #[derive(Deserialize, Serialize, Clone, Debug)]
 #[serde(rename_all = "camelCase")]
@@ -297,28 +211,7 @@ impl lsp::notification::Notification for AnalysedNotification {
     const METHOD: &'static str = "gccRobot/analysed";
 }
 
-/// Bytes as base64.
-pub fn base64(bytes: &[u8]) -> String {
-    const ALPHABET: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    let mut out = Vec::with_capacity(bytes.len().div_ceil(3) * 4);
-    for three in bytes.chunks(3) {
-        let [a, b, c] = [0, 1, 2].map(|i| u32::from(three.get(i).copied().unwrap_or(0)));
-        let n = a << 16 | b << 8 | c;
-        let digits = [18, 12, 6, 0].map(|shift| ALPHABET[(n >> shift) as usize & 63]);
-        out.extend_from_slice(&digits);
-    }
-    let missing = (3 - bytes.len() % 3) % 3;
-    let end = out.len();
-    out[end - missing..].fill(b'=');
-    // Its characters are ASCII.
-    String::from_utf8(out).unwrap_or_default()
-}
-
-/// f32 numbers as base64.
-pub fn floats(values: impl IntoIterator<Item = f32>) -> String {
-    let bytes: Vec<u8> = values.into_iter().flat_map(f32::to_le_bytes).collect();
-    base64(&bytes)
-}
+pub use gr_backends::plot::trace::base64;
 
 /// u32 numbers as base64.
 pub fn integers(values: impl IntoIterator<Item = u32>) -> String {
@@ -331,10 +224,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn base64_of_every_length() {
-        let all: Vec<String> = [&b""[..], b"f", b"fo", b"foo", b"foob", b"fooba", b"foobar"].iter().map(|b| base64(b)).collect();
-        assert_eq!(all, ["", "Zg==", "Zm8=", "Zm9v", "Zm9vYg==", "Zm9vYmE=", "Zm9vYmFy"]);
-        assert_eq!(floats([1.0]), "AACAPw==");
+    fn lists_are_little_endian() {
         assert_eq!(integers([1, u32::MAX]), "AQAAAP////8=");
     }
 }

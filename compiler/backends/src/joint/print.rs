@@ -20,6 +20,11 @@ impl JointProgram {
         out
     }
 
+    /// Where each line of [`JointProgram::gcode`] comes from; none for the start.
+    pub fn sources(&self) -> Vec<Option<gr_ir::Source>> {
+        self.points.iter().map(|p| p.source).collect()
+    }
+
     /// The points in space: time in s, X Y Z in mm, A B C in degrees.
     pub fn cartesian_csv(&self) -> String {
         let head = ["t", "X", "Y", "Z", "A", "B", "C"].map(String::from);

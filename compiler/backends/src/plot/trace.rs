@@ -6,6 +6,8 @@ use gr_ir::geometry::{Extent, flatten};
 use gr_ir::measure::{Known, Rates, Totals};
 use gr_ir::timing::Clock;
 use gr_ir::{FileId, Op, Pose, Program, Source, View};
+use gr_machine::math::Frame;
+use gr_machine::{JointKind, Machine};
 use serde_json::{Value, json};
 
 use super::path::{Class, Common, moves_frame, rough_size, single};
@@ -73,8 +75,109 @@ pub struct Trace {
     pub totals: Totals,
     /// There are more points than were kept.
     pub truncated: bool,
-    /// The operation that each point ends or lies in.
-    pub operations: Vec<u32>,
+    /// The block that each point belongs to.
+    pub sources: Vec<Source>,
+    /// Lowest and highest corner of the raw part, mm.
+    pub stock: Option<[[f64; 3]; 2]>,
+    /// The machine along the path.
+    pub machine: Option<TraceMachine>,
+}
+
+/// The machine that was chosen, and how it stands along the path.
+#[derive(Clone, PartialEq, Debug, Default)]
+pub struct TraceMachine {
+    /// Its id.
+    pub id: String,
+    /// For people.
+    pub title: String,
+    /// Names of its joints.
+    pub joints: Vec<String>,
+    /// `deg` or `mm`, per joint.
+    pub units: Vec<String>,
+    /// Limits per joint, in the same unit.
+    pub limits: Vec<[Option<f64>; 2]>,
+    /// Joints × points, in the same unit; NaN where they are not known.
+    pub values: Vec<f32>,
+    /// Base, table and part: name, origin and axes, in the frame of the path.
+    pub frames: Vec<(String, Frame)>,
+    /// Points of each line of its figure; none: it has no figure.
+    pub lines: Vec<u32>,
+    /// The figure is known at every so many points of the path.
+    pub every: u32,
+    /// X Y Z of the figure's points in the frame of the path, one figure after the other; NaN where it isn't known.
+    pub figure: Vec<f32>,
+    /// What is to be said about the values: why there are none, or where they come from.
+    pub note: String,
+}
+
+/// Points with joint values; the picture of the machine is coarser in longer paths.
+const MOST_VALUES: usize = 200_000;
+/// Figures along a path.
+const MOST_FIGURES: usize = 2_000;
+
+impl TraceMachine {
+    /// A machine of which no joint values are known.
+    pub fn new(machine: &Machine, note: String) -> TraceMachine {
+        let part = machine.cell.part_in_base();
+        TraceMachine {
+            id: machine.id.clone(),
+            title: machine.title.clone(),
+            joints: machine.joints.iter().map(|j| j.name.clone()).collect(),
+            units: machine.joints.iter().map(|j| if j.kind == JointKind::Revolute { "deg" } else { "mm" }.into()).collect(),
+            limits: machine.joints.iter().map(|j| [j.min, j.max].map(|v| v.map(|v| in_units(j.kind, v)))).collect(),
+            frames: frames(machine, &part),
+            every: 1,
+            note,
+            ..TraceMachine::default()
+        }
+    }
+    /// With joint values and tool point in the base (mm, rad) for each of some points; `work`: the frame of the path in
+    /// the base.
+    pub fn along(self, machine: &Machine, work: &Frame, count: usize, stand: &dyn Fn(usize) -> Option<Stand>) -> TraceMachine {
+        let back = work.inverse();
+        let every = count.div_ceil(MOST_FIGURES).max(1);
+        let mut out = TraceMachine { frames: frames(machine, work), every: every as u32, ..self };
+        for i in 0..count.min(MOST_VALUES) {
+            let stand = stand(i);
+            let value = |(n, j): (usize, &gr_machine::Joint)| stand.as_ref().and_then(|s| s.0.get(n)).map_or(f32::NAN, |v| in_units(j.kind, *v) as f32);
+            out.values.extend(machine.joints.iter().enumerate().map(value));
+        }
+        let figure = |i: usize| {
+            let (joints, tip) = stand(i)?;
+            let mut lines = machine.figure(&joints)?;
+            lines.first_mut()?.push(tip);
+            Some(lines)
+        };
+        let figures: Vec<Option<Vec<Vec<[f64; 3]>>>> = (0..count).step_by(every).map(figure).collect();
+        let Some(shape) = figures.iter().flatten().next() else { return out };
+        out.lines = shape.iter().map(|l| l.len() as u32).collect();
+        let nodes = out.lines.iter().sum::<u32>() as usize;
+        for f in &figures {
+            match f {
+                Some(lines) => out.figure.extend(lines.iter().flatten().flat_map(|p| back.apply(*p).map(|v| v as f32))),
+                None => out.figure.extend(std::iter::repeat_n(f32::NAN, 3 * nodes)),
+            }
+        }
+        out
+    }
+}
+
+/// Joint values and tool point.
+pub type Stand = (Vec<f64>, [f64; 3]);
+
+fn in_units(kind: JointKind, value: f64) -> f64 {
+    if kind == JointKind::Revolute { value.to_degrees() } else { value }
+}
+
+/// Base, table and part in the frame of the path; a table that is nowhere else than the base has no name of its own.
+fn frames(machine: &Machine, work: &Frame) -> Vec<(String, Frame)> {
+    let back = work.inverse();
+    let mut out = vec![("base".to_string(), back)];
+    if machine.cell.table != Frame::IDENTITY {
+        out.push(("table".into(), back.then(&machine.cell.table)));
+    }
+    out.push(("part".into(), back.then(&machine.cell.part_in_base())));
+    out
 }
 
 struct Run<'p> {
@@ -119,7 +222,9 @@ impl Trace {
                     }
                     fresh = false;
                     if let Some(start) = start {
-                        run.moved(&view, &start, class, before);
+                        // Along the curve, not along the points that stand for it.
+                        let feed = if measured.feed_ns > 0 { measured.feed_nm as f64 / measured.feed_ns as f64 * 60e3 } else { 0.0 };
+                        run.moved(&view, &start, class, (before, feed));
                     }
                 }
                 None => {
@@ -131,38 +236,78 @@ impl Trace {
         run.trace
     }
 
-    /// The answer of `gccRobot/preview` about this path. `uri` names the document.
-    pub fn json(&self, uri: &str) -> Value {
+    /// A name for this path: the same path has the same one, on every machine.
+    pub fn key(&self) -> String {
+        let mut h = 0xcbf2_9ce4_8422_2325u64;
+        let mut add = |v: u64| h = (h ^ v).wrapping_mul(0x0000_0100_0000_01b3).rotate_left(17);
+        let pair = |a: f32, b: u32| u64::from(a.to_bits()) << 32 | u64::from(b);
+        add(self.kinds.len() as u64);
+        for (i, p) in self.positions.iter().enumerate() {
+            add(pair(p[0], p[1].to_bits()));
+            add(pair(p[2], self.lines[i]));
+            add(pair(self.feeds[i], u32::from(self.kinds[i])));
+        }
+        for t in &self.tools {
+            add(u64::from(t.point) << 32 | u64::from(t.number as u32));
+            add(t.diameter.unwrap_or(0.0).to_bits());
+        }
+        self.stock.iter().flatten().flatten().for_each(|v| add(v.to_bits()));
+        if let Some(m) = &self.machine {
+            m.id.bytes().chain(m.note.bytes()).for_each(|b| add(u64::from(b)));
+            m.values.chunks(2).for_each(|v| add(pair(v[0], v.get(1).map_or(0, |v| v.to_bits()))));
+            m.frames.iter().flat_map(|f| f.1.position).for_each(|v| add(v.to_bits()));
+        }
+        format!("{h:016x}")
+    }
+
+    /// The answer of `gccRobot/preview` about this path, under this key; without the long lists when the asker has
+    /// the path already (`docs/editor-features.md`). `uri` names the document.
+    pub fn json(&self, uri: &str, key: &str, unchanged: bool) -> Value {
         let tools: Vec<Value> = self.tools.iter().map(tool).collect();
-        let floats = |list: &[f32]| base64(&list.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>());
+        let floats = |list: &[f32]| if unchanged { String::new() } else { base64(&list.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>()) };
+        let bytes = |list: &[u8]| if unchanged { String::new() } else { base64(list) };
         json!({
             "uri": uri,
             "version": 0,
-            "key": "",
-            "unchanged": false,
+            "key": key,
+            "unchanged": unchanged,
             "count": self.positions.len(),
             "positions": floats(self.positions.as_flattened()),
-            "kinds": base64(&self.kinds),
-            "lines": base64(&self.lines.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>()),
+            "kinds": bytes(&self.kinds),
+            "lines": if unchanged { String::new() } else { base64(&self.lines.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>()) },
             "times": floats(&self.times),
             "feeds": floats(&self.feeds),
             "files": [uri],
             "tools": tools,
             "bounds": corners(&self.bounds),
             "cut": corners(&self.cut),
-            "stock": null,
+            "stock": self.stock,
             "seconds": self.totals.seconds(),
             "rapidSeconds": self.totals.rapid_ns as f64 / 1e9,
             "cutLength": self.totals.feed_nm as f64 / 1e6,
             "rapidLength": self.totals.rapid_nm as f64 / 1e6,
             "truncated": self.truncated,
-            "machine": null,
+            "machine": self.machine.as_ref().map(|m| json!({
+                "id": m.id,
+                "title": m.title,
+                "joints": m.joints,
+                "units": m.units,
+                "limits": m.limits,
+                "values": floats(&m.values),
+                "frames": m.frames.iter().map(frame).collect::<Vec<Value>>(),
+                "figure": { "lines": m.lines, "every": m.every, "points": floats(&m.figure) },
+                "note": m.note,
+            })),
         })
     }
 }
 
 fn tool(t: &TraceTool) -> Value {
     json!({ "point": t.point, "number": t.number, "diameter": t.diameter, "comment": t.comment, "line": t.line })
+}
+
+fn frame((name, f): &(String, Frame)) -> Value {
+    json!({ "name": name, "origin": f.position, "axes": [f.axis(0), f.axis(1), f.axis(2)] })
 }
 
 /// Corners of a box; none when it is empty.
@@ -172,11 +317,11 @@ pub fn corners(extent: &Extent) -> Option<[[f32; 3]; 2]> {
 
 impl Run<'_> {
     /// Points of a move.
-    fn moved(&mut self, view: &View<'_, '_>, from: &Pose, class: Class, before: u64) {
+    fn moved(&mut self, view: &View<'_, '_>, from: &Pose, class: Class, (before, feed): (u64, f64)) {
         let start = self.common.place(&from.axes);
         let line = self.line_of(view.source);
         if self.last.is_none_or(|last| single(last) != single(start)) {
-            self.add(start, JUMP, line, before, 0.0, view.index);
+            self.add(start, JUMP, line, before, 0.0, view.source);
         }
         let mut points = Vec::new();
         let (tolerance, common) = (self.tolerance, &self.common);
@@ -190,13 +335,13 @@ impl Run<'_> {
         }
         let whole: f64 = steps.iter().sum();
         let ns = self.trace.totals.ns().saturating_sub(before);
-        let feed = if class == Class::Rapid || ns == 0 { 0.0 } else { whole / (ns as f64 / 1e9) * 60.0 };
+        let feed = if class == Class::Rapid { 0.0 } else { feed };
         let mut gone = 0.0;
         for (i, (p, step)) in points.iter().zip(&steps).enumerate() {
             gone += step;
             let share = if whole > 0.0 { gone / whole } else { (i + 1) as f64 / points.len() as f64 };
             let at = before.saturating_add((ns as f64 * share) as u64);
-            self.add(*p, class as u8, line, at, feed, view.index);
+            self.add(*p, class as u8, line, at, feed, view.source);
             if class != Class::Rapid {
                 self.trace.cut.add(*p);
             }
@@ -217,7 +362,7 @@ impl Run<'_> {
         if let Some(last) = self.last.filter(|_| now > before) {
             let kind = self.trace.kinds.last().copied().unwrap_or(JUMP);
             let line = self.line_of(view.source);
-            self.add(last, kind, line, now, 0.0, view.index);
+            self.add(last, kind, line, now, 0.0, view.source);
         }
     }
 
@@ -235,7 +380,7 @@ impl Run<'_> {
         });
     }
 
-    fn add(&mut self, p: [f64; 3], kind: u8, line: u32, ns: u64, feed: f64, operation: usize) {
+    fn add(&mut self, p: [f64; 3], kind: u8, line: u32, ns: u64, feed: f64, source: Source) {
         let t = &mut self.trace;
         t.bounds.add(p);
         self.last = Some(p);
@@ -248,7 +393,7 @@ impl Run<'_> {
         t.lines.push(line);
         t.times.push((ns as f64 / 1e9) as f32);
         t.feeds.push(feed as f32);
-        t.operations.push(operation as u32);
+        t.sources.push(source);
     }
 
     fn line_of(&mut self, source: Source) -> u32 {
@@ -282,4 +427,13 @@ pub fn base64(bytes: &[u8]) -> String {
         }
     }
     out
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn base64_of_every_length() {
+        let all: Vec<String> = [&b""[..], b"f", b"fo", b"foo", b"foob", b"fooba", b"foobar"].iter().map(|b| super::base64(b)).collect();
+        assert_eq!(all, ["", "Zg==", "Zm8=", "Zm9v", "Zm9vYg==", "Zm9vYmE=", "Zm9vYmFy"]);
+    }
 }

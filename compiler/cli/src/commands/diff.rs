@@ -126,7 +126,7 @@ fn as_json(result: &Diff, a: &Sources, b: &Sources) -> String {
 pub fn verify(global: &Global, args: &VerifyArgs) -> Exit {
     let mut renderer = global.renderer(true);
     let Some(station) = prepare(&args.setup, &mut renderer) else { return Exit::Findings };
-    if let Some(machine) = station.machine.as_ref().filter(|m| crate::robot::is_checked(m)) {
+    if let Some(machine) = station.machine.as_ref().filter(|m| gr_robot::along::is_planned(m)) {
         return on_robot(global, args, &station, machine, &mut renderer);
     }
     if args.output.is_some() {

@@ -11,7 +11,6 @@ use gr_lsp::Settings;
 use gr_lsp::host::{Host, Made, MadeFile, OutputJob, Plan, Station};
 use gr_text::{Diagnostic, Encoding, FileId};
 
-use crate::commands::check::Checked;
 use crate::emit::{Artifact, Built, Goal, TargetOptions, build, stem};
 use crate::options::{LintArgs, SetupArgs, UnitArg};
 use crate::pipeline::{Unit, motion, run};
@@ -116,17 +115,11 @@ impl Host for Editor {
         }
     }
 
-    fn check_machine(&self, path: &Path, text: &str, dialect: &'static gr_spec::Dialect, station: &Station) -> Vec<Diagnostic> {
-        let Some(machine) = own(station).and_then(|s| s.machine.as_ref()) else { return Vec::new() };
-        let mut checked = Checked::nothing();
-        crate::robot::ask(&path.display().to_string(), text, machine, &station.setup_for(dialect), &mut checked);
-        checked.found
-    }
-
     fn plan(&self, path: &Path, text: &str, station: &Station) -> Option<Plan> {
         let unit = Unit::new(path, text.into(), Encoding::Utf8, own(station)?);
         let (made, _) = motion(&unit, None).ok()?;
-        Some(Plan { program: made.program, stock: None })
+        let tools = crate::emit::tool_rows(&made, &unit);
+        Some(Plan { tools, stock: made.plan.and_then(|p| p.stock), program: made.program })
     }
 
     fn output(&self, job: &OutputJob<'_>) -> Result<Made, String> {
@@ -223,5 +216,8 @@ fn made(job: &OutputJob<'_>, built: Built, mut found: Vec<Diagnostic>) -> Made {
         bytes: a.bytes,
         lines: a.lines,
     };
-    Made { files: built.artifacts.into_iter().map(file).collect(), found }
+    let mut files: Vec<MadeFile> = built.artifacts.into_iter().map(file).collect();
+    // Where there are several, the one that holds the program comes first.
+    files.sort_by_key(|f| std::cmp::Reverse(f.lines.iter().filter(|l| **l != u32::MAX).count()));
+    Made { files, found }
 }

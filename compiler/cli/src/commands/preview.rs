@@ -6,7 +6,7 @@ use gr_backends::plot::{Options, Show};
 use gr_text::Severity;
 
 use super::check::{Checked, show};
-use crate::emit::{picture, stem, tool_rows};
+use crate::emit::{picture, stem, traced};
 use crate::exit::Exit;
 use crate::options::{Global, LintArgs, PreviewArgs, ViewArg};
 use crate::pipeline::{load, motion};
@@ -37,8 +37,9 @@ pub fn run(global: &Global, args: &PreviewArgs) -> Exit {
     };
     let bad = motion.found.iter().any(|d| d.severity == Severity::Error);
     let kind = goal.extension().map_or(String::new(), |e| e.to_string_lossy().to_ascii_lowercase());
-    let plot = Options { text: unit.text.to_string(), tools: tool_rows(&motion, &unit), rates: gr_driver::rates(&unit.setup), ..options(args) };
-    let made = picture(&motion.program, &kind, &plot);
+    let plot = Options { text: unit.text.to_string(), rates: gr_driver::rates(&unit.setup), ..options(args) };
+    let trace = (kind == "html").then(|| traced(&motion, &unit, station.machine.as_ref()));
+    let made = picture(&motion.program, trace.as_ref(), &kind, &plot);
     drop(progress);
     show(&mut renderer, &Checked { sources: motion.sources, found: motion.found, more: 0, unreadable: false });
     let exit = match made {

@@ -13,8 +13,7 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard};
 use std::time::{Duration, SystemTime};
 
-use gr_backends::plot::{Trace, preview_page};
-use gr_backends::plot::trace::TraceOptions;
+use gr_backends::plot::preview_page;
 use gr_text::{Encoding, Severity};
 use serde_json::{Value, json};
 
@@ -212,9 +211,8 @@ impl Drawing {
         let unit = Unit::new(&self.file, text.clone(), encoding, &self.station);
         let said = match motion(&unit, self.station.machine.as_ref()) {
             Ok((motion, checked)) => {
-                let tools = crate::emit::tool_rows(&motion, &unit);
-                let trace = Trace::new(&motion.program, &TraceOptions { tools, rates: gr_driver::rates(&unit.setup), ..TraceOptions::default() });
-                self.path = Some(trace.json(&self.shared.title).to_string());
+                let trace = crate::emit::traced(&motion, &unit, self.station.machine.as_ref());
+                self.path = Some(trace.json(&self.shared.title, &trace.key(), false).to_string());
                 self.files = std::iter::once(self.file.clone()).chain(motion.subs).collect();
                 let bad = motion.found.iter().any(|d| d.severity == Severity::Error);
                 problem(&if bad { Checked { sources: motion.sources, found: motion.found, ..Checked::nothing() } } else { checked })

@@ -37,6 +37,15 @@ impl Client {
 
     /// … and further capabilities of the client.
     pub fn with(files: &[(&str, &str)], settings: Value, general: Value) -> Client {
+        Client::made(files, settings, general, false)
+    }
+
+    /// A client that asks for diagnostics itself.
+    pub fn pulling(files: &[(&str, &str)]) -> Client {
+        Client::made(files, json!({}), json!({}), true)
+    }
+
+    fn made(files: &[(&str, &str)], settings: Value, general: Value, pulls: bool) -> Client {
         let folder = tempfile::tempdir().expect("a folder");
         for (name, text) in files {
             let path = folder.path().join(name);
@@ -75,14 +84,16 @@ impl Client {
             capabilities: Value::Null,
         };
         let root = c.uri("");
+        let mut options = c.settings.clone();
+        options["pullDiagnostics"] = pulls.into();
         let hello = json!({
             "processId": null,
             "capabilities": {
                 "general": general,
-                "workspace": { "configuration": true, "didChangeWatchedFiles": { "dynamicRegistration": true }, "inlayHint": { "refreshSupport": true } },
+                "workspace": { "configuration": true, "didChangeWatchedFiles": { "dynamicRegistration": true }, "inlayHint": { "refreshSupport": true }, "diagnostics": { "refreshSupport": true } },
                 "window": { "workDoneProgress": true },
             },
-            "initializationOptions": c.settings,
+            "initializationOptions": options,
             "workspaceFolders": [{ "uri": root.trim_end_matches('/'), "name": "parts" }],
         });
         c.capabilities = c.request("initialize", hello)["capabilities"].clone();
@@ -191,6 +202,21 @@ impl Client {
             let m = self.receive();
             self.take(&m);
         }
+    }
+    /// Writes a file, and says so as a client that watches files does.
+    pub fn write(&mut self, name: &str, text: &str) {
+        std::fs::write(self.path(name), text).expect("written");
+        let uri = self.uri(name);
+        self.notify("workspace/didChangeWatchedFiles", json!({ "changes": [{ "uri": uri, "type": 2 }] }));
+    }
+    /// The next diagnostics of a document, whatever version they are of.
+    pub fn next_diagnostics(&mut self, uri: &str) -> Vec<Value> {
+        self.found.remove(uri);
+        while !self.found.contains_key(uri) {
+            let m = self.receive();
+            self.take(&m);
+        }
+        self.found[uri].1.as_array().cloned().unwrap_or_default()
     }
     pub fn text(&self, uri: &str) -> &str {
         &self.texts[uri]

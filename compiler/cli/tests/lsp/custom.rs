@@ -74,7 +74,85 @@ fn preview_knows_tools_subs_and_machine() {
     let joints = floats(&p["machine"]["values"]);
     assert_eq!(joints.len(), 3 * p["count"].as_u64().expect("a number") as usize);
     assert!(joints.iter().any(|v| v.is_finite()));
-    assert!(c.hover(&uri, "G1 X|9").contains("joints at the end: "));
+    assert_eq!(p["machine"]["figure"]["lines"], json!([5]), "base, two joints, wrist, tool");
+    // The figure ends in the tool: its last point is a point of the path.
+    let (path, figure) = (floats(&p["positions"]), floats(&p["machine"]["figure"]["points"]));
+    let every = p["machine"]["figure"]["every"].as_u64().expect("a number") as usize;
+    assert_eq!((every, figure.len()), (1, path.len() * 5));
+    assert!(figure.chunks(15).zip(path.chunks(3)).all(|(f, p)| f[12].is_nan() || (f[12] - p[0]).abs() < 1e-3 && (f[13] - p[1]).abs() < 1e-3));
+    assert!(c.hover(&uri, "G1 X|9").contains("joints at the end (of several solutions the nearest): "));
+    c.shut_down();
+}
+
+#[test]
+fn preview_shows_the_raw_part() {
+    let mut c = Client::new(&[], json!({}));
+    let uri = c.open("plate.p21", Some(include_str!("../../../../docs/examples/stepnc/case-study.p21")));
+    let p = c.request("gccRobot/preview", json!({ "textDocument": { "uri": uri } }));
+    let stock = p["stock"].as_array().unwrap_or_else(|| panic!("no raw part: {}", p["stock"]));
+    let corner = |i: usize| stock[i].as_array().expect("a corner").iter().map(|v| v.as_f64().expect("a number")).collect::<Vec<_>>();
+    let (low, high, cut) = (corner(0), corner(1), &p["cut"]);
+    assert!((0..3).all(|i| low[i] < high[i]), "{stock:?}");
+    // The part is cut out of it: in depth the tool does not come below it by more than a drill's point.
+    assert!(cut[0][2].as_f64() < Some(high[2]) && cut[0][2].as_f64() > Some(low[2] - 10.0), "{cut} {stock:?}");
+    assert_eq!(p["tools"][0]["diameter"].is_number(), true);
+    c.shut_down();
+}
+
+/// A cell and a program that needs its arm to reach over.
+const CELL: &str = include_str!("../../../../docs/examples/irb2400-cell.toml");
+const CUTS: &str = "G21 G90 G17 F600\nT1 M6\nG0 X0 Y0 Z20\nG1 Z5\nX60\nG3 X60 Y40 J20\nG1 X0\nM2\n";
+
+#[test]
+fn preview_and_hover_have_the_joints_of_the_plan() {
+    let mut c = Client::new(&[("a.ngc", CUTS), ("cell.toml", CELL)], json!({ "machine": "cell.toml" }));
+    let uri = c.open("a.ngc", None);
+    let p = c.request("gccRobot/preview", json!({ "textDocument": { "uri": uri } }));
+    let m = &p["machine"];
+    assert_eq!((m["note"].as_str(), m["id"].as_str()), (Some(""), Some("example/irb2400-cell")));
+    // The part lies at 900 -100 450 in the base: the base is the other way.
+    let frames: Vec<(String, Vec<f64>)> = m["frames"]
+        .as_array()
+        .expect("frames")
+        .iter()
+        .map(|f| (f["name"].as_str().unwrap_or("").into(), f["origin"].as_array().expect("a place").iter().filter_map(Value::as_f64).map(f64::round).collect()))
+        .collect();
+    let expected = [("base", [-900.0, 100.0, -450.0]), ("table", [0.0, 0.0, -50.0]), ("part", [0.0, 0.0, 0.0])];
+    assert_eq!(frames, expected.map(|(n, p)| (n.to_string(), p.to_vec())));
+    let (path, lines, values) = (floats(&p["positions"]), integers(&p["lines"]), floats(&m["values"]));
+    let last = lines.iter().rposition(|l| *l == 4).expect("the cut along X");
+    let joints = &values[6 * last..6 * last + 6];
+    // The figure's first point is the base, its last the tool on the path.
+    let nodes = m["figure"]["lines"][0].as_u64().expect("a number") as usize;
+    let figure = floats(&m["figure"]["points"]);
+    assert_eq!(figure.len(), 3 * nodes * lines.len());
+    let at = &figure[3 * nodes * last..3 * nodes * (last + 1)];
+    assert!([-900.0, 100.0, -450.0].iter().zip(&at[..3]).all(|(a, b)| (a - b).abs() < 0.01), "{at:?}");
+    assert!(path[3 * last..].iter().zip(&at[3 * nodes - 3..]).all(|(a, b)| (a - b).abs() < 0.1), "{at:?}");
+    // Hover has the same joint values as the path, and both those of the program that is built.
+    let hover = c.hover(&uri, "X6|0\n");
+    let text = hover.split("joints at the end: ").nth(1).and_then(|t| t.lines().next()).map(str::trim).unwrap_or_else(|| panic!("{hover}"));
+    let shown: Vec<f32> = text.split(", ").map(|j| j.rsplit(' ').next().and_then(|v| v.trim_end_matches('°').trim().parse().ok()).expect("degrees")).collect();
+    assert!(shown.iter().zip(joints).all(|(a, b)| (a - b).abs() < 0.01), "{shown:?} {joints:?}");
+    let out = c.request("gccRobot/output", json!({ "textDocument": { "uri": uri }, "target": "joint-gcode", "options": {} }));
+    let (text, map) = (out["files"][0]["text"].as_str().expect("text"), integers(&out["files"][0]["lines"]));
+    let n = map.iter().rposition(|l| *l == 4).unwrap_or_else(|| panic!("no line of the cut in {map:?}"));
+    let line = text.lines().nth(n).expect("the line");
+    let word = |v: f32| line.split(' ').any(|w| w[1..].parse::<f32>().is_ok_and(|w| (w - v).abs() < 0.01));
+    assert!(shown.iter().all(|v| word(*v)), "{line} {shown:?}");
+    c.shut_down();
+}
+
+#[test]
+fn no_joints_without_a_plan() {
+    let far = CUTS.replace("X60\n", "X6000\n");
+    let mut c = Client::new(&[("a.ngc", &far), ("cell.toml", CELL)], json!({ "machine": "cell.toml" }));
+    let uri = c.open("a.ngc", None);
+    let p = c.request("gccRobot/preview", json!({ "textDocument": { "uri": uri } }));
+    assert!(p["machine"]["note"].as_str().is_some_and(|n| !n.is_empty()), "{}", p["machine"]["note"]);
+    assert_eq!(p["machine"]["values"], "");
+    let hover = c.hover(&uri, "X6|000\n");
+    assert!(hover.contains("joints: not known, "), "{hover}");
     c.shut_down();
 }
 
@@ -104,6 +182,29 @@ fn output_of_targets() {
     let bad = ask(&mut c, "rs274ngc", json!({}));
     assert_eq!(bad["files"], json!([]));
     assert!(bad["diagnostics"].as_array().is_some_and(|d| d.iter().any(|d| d["severity"] == 1)), "{bad}");
+    c.shut_down();
+}
+
+/// Every target that is written line by line says where its lines come from.
+#[test]
+fn outputs_go_with_their_source_line_by_line() {
+    let mut c = Client::new(&[("a.ngc", CUTS), ("cell.toml", CELL)], json!({ "machine": "cell.toml" }));
+    let uri = c.open("a.ngc", None);
+    // A word of the cut along X (line 5 of the program) in each language.
+    let cut = [("rapid", "MoveL"), ("krl", "LIN"), ("fanuc-ls", ":L "), ("urscript", "movel"), ("val3", "movel"), ("motion", "line"), ("rs274ngc", "X60"), ("canon", "STRAIGHT_FEED"), ("joint-gcode", "G1")];
+    for (target, word) in cut {
+        // The arm needs a maker's language it is not made for: only the text counts here.
+        let out = c.request("gccRobot/output", json!({ "textDocument": { "uri": uri }, "target": target, "options": {} }));
+        let file = &out["files"][0];
+        let (text, map) = (file["text"].as_str().unwrap_or_else(|| panic!("{target}: {out}")), integers(&file["lines"]));
+        assert_eq!(map.len(), text.lines().count(), "{target}");
+        let of_cut: Vec<&str> = text.lines().zip(&map).filter(|(_, m)| **m == 4).map(|(l, _)| l).collect();
+        assert!(of_cut.iter().any(|l| l.contains(word)), "{target}: {of_cut:?} of\n{text}");
+        assert!(!text.contains('\u{1}') && map.iter().all(|m| *m == u32::MAX || *m < 8), "{target}");
+        // What comes later in the program does not come earlier in its translation.
+        let order: Vec<u32> = map.iter().copied().filter(|m| *m != u32::MAX).collect();
+        assert!(order.windows(2).all(|w| w[0] <= w[1]), "{target}: {order:?}");
+    }
     c.shut_down();
 }
 

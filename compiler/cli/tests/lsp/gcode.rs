@@ -376,6 +376,30 @@ fn actions_for_cycles_compensation_units_and_ends() {
 
 #[test]
 fn fixes_of_diagnostics() {
+    let text = "G21 G90 F100\nG1 XO\nG1 X1,5\n(end\nM2\n";
+    let mut c = Client::new(&[("a.ngc", text)], json!({}));
+    let uri = c.open("a.ngc", None);
+    let found = c.diagnostics(&uri);
+    let mut fixed = Vec::new();
+    for d in found.iter().filter(|d| d["data"]["fixes"].as_u64().unwrap_or(0) > 0) {
+        let params = json!({ "textDocument": { "uri": uri }, "range": d["range"], "context": { "diagnostics": [d], "only": ["quickfix"] } });
+        let actions = c.request("textDocument/codeAction", params);
+        let action = actions.as_array().and_then(|a| a.first()).unwrap_or_else(|| panic!("{d} has a fix, and none is offered"));
+        assert_eq!((action["kind"].as_str(), action["isPreferred"].as_bool()), (Some("quickfix"), Some(true)));
+        assert_eq!(action["diagnostics"][0]["code"], d["code"]);
+        let after = c.edited(&uri, &action["edit"]);
+        let line = d["range"]["start"]["line"].as_u64().expect("a line") as usize;
+        fixed.push(format!("{}: {}", action["title"].as_str().unwrap_or(""), after.lines().nth(line).unwrap_or("")));
+    }
+    assert_eq!(fixed, ["Write the digit 0: G1 X0", "Write a decimal point: G1 X1.5", "Close the comment: (end)"]);
+    // With all of them in place nothing is left to say.
+    c.edit(&uri, "XO\nG1 X1,5\n(end\n", "X0\nG1 X1.5\n(end)\n");
+    assert_eq!(c.diagnostics(&uri), Vec::<Value>::new());
+    c.shut_down();
+}
+
+#[test]
+fn fixes_of_exchange_files() {
     let text = include_str!("../../../../docs/examples/stepnc/mistakes.p21");
     let mut c = Client::new(&[("a.p21", text)], json!({}));
     let uri = c.open("a.p21", None);

@@ -24,8 +24,8 @@ pub struct Run {
     pub value: Option<(Option<f64>, Option<f64>)>,
     /// A canned cycle made the moves.
     pub cycle: bool,
-    /// Joint values at the end of the block, as people read them: `J1 12.4°`.
-    pub joints: Vec<String>,
+    /// Joint values at the end of the block in words, or why they are not known; may be empty.
+    pub joints: String,
 }
 
 /// What hover needs besides the text.
@@ -246,7 +246,7 @@ pub fn block(run: &Run) -> String {
         lines.push(format!("waits {}", duration(m.totals.seconds())));
     }
     if !run.joints.is_empty() {
-        lines.push(format!("joints at the end: {}", run.joints.join(", ")));
+        lines.push(run.joints.clone());
     }
     lines.push(format!("modes: {}", codes(a).join(" ")));
     lines.join("  \n")

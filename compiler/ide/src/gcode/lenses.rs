@@ -13,13 +13,13 @@ use super::names::{self, label_text};
 use crate::Lens;
 
 /// Lenses of a program that was run. `calls_elsewhere`: calls of a label in other files.
-pub fn lenses(doc: Doc<'_>, program: Option<(&Program, &Report, &Rates)>, calls_elsewhere: &dyn Fn(&str) -> usize) -> Vec<Lens> {
+pub fn lenses(doc: Doc<'_>, program: Option<(&Program, FileId, &Report, &Rates)>, calls_elsewhere: &dyn Fn(&str) -> usize) -> Vec<Lens> {
     let mut found = Vec::new();
-    if let Some((program, report, rates)) = program {
+    if let Some((program, main, report, rates)) = program {
         if report.totals.moves > 0 {
             found.push(Lens { line: 0, text: format!("program: {}", sums(&report.totals, &report.cut)) });
         }
-        for t in report.tools.iter().filter(|t| t.changes > 0 && t.tool > 0 && t.first.file == FileId(0)) {
+        for t in report.tools.iter().filter(|t| t.changes > 0 && t.tool > 0 && t.first.file == main) {
             let changes = if t.changes > 1 { format!(", {} times", t.changes) } else { String::new() };
             found.push(Lens { line: t.first.line, text: format!("T{}: {}{changes}", t.tool, sums(&t.totals, &t.cut)) });
         }
