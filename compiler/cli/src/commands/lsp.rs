@@ -9,7 +9,7 @@ use clap::Parser;
 use gr_canon::{At, Call, CallFrame, FrameId, Mark, Printer, Sink};
 use gr_lsp::Settings;
 use gr_lsp::host::{Host, Made, MadeFile, OutputJob, Plan, Station};
-use gr_text::{Diagnostic, Encoding, FileId};
+use gr_text::{Diagnostic, Encoding, FileId, Span};
 
 use crate::emit::{Artifact, Built, Goal, TargetOptions, build, stem};
 use crate::options::{LintArgs, SetupArgs, UnitArg};
@@ -40,6 +40,25 @@ fn setup_args(settings: &Settings) -> SetupArgs {
     }
 }
 
+/// A finding about something that a project file names, at its name there.
+fn named_in(project: &str, mut d: Diagnostic) -> Diagnostic {
+    let mut at = 0;
+    // Every other piece between quotes is a string.
+    let strings = project.split('"').enumerate().filter_map(|(n, piece)| {
+        let start = at;
+        at += piece.len() + 1;
+        (n % 2 == 1 && !piece.is_empty()).then_some((start, piece))
+    });
+    let named = strings.filter(|(_, s)| d.message.contains(s)).max_by_key(|(_, s)| s.len());
+    let place = named.map(|(start, s)| Span::new(start as u32 - 1, (start + s.len()) as u32 + 1));
+    d.labels.truncate(1);
+    for label in &mut d.labels {
+        label.file = FileId(0);
+        label.span = place.unwrap_or(label.span);
+    }
+    d
+}
+
 /// What programs below a folder are run with, and what is wrong with the files that say so.
 fn own_station(path: &Path, settings: &Settings) -> (crate::setup::Station, Sources, Vec<Diagnostic>) {
     let lints = LintArgs {
@@ -63,11 +82,16 @@ fn own(station: &Station) -> Option<&crate::setup::Station> {
 impl Host for Editor {
     fn station(&self, path: &Path, settings: &Settings) -> Station {
         let (station, sources, found) = own_station(path, settings);
+        let project = station.project.as_ref().and_then(|p| Some((p.path.clone(), crate::sources::read(&p.path).ok()?.text)));
         let found = found.into_iter().filter_map(|d| {
-            let file = sources.get(d.primary().0)?;
-            Some((file.name.clone().into(), file.text.to_string(), d))
+            let own = sources.get(d.primary().0).filter(|f| Path::new(&f.name).is_file());
+            match own {
+                Some(file) => Some((file.name.clone().into(), file.text.to_string(), d)),
+                // A file that is not there, a name that does not exist: told where the project names it.
+                None => project.clone().map(|(path, text)| (path, text.clone(), named_in(&text, d))),
+            }
         });
-        let found = found.filter(|(path, ..): &(std::path::PathBuf, String, Diagnostic)| path.is_file()).collect();
+        let found = found.collect();
         let chosen = settings.dialect.as_deref().and_then(gr_spec::Dialect::find);
         let shared = Arc::new(station);
         let of = shared.clone();
@@ -99,11 +123,7 @@ impl Host for Editor {
             // What its names lead to: dialects, machines, lints and files that are not there. As it is on disk.
             let (_, sources, more) = own_station(path, &Settings::default());
             let here = |d: &Diagnostic| sources.get(d.primary().0).is_none_or(|f| Path::new(&f.name) == path || f.text.is_empty());
-            found.extend(more.into_iter().filter(here).map(|mut d| {
-                d.labels.truncate(1);
-                d.labels.iter_mut().for_each(|l| l.file = FileId(0));
-                d
-            }));
+            found.extend(more.into_iter().filter(here).map(|d| named_in(text, d)));
         }
         found
     }

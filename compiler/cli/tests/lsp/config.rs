@@ -62,14 +62,14 @@ fn project_files() {
 
 #[test]
 fn a_broken_project_is_told_in_its_file() {
-    let mut c = Client::new(&[("gcc-robot.toml", "schema = 1\n[project]\ntools = \"none.tbl\"\ndialect = \"klingon\"\n[[dialects]]\nfiles = \"*\"\ndialect = \"elvish\"\n"), ("a.ngc", "G21\nM2\n")], json!({}));
+    let mut c = Client::new(&[("gcc-robot.toml", "schema = 1\n[project]\ntools = \"none.tbl\"\nmachine = \"klingon/1\"\n[[dialects]]\nfiles = \"*\"\ndialect = \"elvish\"\n"), ("a.ngc", "G21\nM2\n")], json!({}));
     let uri = c.open("a.ngc", None);
     let _ = c.diagnostics(&uri);
     let project = c.uri("gcc-robot.toml");
     let (_, found) = c.found.get(&project).cloned().unwrap_or_else(|| panic!("nothing is said about {project}: {:?}", c.found));
     let mut said: Vec<String> = found.as_array().expect("a list").iter().map(|d| format!("{} {}", d["severity"], c.place(&project, &d["range"]))).collect();
     said.sort();
-    assert_eq!(said, ["1 gcc-robot.toml:3 \"none.tbl\"", "1 gcc-robot.toml:4 \"klingon\"", "1 gcc-robot.toml:7 \"elvish\""]);
+    assert_eq!(said, ["1 gcc-robot.toml:3 \"none.tbl\"", "1 gcc-robot.toml:4 \"klingon/1\"", "1 gcc-robot.toml:7 \"elvish\""]);
     // Put right, they are taken back; the program is read all the same.
     c.write("gcc-robot.toml", "schema = 1\n");
     while c.found.get(&project).is_some_and(|f| f.1 != json!([])) {
