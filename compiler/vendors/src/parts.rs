@@ -104,7 +104,7 @@ impl Lines {
         self.count += 1;
         let limits = &cx.machine.cell.controller;
         let over = |most: Option<u64>, now: u64| most.is_some_and(|m| now > m);
-        if over(limits.lines, self.count) || over(limits.bytes, (self.text.len() - self.marks) as u64) {
+        if over(limits.lines, self.count) || over(limits.bytes, self.text.len().saturating_sub(self.marks) as u64) {
             let most = limits.lines.unwrap_or(0).max(limits.bytes.unwrap_or(0));
             let args = ["more".to_string(), "lines or bytes".into(), most.to_string(), cx.traits.title.into()];
             cx.say(gr_text::code::VENDOR_PROGRAM_TOO_LONG, &args);
