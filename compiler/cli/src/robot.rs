@@ -5,7 +5,6 @@ use gr_accuracy::compensate::{self, Correction};
 use gr_ir::Sources;
 use gr_machine::math::norm;
 use gr_machine::{Kind, Machine};
-use gr_robot::along::is_planned;
 use gr_robot::{Options, Planned, plan};
 use gr_text::Diagnostic;
 use gr_text::figures::{duration, number};
@@ -290,7 +289,7 @@ fn short(v: f64) -> String {
 /// Adds to the findings of a program what the robot has to say, when the program itself is good.
 pub fn ask(name: &str, text: &str, machine: &Machine, setup: &gr_interp::Setup, checked: &mut crate::commands::check::Checked) {
     let bad = checked.found.iter().any(|d| d.severity == gr_text::Severity::Error);
-    if bad || !is_planned(machine) {
+    if bad || !gr_robot::along::is_planned(machine) {
         return;
     }
     let motion = crate::pipeline::motion_of(name, text.to_string(), setup);
@@ -327,7 +326,7 @@ fn too_many(found: &gr_robot::joints::TooMany, texts: &dyn Sources) -> Diagnosti
 
 /// Whether joint-gcode goes through the planner: every robot but the planar arm, which has its own way.
 pub fn plans_joints(goal: &Goal<'_>) -> bool {
-    matches!(goal.options.reference, None | Some(crate::emit::Reference::Usp2009)) && goal.machine.is_some_and(is_planned)
+    matches!(goal.options.reference, None | Some(crate::emit::Reference::Usp2009)) && goal.machine.is_some_and(gr_robot::along::is_planned)
 }
 
 /// Joint positions as LinuxCNC words with inverse time, and both tables.
