@@ -1,7 +1,7 @@
 //! Time of one forward and one inverse solution.
 
 use gr_machine::math::Frame;
-use gr_machine::{Chain, Kinematics, Opw, builtin};
+use gr_machine::{Chain, Opw, builtin};
 
 fn main() {
     divan::main();

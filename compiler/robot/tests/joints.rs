@@ -147,7 +147,7 @@ const WORDS: &str = "T1 M6\nM3 S8000\nM7\nM19 R90 P1 Q3\nM3 S8000\nG0 X10 Y10 Z3
 fn words_keep_their_arguments() {
     let program = planned(WORDS);
     let path = joint_path(&program, &JointOptions::default()).unwrap();
-    let (text, found) = gcode(&program, &path, 3, &Texts::new([(FileId(0), WORDS)]));
+    let (text, _, found) = gcode(&program, &path, 3, &Texts::new([(FileId(0), WORDS)]));
     let words: Vec<&str> = text.lines().filter(|l| !l.starts_with("G1 ")).collect();
     insta::assert_snapshot!("own_words", words.join("\n"));
     // The example's spindle waits for an input with a name.
@@ -170,7 +170,7 @@ fn waits_for_numbered_inputs() {
     program.steps[dwells[0]].action = Action::WaitInput { name: "DI[3]".into(), on: true, timeout: Some(2.5) };
     program.steps[dwells[1]].action = Action::WaitInput { name: "in 4".into(), on: false, timeout: None };
     let path = joint_path(&program, &JointOptions::default()).unwrap();
-    let (text, found) = gcode(&program, &path, 3, &gr_ir::NoSources);
+    let (text, _, found) = gcode(&program, &path, 3, &gr_ir::NoSources);
     assert_eq!(found, []);
     assert!(motion_is_good(&text));
     let words: Vec<&str> = text.lines().filter(|l| l.contains("M66") || l.starts_with('o') || l.contains("did not")).collect();

@@ -162,7 +162,7 @@ fn made(target: &str, planned: Result<Planned, Vec<Diagnostic>>) -> (String, Vec
     let text = match target {
         "joint-gcode" => {
             let path = joint_path(program, &JointOptions::default()).unwrap();
-            let (text, more) = gcode(program, &path, 6, &gr_ir::NoSources);
+            let (text, _, more) = gcode(program, &path, 6, &gr_ir::NoSources);
             found.extend(short(more));
             text
         }
