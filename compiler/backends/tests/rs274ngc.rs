@@ -402,6 +402,18 @@ fn no_start_inside_a_cycle() {
 }
 
 #[test]
+fn a_restart_keeps_a_length_that_no_table_knows() {
+    for asked in ["G43 H3", "G43"] {
+        let text = format!("G21 G90 G17\nT3 M6\n{asked}\nS1000 M3\nF100\nG0 X0 Y0 Z5\nG1 Z-1\nG1 X10\nM5\nM2\n");
+        let texts = Texts::new([(FileId(0), text.as_str())]);
+        let restart = from_line::from_line(&run(&text), FileId(0), 8, &from_line::Options::default(), &texts).expect("a start");
+        let o = Options { tools: Vec::new(), ..options(Language::Linuxcnc) };
+        let written = emit(&restart.program, &o, &texts).expect("written").text;
+        assert!(written.contains(&format!("{asked}\n")) && !written.contains("G49"), "{written}");
+    }
+}
+
+#[test]
 fn rows_of_the_registry() {
     let mut tried = 0;
     for row in gr_spec::Code::all().map(gr_spec::Code::def) {

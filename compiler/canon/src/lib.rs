@@ -290,6 +290,8 @@ pub trait Sink {
     fn mark(&mut self, _at: &At<'_>, _mark: &Mark) {}
     /// Text of `(PRINT,…)`, for standard output.
     fn print(&mut self, _text: &str) {}
+    /// Comes every few thousand blocks, also from loops that only compute: who watches over a run may break it off here.
+    fn give_way(&mut self) {}
 }
 
 /// Drops everything (for checks and timing).
@@ -311,5 +313,8 @@ impl<S: Sink + ?Sized> Sink for &mut S {
     }
     fn print(&mut self, text: &str) {
         (**self).print(text);
+    }
+    fn give_way(&mut self) {
+        (**self).give_way();
     }
 }

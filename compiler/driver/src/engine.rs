@@ -153,6 +153,9 @@ impl<S: Sink> Sink for LastLine<S> {
     fn print(&mut self, text: &str) {
         self.inner.print(text);
     }
+    fn give_way(&mut self) {
+        self.inner.give_way();
+    }
 }
 
 /// State before the first block of a program that begins with `%` or not.
@@ -344,10 +347,10 @@ impl<S: Sink> Sink for Watch<'_, S> {
         }
         self.inner.call(at, call);
     }
+    fn give_way(&mut self) {
+        self.db.unwind_if_revision_cancelled();
+    }
     fn frame(&mut self, id: FrameId, frame: &CallFrame) {
-        if id.0 % 4096 == 0 {
-            self.db.unwind_if_revision_cancelled();
-        }
         if self.frames.len() < MOST_FRAMES {
             self.frames.push((id, frame.clone()));
         }

@@ -68,10 +68,10 @@ impl Sink for Watch<'_> {
         }
         self.lowering.call(at, call);
     }
+    fn give_way(&mut self) {
+        self.db.unwind_if_revision_cancelled();
+    }
     fn frame(&mut self, id: FrameId, frame: &CallFrame) {
-        if id.0 % 4096 == 0 {
-            self.db.unwind_if_revision_cancelled();
-        }
         self.lowering.frame(id, frame);
     }
     fn mark(&mut self, at: &At<'_>, mark: &Mark) {

@@ -1,7 +1,7 @@
 //! Incremental = from scratch: whatever the chunk size and the order of edits, the answers are those of a fresh
 //! session over the same text.
 
-use gr_driver::{Check, Options, Session};
+use gr_driver::{Cancelled, Check, Options, Session};
 use gr_interp::Setup;
 use gr_text::Diagnostic;
 use proptest::prelude::*;
@@ -431,19 +431,27 @@ fn visible_lines_first() {
 
 #[test]
 fn an_edit_cancels_a_snapshot() {
-    let text = program(200_000);
-    let mut session = Session::new();
-    let file = session.open("part.ngc", &text, options(100));
-    let snapshot = session.snapshot();
-    let worker = std::thread::spawn(move || {
-        let result = snapshot.check(file);
-        drop(snapshot);
-        result
-    });
-    session.edit(file, 0..0, "G91\n");
-    // Either it was done already, or it was cut short; it never blocks the edit.
-    let _ = worker.join().expect("no panic comes out of a snapshot");
-    assert_eq!(session.check(file), scratch(&session.text(file).unwrap(), 1024));
+    // Minutes of work within the budgets, none of it motion.
+    for block in ["#3=[#3+1]", "#4=SIN[#3]"] {
+        let section = |n: usize| format!("o{n} repeat [18]\no{} repeat [900000]\n{block}\no{0} endrepeat\no{n} endrepeat\n", n + 1);
+        let text: String = "G21\n#3=0\n".to_string() + &(1..40).map(|i| section(2 * i)).collect::<String>() + "M2\n";
+        let mut session = Session::new();
+        let file = session.open("part.ngc", &text, options(100));
+        let snapshot = session.snapshot();
+        let worker = std::thread::spawn(move || {
+            let result = snapshot.check(file);
+            drop(snapshot);
+            result
+        });
+        let begun = std::time::Instant::now();
+        while session.executed().flows == 0 && begun.elapsed().as_secs() < 60 {
+            std::thread::sleep(std::time::Duration::from_millis(1));
+        }
+        session.edit(file, 0..text.len() as u32, "G21\nG0 X1\nM2\n");
+        let cut_short = worker.join().expect("no panic comes out of a snapshot");
+        assert_eq!(cut_short, Err(Cancelled), "{block}");
+        assert_eq!(session.check(file), scratch("G21\nG0 X1\nM2\n", 1024));
+    }
 }
 
 /// Found by the properties above.

@@ -70,6 +70,9 @@ impl<S: Sink> Interp<'_, S> {
     /// Budgets end what goes around and around. A program that comes on line by line may be as long as it likes.
     #[inline]
     pub(crate) fn check_budgets(&mut self) -> Res {
+        if self.blocks.is_multiple_of(4096) {
+            self.sink.give_way();
+        }
         let (blocks, calls) = (self.blocks - self.spent.0, self.emitted - self.spent.1);
         if blocks > self.setup.budgets.blocks || calls > self.setup.budgets.calls {
             return self.over_budget(blocks);

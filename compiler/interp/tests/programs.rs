@@ -221,6 +221,34 @@ fn file_subroutines_and_remaps() {
     assert_eq!(moves, ["3.0000, 0.0000, 0.0000", "3.0000, 7.0000, 0.0000", "3.0000, 7.0000, 4.0000"]);
 }
 
+#[test]
+fn python_parts_of_remaps_are_told_and_left_out() {
+    let mut setup = setup();
+    let remaps = [
+        "M400 modalgroup=10 argspec=P prolog=a ngc=foo",
+        "M401 modalgroup=10 python=b",
+        "M6 modalgroup=6 prolog=change_prolog ngc=change epilog=change_epilog",
+    ];
+    setup.ini.values.insert(("rs274ngc".into(), "remap".into()), remaps.map(String::from).to_vec());
+    let run = |setup: &Setup| {
+        let mut files = Memory::default()
+            .add("main.ngc", "M400 P3\nM401\nT1 M6\nM2\n", setup, 1)
+            .add("foo.ngc", "o<foo> sub\nG0 X#<p>\no<foo> endsub\n", setup, 9)
+            .add("change.ngc", "o<change> sub\nG0 Y#<selected_tool>\no<change> endsub\n", setup, 9);
+        let mut printer = Printer::new(Vec::new(), Version::V2_9);
+        let outcome = Interp::new(&mut files, setup, &mut printer).run(FileId(0));
+        (String::from_utf8(printer.finish().expect("a vector takes everything")).expect("text"), outcome)
+    };
+    let (out, outcome) = run(&setup);
+    assert!(outcome.findings.iter().all(|f| f.fault.code == code::REMAP_PYTHON), "{:?}", outcome.findings);
+    assert_eq!(outcome.findings.len(), 3);
+    let after = out.split("STRAIGHT_TRAVERSE(3.0000, 1.0000").nth(1).expect("the subroutine knows the tool");
+    assert!(after.contains("CHANGE_TOOL(1)"), "{out}");
+    // The real command without Python knows no such code.
+    setup.without_python = false;
+    assert!(!run(&setup).1.ok());
+}
+
 fn run_fanuc(id: &str, text: &str) -> (Vec<String>, Outcome) {
     let dialect = Dialect::find(id).expect("a dialect of the tables");
     let setup = Setup { dialect, uvw: true, ..setup() };
