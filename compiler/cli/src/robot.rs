@@ -100,7 +100,7 @@ fn job(path: &std::path::Path, machine: &Machine) -> Result<Vec<gr_robot::Setup>
         }
         let placed = gr_machine::math::Frame::new(c.position, c.rotation.map(f64::to_radians));
         let from_line = c.from_line.map(|l| l.saturating_sub(1));
-        Ok(gr_robot::Setup { name: c.name, from_line, workingsteps: c.workingsteps, part: machine.cell.table.then(&placed) })
+        Ok(gr_robot::Setup { name: c.name, from_line, workingsteps: c.workingsteps, part: machine.cell.carried(machine.cell.table.then(&placed)) })
     };
     job.setup.into_iter().map(setup).collect()
 }

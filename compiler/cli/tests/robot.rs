@@ -134,3 +134,29 @@ fn joint_targets_drop_nothing() {
     assert_eq!(bad.status.code(), Some(2));
     assert!(text(&bad.stderr).contains("every number is the nearest one"), "{}", text(&bad.stderr));
 }
+
+/// A URDF becomes a machine file that `machine check` takes; one that is none is refused in words.
+#[test]
+fn machine_import() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_string_lossy().into_owned();
+    let mut urdf = String::from("<?xml version=\"1.0\"?>\n<robot name=\"made\">\n<link name=\"l0\"/>\n");
+    for (i, (z, axis)) in [(0.4, "0 0 1"), (0.1, "0 1 0"), (0.5, "0 1 0"), (0.1, "1 0 0"), (0.4, "0 1 0"), (0.1, "1 0 0")].iter().enumerate() {
+        let n = i + 1;
+        urdf += &format!(
+            "<link name=\"l{n}\"/>\n<joint name=\"j{n}\" type=\"revolute\"><parent link=\"l{i}\"/><child link=\"l{n}\"/>\
+             <origin xyz=\"0 0 {z}\" rpy=\"0 0 0\"/><axis xyz=\"{axis}\"/><limit lower=\"-3\" upper=\"3\" effort=\"1\" velocity=\"2\"/></joint>\n"
+        );
+    }
+    std::fs::write(path("made.urdf"), urdf + "</robot>\n").unwrap();
+    let made = run(&["machine", "import", &path("made.urdf"), "--id", "shop/made", "-o", &path("made.toml")]);
+    assert!(made.status.success(), "{}", text(&made.stderr));
+    let checked = run(&["machine", "check", &path("made.toml")]);
+    assert!(checked.status.success(), "{}{}", text(&checked.stdout), text(&checked.stderr));
+    let shown = text(&run(&["machine", "show", &path("made.toml")]).stdout);
+    assert!(shown.starts_with("shop/made") && shown.contains("j6"), "{shown}");
+    std::fs::write(path("none.urdf"), "<robot name=\"x\"><link").unwrap();
+    let refused = run(&["machine", "import", &path("none.urdf"), "--id", "shop/none", "-o", &path("none.toml")]);
+    assert!(!refused.status.success() && text(&refused.stderr).contains("none.urdf"), "{}", text(&refused.stderr));
+    assert!(!folder.path().join("none.toml").exists());
+}

@@ -1,7 +1,7 @@
 //! What surrounds the joints of a machine: tools, frames, spindle, signals, external axes, controller.
 
-use crate::math::Frame;
-use crate::{Joint, short};
+use crate::math::{Frame, about, rotate, scale, sub};
+use crate::{Joint, JointKind, short};
 use std::collections::BTreeMap;
 
 /// Everything a machine file says besides joints and kinematics.
@@ -80,6 +80,21 @@ pub struct External {
     pub axis: [f64; 3],
     /// A point on it, mm.
     pub point: [f64; 3],
+    /// Where it stands while a program runs, mm or rad.
+    pub position: f64,
+}
+
+impl External {
+    /// What it does to the things in the cell, seen from the machine's base.
+    fn motion(&self) -> Frame {
+        let moved = if self.joint.kind == JointKind::Revolute {
+            let turn = about(self.axis, self.position);
+            Frame { turn, position: sub(self.point, rotate(&turn, self.point)) }
+        } else {
+            Frame::shift(scale(self.axis, self.position))
+        };
+        if self.carries_machine { moved.inverse() } else { moved }
+    }
 }
 
 /// The controller counts a joint together with another: its value = joint + factor · with.
@@ -161,7 +176,12 @@ impl Cell {
     }
     /// The part's frame in the base.
     pub fn part_in_base(&self) -> Frame {
-        self.table.then(&self.part)
+        self.carried(self.table.then(&self.part))
+    }
+    /// A frame of the cell as the base sees it while rails and positioners stand where the file says. The file gives
+    /// frames for all of them at 0.
+    pub fn carried(&self, frame: Frame) -> Frame {
+        self.external.iter().rev().fold(frame, |f, e| e.motion().then(&f))
     }
     /// Tool point on the flange: spindle, then tool. An unknown tool is the spindle's nose.
     pub fn tool_frame(&self, number: u32) -> Frame {
@@ -195,7 +215,8 @@ impl Cell {
         for e in &self.external {
             let limit = |v: Option<f64>| v.map_or("no limit".into(), |v| e.joint.show(v));
             let what = if e.carries_machine { "carries the machine" } else { "carries the part" };
-            out += &format!("external axis {}: from {} to {}, {what}\n", e.joint.name, limit(e.joint.min), limit(e.joint.max));
+            let here = e.joint.show(e.position);
+            out += &format!("external axis {}: from {} to {}, {what}, stands at {here}\n", e.joint.name, limit(e.joint.min), limit(e.joint.max));
         }
         if let (Some(c), true) = (&self.coupling, !joints.is_empty()) {
             let name = |i: usize| joints.get(i).map_or("", |j| j.name.as_str());

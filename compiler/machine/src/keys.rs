@@ -142,6 +142,7 @@ static EXTERNAL: &[Key] = &[
     key("point", Numbers(3), "A point on it, mm."),
     key("min", Number, "Lower limit, mm or degrees."),
     key("max", Number, "Upper limit, mm or degrees."),
+    key("position", Number, "Where it stands while a program runs, mm or degrees; else 0 or the limit nearest to it."),
     key("speed", Number, "Greatest speed."),
     key("rapid", Number, "Speed of a rapid move."),
     key("acceleration", Number, "Greatest acceleration."),

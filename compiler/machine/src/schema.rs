@@ -561,7 +561,19 @@ impl Check {
             self.value(&e.span, "`axis` has no length");
             return None;
         }
+        let revolute = joint.kind == JointKind::Revolute;
+        let (low, high) = (joint.min.unwrap_or(f64::NEG_INFINITY), joint.max.unwrap_or(f64::INFINITY));
+        let mut position = 0f64.max(low).min(high);
+        if let Some(node) = e.get("position")
+            && let Some(given) = node.number()
+        {
+            position = if revolute { given.to_radians() } else { given };
+            if position < low || position > high {
+                self.value(&node.span, format!("position {given} is outside of the limits"));
+            }
+        }
         Some(External {
+            position,
             joint,
             carries_machine: e.string("carries").as_deref() == Some("machine"),
             axis: scale(axis, 1.0 / norm(axis)),

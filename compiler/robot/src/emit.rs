@@ -47,9 +47,7 @@ impl<'a> Emit<'a> {
         for (slot, j) in speeds.iter_mut().zip(&machine.joints) {
             *slot = j.speed.unwrap_or(f64::INFINITY);
         }
-        let external = machine.cell.external.iter().map(|e| {
-            0f64.max(e.joint.min.unwrap_or(f64::NEG_INFINITY)).min(e.joint.max.unwrap_or(f64::INFINITY))
-        });
+        let external = machine.cell.external.iter().map(|e| e.position);
         Emit {
             machine,
             solver,

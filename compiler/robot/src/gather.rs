@@ -477,7 +477,7 @@ impl<'a> Gather<'a> {
         let any = (1..=9).find(|n| places(work_name(*n)).is_some());
         let placed = match (places(name), any, placement) {
             (_, _, Some(p)) => p.part,
-            (Some(frame), _, _) => *frame,
+            (Some(frame), _, _) => self.machine.cell.carried(*frame),
             (None, Some(n), _) => {
                 self.findings.say(code::ROBOT_UNKNOWN_FRAME, Some(self.source), &[name.into(), work_name(n).into()]);
                 return None;

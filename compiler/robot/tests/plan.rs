@@ -50,6 +50,33 @@ fn told(p: &Planned) -> String {
     out
 }
 
+/// A rail moves the part the other way, a positioner turns it; both stand in every target.
+#[test]
+fn rails_and_positioners_stand_where_the_file_says() {
+    let text = "G21 G90\nT1 M6\nG43 H1\nG0 X10 Y10 Z20\nG1 Z0 F600\nX40\nM30\n";
+    let file = include_str!("../../../docs/examples/irb2400-cell.toml");
+    let machine = |part: &str, more: &str| {
+        let text = file.replace("position = [0, 0, 50]", part) + more;
+        gr_machine::parse(FileId(0), &text).unwrap_or_else(|e| panic!("{}", messages(&e, &text)))
+    };
+    let joints = |m: &Machine| planned(text, m).unwrap_or_else(|e| panic!("{}", messages(&e, text))).program.targets;
+    let plain = joints(&machine("position = [100, -50, 50]", ""));
+    let rail = "\n[[external]]\nname = \"E1\"\ntype = \"prismatic\"\ncarries = \"machine\"\naxis = [1, 0, 0]\nmin = 0\nmax = 3000\nposition = 700\n";
+    let table = "\n[[external]]\nname = \"E2\"\ntype = \"revolute\"\ncarries = \"part\"\npoint = [1600, 0, 0]\nposition = 180\n";
+    let moved = joints(&machine("position = [800, -50, 50]", rail));
+    // Half a turn about X 1600 of the part that stood at 1600, 50 from the base, and turned by half a turn itself.
+    let both = joints(&machine("position = [700, 250, 50]\nrotation = [0, 0, 180]", &format!("{rail}{table}")));
+    assert_eq!(plain.len(), moved.len());
+    for ((p, m), b) in plain.iter().zip(&moved).zip(&both) {
+        assert!((0..6).all(|i| (p.joints[i] - m.joints[i]).abs() < 1e-9), "{p:?} {m:?}");
+        assert!((m.joints[6] - 700.0).abs() < 1e-12 && (b.joints[6] - 700.0).abs() < 1e-12);
+        assert!((b.joints[7] - std::f64::consts::PI).abs() < 1e-12);
+    }
+    let beyond = file.to_string() + &rail.replace("700", "7000");
+    let found = gr_machine::parse(FileId(0), &beyond).expect_err("beyond its travel");
+    assert!(found[0].message.contains("outside of the limits"), "{found:?}");
+}
+
 #[test]
 fn the_example_part() {
     let text = include_str!("../../../docs/examples/bracket.ngc");
