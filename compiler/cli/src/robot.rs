@@ -336,9 +336,6 @@ pub fn joint_gcode(motion: &Motion, goal: &Goal<'_>, texts: &dyn Sources, name: 
     if o.interval.is_some_and(|t| !(t > 0.0)) {
         return Err("--interval must be above zero".into());
     }
-    if o.round == Some(crate::emit::RoundArg::Truncate) {
-        return Err("--round truncate is for the planar arm and for --reference ufmg2008; here every number is the nearest one".into());
-    }
     let (planned, corrected) = match own_plan(motion, goal, texts, name)? {
         Ok(planned) => planned,
         Err(found) => return Ok(Err(found)),

@@ -174,6 +174,8 @@ fn what_a_robot_cannot_do() {
     told("E0534", std::slice::from_ref(&part), "build a.ngc --machine comau/tricept806 --target pdl2 -o o/");
     let slow = file("a.ngc", "G21 G90 F0.0001\nT1 M6 G43 H1\nG0 X40 Y10 Z25\nG1 X400\nM2\n");
     told("E0537", &[slow, shipped.clone()], "build a.ngc --machine cell.toml --target setpoints -o o/");
+    let round = file("a.ngc", &format!("{TOOL}G64 P0.05\nG0 X40 Y30 Z25\nG1 Z2\nX60\nY40\nM2\n"));
+    told("E0638", &[round, shipped.clone()], "build a.ngc --machine cell.toml --target setpoints -o o/");
     told("E0704", &[part, shipped], &format!("{rapid} --compensate"));
     let huge = file("a.ngc", "G21 G90 F100\nG0 X0 Y0 Z0\nG1 X9000\nG1 Y9000\nM2\n");
     told("E0705", &[huge], "place a.ngc --machine abb/irb2400");

@@ -132,7 +132,7 @@ fn joint_targets_drop_nothing() {
     assert!(events.contains("\"T2 M6\",\"ChangeTool\"") && events.contains("\"S12000\",\"aoSpindleSpeed = 12000\""), "{events}");
     let bad = run(&["build", PART, "--machine", CELL, "--target", "joint-gcode", "--round", "truncate", "-o", out.to_str().unwrap()]);
     assert_eq!(bad.status.code(), Some(2));
-    assert!(text(&bad.stderr).contains("every number is the nearest one"), "{}", text(&bad.stderr));
+    assert!(text(&bad.stderr).contains("--round does nothing for the target joint-gcode"), "{}", text(&bad.stderr));
 }
 
 /// A URDF becomes a machine file that `machine check` takes; one that is none is refused in words.

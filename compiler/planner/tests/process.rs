@@ -201,3 +201,12 @@ proptest::proptest! {
         proptest::prop_assert!(planned.is_none() == (!codes(&out).is_empty()));
     }
 }
+
+#[test]
+fn steps_that_no_workplan_has_are_told() {
+    let (p, out) = read(&with("#58", ""));
+    assert_eq!(ids(&p), [58]);
+    let orphans: Vec<&Diagnostic> = out.iter().filter(|d| d.code == code::PLAN_ORPHAN_STEP).collect();
+    assert_eq!(orphans.len(), 1, "{out:?}");
+    assert!(orphans[0].message.contains("#47"), "{}", orphans[0].message);
+}

@@ -153,6 +153,7 @@ fn words_keep_their_arguments() {
     // The example's spindle waits for an input with a name.
     let told: Vec<&str> = found.iter().map(|d| d.message.as_str()).collect();
     assert_eq!(told, ["the wait for the input `diSpindleAtSpeed` isn't written: LinuxCNC knows inputs by number only"]);
+    assert_eq!(found[0].code.def().slug, "robot/input-name");
     assert!(motion_is_good(&text));
 }
 

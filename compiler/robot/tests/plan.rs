@@ -304,3 +304,36 @@ fn what_a_robot_does_not_do() {
     }
     insta::assert_snapshot!("what_a_robot_does_not_do", out);
 }
+
+/// Where the parallel machine's joints are within their limits but the mechanism is not.
+#[test]
+fn a_point_breaks_a_condition() {
+    let machine = builtin("usp/2ups-prp").unwrap();
+    let k = machine.kinematics();
+    let broken = |x: f64, y: f64, z: f64| {
+        let pose = gr_machine::Pose { position: [x, y, z], rotation: [0.0; 3] };
+        k.inverse(&pose).is_ok_and(|all| {
+            all.iter().any(|s| machine.outside(&s.joints).is_empty()) && all.iter().all(|s| !k.violations(&s.joints).is_empty())
+        })
+    };
+    let grid = (0..=640).step_by(40).flat_map(|z| (0..1400).step_by(20).flat_map(move |x| (-600..=600).step_by(100).map(move |y| [x, y, z].map(f64::from))));
+    let all: Vec<[f64; 3]> = grid.filter(|p| broken(p[0], p[1], p[2])).collect();
+    let told: Vec<String> = all.iter().take(20).map(|[x, y, z]| faults(&format!("G0 X{x} Y{y} Z{z}\nG1 X{x} Y{y} Z{} F500\nM30\n", z + 1.0), &machine)).collect();
+    let named = told.iter().find(|t| t.contains("E0531 line 1: this point breaks the condition `"));
+    assert!(named.is_some(), "{} places: {told:?}", all.len());
+}
+
+/// Further and further out, the last place that the arm reaches is next to its stretched position.
+#[test]
+fn close_to_singular_is_told() {
+    let text = "format = 1\nid = \"shop/far\"\nextends = \"abb/irb2400\"\n[home]\njoints = [0, 0, 0, 0, 30, 0]\n[[joint]]\nname = \"J3\"\nmin = -170\nmax = 170\n";
+    let machine = gr_machine::parse(FileId(0), text).unwrap();
+    let program = |x: f64| format!("G0 X{x:.4} Y0 Z700\nG1 Z699 F500\nM30\n");
+    let (mut good, mut bad) = (900.0, 4000.0);
+    for _ in 0..14 {
+        let x = (good + bad) / 2.0;
+        if planned(&program(x), &machine).is_ok() { good = x } else { bad = x }
+    }
+    let told = faults(&program(good), &machine);
+    assert!(told.contains("E0527") && told.contains("comes close to a singular position: the arm is stretched but for "), "{told}");
+}
