@@ -319,16 +319,16 @@ impl Source {
             code::SYNTAX_BAD_CHARACTER if written(span)? == "," => {
                 let digit = |s: Option<&str>| s.is_some_and(|s| s.bytes().all(|b| b.is_ascii_digit()));
                 let between = digit(written(Span::new(span.start.checked_sub(1)?, span.start))) && digit(written(Span::new(span.end, span.end + 1)));
-                (between.then(|| "Write a decimal point".to_string())?, span, ".".into())
+                (between.then(|| "write a decimal point".to_string())?, span, ".".into())
             }
-            code::COMMENT_UNCLOSED => ("Close the comment".into(), here, ")".into()),
+            code::COMMENT_UNCLOSED => ("close the comment".into(), here, ")".into()),
             code::EXPRESSION_UNKNOWN_FUNCTION => {
                 let digit = match written(span)? {
                     "O" | "o" => "0",
                     "l" | "I" => "1",
                     _ => return None,
                 };
-                (format!("Write the digit {digit}"), span, digit.into())
+                (format!("write the digit {digit}"), span, digit.into())
             }
             _ => return None,
         })

@@ -436,7 +436,9 @@ fn an_edit_cancels_a_snapshot() {
         let section = |n: usize| format!("o{n} repeat [18]\no{} repeat [900000]\n{block}\no{0} endrepeat\no{n} endrepeat\n", n + 1);
         let text: String = "G21\n#3=0\n".to_string() + &(1..40).map(|i| section(2 * i)).collect::<String>() + "M2\n";
         let mut session = Session::new();
-        let file = session.open("part.ngc", &text, options(100));
+        let mut patient = options(100);
+        patient.setup.budgets = gr_interp::Budgets::default();
+        let file = session.open("part.ngc", &text, patient);
         let snapshot = session.snapshot();
         let worker = std::thread::spawn(move || {
             let result = snapshot.check(file);

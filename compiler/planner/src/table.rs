@@ -296,7 +296,7 @@ fn technology(o: &Operation) -> String {
 }
 
 fn number(v: f64) -> String {
-    gr_text::figures::number(v, 4)
+    gr_text::figures::exact(v)
 }
 
 fn list(v: &[f64]) -> String {
@@ -308,7 +308,7 @@ fn quoted(s: &str) -> String {
     format!("'{s}'")
 }
 
-/// The plan as JSON: the same facts, numbers to nine decimals.
+/// The plan as JSON: the same facts.
 pub fn json(process: &Process, tools: &[Tool]) -> String {
     let steps: Vec<String> = process.steps().into_iter().map(step_json).collect();
     let tools: Vec<String> = tools.iter().map(tool_json).collect();
@@ -354,7 +354,7 @@ fn tool_json(t: &Tool) -> String {
 }
 
 fn real(v: f64) -> String {
-    if v.is_finite() { (libm::round(v * 1e9) / 1e9 + 0.0).to_string() } else { "null".into() }
+    if v.is_finite() { number(v) } else { "null".into() }
 }
 fn option(v: Option<f64>) -> String {
     v.map_or("null".into(), real)

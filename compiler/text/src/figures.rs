@@ -11,6 +11,16 @@ pub fn number(value: f64, places: usize) -> String {
     if text == "-0" { "0".into() } else { text.into() }
 }
 
+/// All digits of a value, but for what a conversion of units leaves in the last ones: 11.819851171331011, and 30 for
+/// 29.999999999999996.
+pub fn exact(value: f64) -> String {
+    let near = number(value, 9);
+    match near.parse::<f64>() {
+        Ok(v) if (v - value).abs() <= 1e-13 * value.abs().max(1.0) => near,
+        _ => value.to_string(),
+    }
+}
+
 /// Seconds: `0.42 s`, `12.5 s`, `3 min 7 s`, `1 h 02 min`.
 pub fn duration(seconds: f64) -> String {
     let whole = seconds.round() as u64;
@@ -30,6 +40,7 @@ mod tests {
     fn as_people_read_them() {
         let numbers = [(29.999999999999996, 4), (0.5, 3), (-0.00001, 3), (1200.0, 0), (f64::INFINITY, 2)];
         assert_eq!(numbers.map(|(v, p)| number(v, p)), ["30", "0.5", "0", "1200", "inf"]);
+        assert_eq!([29.999999999999996, 11.819851171331011, -0.0, 0.1 + 0.2].map(exact), ["30", "11.819851171331011", "0", "0.3"]);
         let times = [0.0, 0.416, 37.74, 59.96, 187.0, 3725.0, 100_000.0];
         assert_eq!(times.map(duration), ["0 s", "0.42 s", "37.7 s", "1 min 0 s", "3 min 7 s", "1 h 02 min", "27 h 46 min"]);
     }

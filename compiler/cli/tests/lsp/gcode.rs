@@ -391,7 +391,7 @@ fn fixes_of_diagnostics() {
         let line = d["range"]["start"]["line"].as_u64().expect("a line") as usize;
         fixed.push(format!("{}: {}", action["title"].as_str().unwrap_or(""), after.lines().nth(line).unwrap_or("")));
     }
-    assert_eq!(fixed, ["Write the digit 0: G1 X0", "Write a decimal point: G1 X1.5", "Close the comment: (end)"]);
+    assert_eq!(fixed, ["write the digit 0: G1 X0", "write a decimal point: G1 X1.5", "close the comment: (end)"]);
     // With all of them in place nothing is left to say.
     c.edit(&uri, "XO\nG1 X1,5\n(end\n", "X0\nG1 X1.5\n(end)\n");
     assert_eq!(c.diagnostics(&uri), Vec::<Value>::new());

@@ -4,7 +4,7 @@ use gr_canon::Units;
 use gr_gcode::{FormatOptions, Form, Renumber};
 use gr_interp::{Modal, Side};
 use gr_ir::geometry::ArcShape;
-use gr_ir::{Op, Program};
+use gr_ir::{Op, PathMode, Program};
 use gr_text::Span;
 
 use super::doc::{Doc, LineOf, code_name, number};
@@ -135,6 +135,7 @@ pub fn write_moves(program: &Program, before: &Modal) -> Option<String> {
     let mut lines: Vec<String> = Vec::new();
     let mut code = "";
     let mut told_feed = before.feed;
+    let mut path = before.path_mode;
     if before.incremental != 0 {
         lines.push("G90".into());
     }
@@ -165,6 +166,22 @@ pub fn write_moves(program: &Program, before: &Modal) -> Option<String> {
                 lines.push(format!("G4 P{}", number(s, 3)));
                 continue;
             }
+            // Cycles keep to the exact path and give back what was in force.
+            Op::PathMode(mode) => {
+                let (new, text) = match mode {
+                    PathMode::ExactPath => (0, "G61".to_string()),
+                    PathMode::ExactStop => (1, "G61.1".into()),
+                    PathMode::Blend(_) if before.naivecam != 0.0 => return None,
+                    PathMode::Blend(0.0) => (2, "G64".into()),
+                    PathMode::Blend(t) => (2, format!("G64 P{}", number(t / scale, places))),
+                };
+                if new != path {
+                    lines.push(text);
+                }
+                path = new;
+                continue;
+            }
+            Op::MergeTolerance(0.0) => continue,
             Op::Begin { .. } | Op::Close(_) | Op::Finish | Op::Feed { .. } | Op::FeedReferenceXyz => continue,
             Op::Note(gr_ir::Note::Comment, _) => continue,
             Op::Units(units) if units == before.units() => continue,
