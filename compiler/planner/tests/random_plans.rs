@@ -454,26 +454,18 @@ proptest! {
     }
 }
 
-/// Many plans, all findings: for looking into them. `PROPTEST_RNG_SEED` takes others.
+/// A planner that refuses everything would gouge nothing: of the plans that are sound, most are planned.
 #[test]
-#[ignore = "a survey, not a check"]
-fn survey() {
+fn most_plans_are_planned() {
     use proptest::strategy::ValueTree;
-    let mut seed = [7; 32];
-    let number = std::env::var("PROPTEST_RNG_SEED").ok().and_then(|n| n.parse::<u64>().ok()).unwrap_or(0);
-    seed[..8].copy_from_slice(&number.to_le_bytes());
-    let mut runner = proptest::test_runner::TestRunner::new_with_rng(
-        ProptestConfig::default(),
-        proptest::test_runner::TestRng::from_seed(proptest::test_runner::RngAlgorithm::ChaCha, &seed),
-    );
+    let seed = proptest::test_runner::TestRng::from_seed(proptest::test_runner::RngAlgorithm::ChaCha, &[7; 32]);
+    let mut runner = proptest::test_runner::TestRunner::new_with_rng(ProptestConfig::default(), seed);
     let mut counts = std::collections::BTreeMap::new();
     for _ in 0..cases() {
         let plan = plan().new_tree(&mut runner).expect("a plan").current();
-        let found = std::panic::catch_unwind(|| check(&plan)).unwrap_or_else(|_| Err("panic".into()));
-        if let Err(e) = &found {
-            println!("FOUND {e} {plan:?}");
-        }
-        *counts.entry((plan.kind, found.unwrap_or("bad"))).or_insert(0) += 1;
+        let found = check(&plan).unwrap_or_else(|e| panic!("{e} {plan:?}"));
+        *counts.entry(found).or_insert(0_u32) += 1;
     }
-    println!("{counts:?}");
+    let of = |name: &str| counts.get(name).copied().unwrap_or(0);
+    assert!(10 * of("good") >= 6 * (of("good") + of("refused")), "{counts:?}");
 }
