@@ -1,17 +1,18 @@
 //! The thread that owns the database: applies what the client says in the order it was said, hands out views to
 //! workers, and has diagnostics found when nothing else is waiting.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicI32, Ordering};
+use std::sync::atomic::Ordering;
 use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
 
 use gr_driver::Session;
 use gr_text::{Diagnostic, Span};
 use tower_lsp::ls_types as lsp;
 
+use crate::closed::{Closed, Looked};
 use crate::documents::{Document, Kind, OpenFile, View, kind_of};
 use crate::host::{Host, Station};
 use crate::protocol;
@@ -39,16 +40,24 @@ pub enum Message {
     Ask { uri: lsp::Uri, work: Box<dyn FnOnce(Option<View>) + Send> },
     /// A question about the server.
     AskAll { work: Box<dyn FnOnce(&Analysis) + Send> },
+    /// What was found in programs of the folders that are not open; `known` names what the client has.
+    AskClosed { known: BTreeMap<lsp::Uri, String>, work: Box<dyn FnOnce(Vec<lsp::WorkspaceDocumentDiagnosticReport>) + Send> },
+    /// A program that is not open was looked at.
+    Closed { path: PathBuf, found: Looked },
     /// Diagnostics of the lines around the last edit were found; those of the rest follow.
     Early { uri: lsp::Uri, version: i32, lines: Range<u32>, found: Vec<Diagnostic> },
     /// Diagnostics of a version were found.
     Found { uri: lsp::Uri, version: i32, found: Option<Arc<Vec<Diagnostic>>> },
+    /// Looking for diagnostics of a version broke off by a mistake of the server.
+    Failed { uri: lsp::Uri, version: i32 },
 }
 
 /// What goes to the client without being asked for.
 pub enum Event {
-    /// Diagnostics of a document.
-    Diagnostics { uri: lsp::Uri, version: Option<i32>, diagnostics: Vec<lsp::Diagnostic> },
+    /// Diagnostics of a document, which is open or was.
+    Diagnostics { uri: lsp::Uri, version: Option<i32>, diagnostics: Vec<lsp::Diagnostic>, open: bool },
+    /// Something for the user to read.
+    Say(lsp::MessageType, String),
     /// Diagnostics of a version are out.
     Analysed { uri: lsp::Uri, version: i32 },
     /// Looking at a big document takes a while: began (true) or ended.
@@ -63,7 +72,7 @@ pub const HEAD: u32 = 65_536;
 /// Documents of this size are worth a progress report.
 const BIG: u32 = 4_000_000;
 
-type Job = Box<dyn FnOnce() + Send>;
+pub(crate) type Job = Box<dyn FnOnce() + Send>;
 
 /// Workers that take one job after the other. A job that fails does not take the worker with it.
 fn workers(count: usize) -> Sender<Job> {
@@ -93,8 +102,12 @@ pub struct Analysis {
     host: Arc<dyn Host>,
     /// Files of stations whose findings were published.
     told: BTreeMap<PathBuf, Vec<PathBuf>>,
+    /// What was said about settings that lead nowhere: once is enough.
+    said: BTreeSet<String>,
+    closed: Closed,
     reads: Sender<Job>,
     checks: Sender<Job>,
+    background: Sender<Job>,
     own: Sender<Message>,
 }
 
@@ -110,8 +123,11 @@ impl Analysis {
             workspace: Arc::default(),
             host,
             told: BTreeMap::new(),
+            said: BTreeSet::new(),
+            closed: Closed::default(),
             reads: workers(2),
             checks: workers(1),
+            background: workers(1),
             own,
         }
     }
@@ -140,6 +156,7 @@ impl Analysis {
             Message::Client { columns } => self.columns = columns,
             Message::Settings(settings) => {
                 if *settings != *self.settings {
+                    self.said.clear();
                     self.settings = Arc::new(*settings);
                     self.reload(publish);
                     publish(Event::Refresh);
@@ -158,8 +175,18 @@ impl Analysis {
                 let _ = self.reads.send(Box::new(move || work(view)));
             }
             Message::AskAll { work } => work(self),
+            Message::AskClosed { known, work } => {
+                let open = self.documents.values().map(|d| d.path.clone()).collect();
+                let (new, items) = self.closed.report(&self.workspace, &open, &known);
+                for path in new {
+                    self.look_at_closed(path, publish);
+                }
+                work(items);
+            }
+            Message::Closed { path, found } => self.closed.put(path, found),
             Message::Early { uri, version, lines, found } => self.early(&uri, version, &lines, found, publish),
             Message::Found { uri, version, found } => self.found(&uri, version, found, publish),
+            Message::Failed { uri, version } => self.failed(&uri, version, publish),
         }
     }
 
@@ -218,9 +245,26 @@ impl Analysis {
             if let Some(uri) = lsp::Uri::from_file_path(&path)
                 && !self.documents.contains_key(&uri)
             {
-                publish(Event::Diagnostics { uri, version: None, diagnostics });
+                publish(Event::Diagnostics { uri, version: None, diagnostics, open: false });
             }
         }
+        for text in &station.said {
+            if self.said.insert(text.clone()) {
+                publish(Event::Say(lsp::MessageType::WARNING, format!("gcc-robot settings: {text}")));
+            }
+        }
+    }
+
+    /// Has a program that is not open looked at, when nothing else is to be done.
+    fn look_at_closed(&mut self, path: PathBuf, publish: &impl Fn(Event)) {
+        let station = self.station(&path, publish);
+        let (columns, settings, host, workspace) = (self.columns, self.settings.clone(), self.host.clone(), self.workspace.clone());
+        let own = self.own.clone();
+        let job = move || {
+            let found = crate::closed::look(&path, columns, settings, host, workspace, station);
+            let _ = own.send(Message::Closed { path, found });
+        };
+        let _ = self.background.send(Box::new(job));
     }
 
     fn open(&mut self, uri: lsp::Uri, language: String, version: i32, text: &str, publish: &(impl Fn(Event) + Clone + Send + 'static)) {
@@ -232,21 +276,7 @@ impl Analysis {
             let dialect = (station.dialect_of)(&path, text);
             Kind::Gcode(self.session.open(&path.to_string_lossy(), text, station.options(dialect)), dialect)
         });
-        let document = Document {
-            uri: uri.clone(),
-            path,
-            language,
-            version,
-            text: Arc::new(Text::new(text)),
-            kind,
-            station,
-            stale: true,
-            found: Arc::default(),
-            focus: 0,
-            derived: Arc::default(),
-            latest: Arc::new(AtomicI32::new(version)),
-            sent_tokens: Arc::default(),
-        };
+        let document = Document::new(uri.clone(), path, language, version, Arc::new(Text::new(text)), kind, station);
         self.documents.insert(uri, document);
     }
 
@@ -311,7 +341,7 @@ impl Analysis {
 
     fn close(&mut self, uri: &lsp::Uri, publish: &impl Fn(Event)) {
         self.forget(uri);
-        publish(Event::Diagnostics { uri: uri.clone(), version: None, diagnostics: Vec::new() });
+        publish(Event::Diagnostics { uri: uri.clone(), version: None, diagnostics: Vec::new(), open: false });
     }
 
     fn disk(&mut self, paths: &[PathBuf], publish: &(impl Fn(Event) + Clone + Send + 'static)) {
@@ -326,6 +356,7 @@ impl Analysis {
             self.reload(publish);
         }
         if settles || programs {
+            self.closed.forget();
             publish(Event::Refresh);
         }
         if programs {
@@ -340,6 +371,7 @@ impl Analysis {
     /// Everything that programs are run with is read again.
     fn reload(&mut self, publish: &(impl Fn(Event) + Clone + Send + 'static)) {
         self.stations.clear();
+        self.closed.forget();
         let uris: Vec<lsp::Uri> = self.documents.keys().cloned().collect();
         for uri in uris {
             let Some(path) = self.documents.get(&uri).map(|d| d.path.clone()) else { continue };
@@ -376,12 +408,14 @@ impl Analysis {
                     let _ = own.send(Message::Early { uri: uri.clone(), version, lines, found });
                 }
                 let found = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| crate::features::diagnostics(view)));
-                // Cut short by an edit: the edit has made the document stale again.
-                let found = found.unwrap_or(Ok(Vec::new())).ok().map(Arc::new);
                 if big {
                     publish(Event::Busy { uri: uri.clone(), begins: false });
                 }
-                let _ = own.send(Message::Found { uri, version, found });
+                let _ = own.send(match found {
+                    // Cut short by an edit: the edit has made the document stale again.
+                    Ok(found) => Message::Found { uri, version, found: found.ok().map(Arc::new) },
+                    Err(_) => Message::Failed { uri, version },
+                });
             };
             let _ = self.checks.send(Box::new(job));
         }
@@ -398,6 +432,19 @@ impl Analysis {
             return;
         }
         document.found = found;
+        document.failed = false;
+        self.publish(uri, publish);
+        publish(Event::Analysed { uri: uri.clone(), version });
+    }
+
+    /// What was found before stays, and the user is told that it may be out of date.
+    fn failed(&mut self, uri: &lsp::Uri, version: i32, publish: &impl Fn(Event)) {
+        let Some(document) = self.documents.get_mut(uri).filter(|d| d.version == version) else { return };
+        if !std::mem::replace(&mut document.failed, true) {
+            let name = document.path.file_name().unwrap_or_default().to_string_lossy();
+            let text = format!("gcc-robot made a mistake of its own and can't check {name} as it is: the marks shown are older than the text. Please report this program.");
+            publish(Event::Say(lsp::MessageType::ERROR, text));
+        }
         self.publish(uri, publish);
         publish(Event::Analysed { uri: uri.clone(), version });
     }
@@ -431,9 +478,9 @@ impl Analysis {
         let place = |(file, span): (gr_text::FileId, Span)| {
             if file == own { Some(lsp::Location { uri: uri.clone(), range: text.range(span, columns) }) } else { other(file, span) }
         };
-        let shown = document.found.iter().filter(|d| d.primary().0 == own).take(self.settings.most_problems);
-        let diagnostics = shown.map(|d| protocol::diagnostic(d, text, columns, &place)).collect();
-        publish(Event::Diagnostics { uri: uri.clone(), version: Some(document.version), diagnostics });
+        let shown = document.found.iter().filter_map(|d| protocol::in_document(d, own)).take(self.settings.most_problems);
+        let diagnostics = shown.map(|d| protocol::diagnostic(&d, text, columns, &place)).collect();
+        publish(Event::Diagnostics { uri: uri.clone(), version: Some(document.version), diagnostics, open: true });
     }
 }
 

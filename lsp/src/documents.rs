@@ -1,5 +1,6 @@
 //! Open documents, and the views of them that requests work on.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicI32, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
@@ -8,7 +9,8 @@ use gr_backends::sheet::ToolRow;
 use gr_driver::{Cancelled, Snapshot};
 use gr_gcode::File;
 use gr_ide::config::Schema;
-use gr_ir::measure::{Rates, Report, report};
+use gr_ir::measure::{Rates, Report, Totals, report};
+use gr_ir::timing::Clock;
 use gr_ir::{Program, Texts};
 use gr_robot::Planned;
 use gr_robot::along::is_planned;
@@ -67,6 +69,64 @@ pub struct Motion {
     pub tools: Vec<ToolRow>,
 }
 
+/// Seconds of every line of a document where it is run for the first time; NaN where it takes none or is not run.
+pub type LineTimes = Vec<f64>;
+
+/// How long blocks take.
+pub enum Pace {
+    /// Each by itself.
+    Alone(Rates),
+    /// As the machine drives through the whole program.
+    Through(Arc<LineTimes>),
+    /// That is not worked out for a program of this size.
+    Unknown,
+}
+
+impl Pace {
+    /// The time of a block, s.
+    pub fn seconds(&self, block: &gr_driver::Traced) -> Option<f64> {
+        match self {
+            Pace::Unknown => None,
+            Pace::Through(lines) => lines.get(block.line as usize).copied().filter(|s| s.is_finite()),
+            Pace::Alone(rates) => {
+                let clock = Clock::new(&block.program, rates);
+                let (mut totals, mut cursor) = (Totals::default(), block.program.cursor());
+                while let Some(view) = cursor.next() {
+                    totals.add(&clock.measure(&view));
+                }
+                Some(totals.seconds())
+            }
+        }
+    }
+}
+
+/// Times the lines of a document in its program.
+fn line_times(motion: &Motion) -> LineTimes {
+    let clock = Clock::new(&motion.program, &motion.rates);
+    let mut lines: Vec<(Option<gr_ir::FrameId>, f64)> = Vec::new();
+    let mut cursor = motion.program.cursor();
+    let (mut last, mut done) = (None, BTreeSet::new());
+    while let Some(view) = cursor.next() {
+        let t = clock.measure(&view);
+        if view.source.file != motion.main || (t.ns() == 0 && t.moves == 0) {
+            continue;
+        }
+        // Behind a move of another line it is the next time that a line is run.
+        let line = view.source.line as usize;
+        if let Some(other) = last.replace(line).filter(|l| *l != line) {
+            done.insert(other);
+        }
+        if lines.len() <= line {
+            lines.resize(line + 1, (None, f64::NAN));
+        }
+        let (frame, seconds) = &mut lines[line];
+        if *frame.get_or_insert(view.source.frame) == view.source.frame && !done.contains(&line) {
+            *seconds = if seconds.is_nan() { t.seconds() } else { *seconds + t.seconds() };
+        }
+    }
+    lines.into_iter().map(|l| l.1).collect()
+}
+
 /// The plan for the chosen machine, or what keeps it from being made.
 pub type Planning = Result<Planned, Vec<Diagnostic>>;
 
@@ -78,6 +138,8 @@ pub struct Derived {
     motion: OnceLock<Option<Arc<Motion>>>,
     /// Of the motion that it was made of.
     planning: Mutex<Option<(Arc<Program>, Arc<Planning>)>>,
+    /// Of the motion that it was made of.
+    times: Mutex<Option<(Arc<Program>, Arc<LineTimes>)>>,
     tokens: Mutex<Option<(String, Arc<Vec<lsp::SemanticToken>>)>>,
 }
 
@@ -245,6 +307,30 @@ impl View {
             None => Ok(Arc::new(report(&motion.program, &motion.rates))),
         }
     }
+    /// How long blocks take: of a machine whose accelerations are known that depends on what comes before and after.
+    /// The motion is asked of the database only then.
+    pub fn pace(&mut self) -> Result<Pace, Cancelled> {
+        /// Larger programs are not timed for a block of them, bytes.
+        const MOST_TIMED: u32 = 4_000_000;
+        let dialect = if let Kind::Gcode(_, d) = self.kind { d } else { Dialect::linuxcnc() };
+        let rates = gr_driver::rates(&self.station.setup_for(dialect));
+        if rates.dynamics.is_none_or(|d| !d.known()) {
+            return Ok(Pace::Alone(rates));
+        }
+        if self.text.len() > MOST_TIMED {
+            return Ok(Pace::Unknown);
+        }
+        let motion = self.motion()?;
+        self.release();
+        let Some(motion) = motion else { return Ok(Pace::Unknown) };
+        let mut known = self.derived.times.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, times)) = known.as_ref().filter(|(p, _)| Arc::ptr_eq(p, &motion.program)) {
+            return Ok(Pace::Through(times.clone()));
+        }
+        let times = Arc::new(line_times(&motion));
+        *known = Some((motion.program.clone(), times.clone()));
+        Ok(Pace::Through(times))
+    }
     /// What a build for the chosen machine would make of the motion; none when there is no such machine, or when it
     /// needs no plan. Worked out once for the same motion: release the database first.
     pub fn planning(&self, motion: &Motion) -> Option<Arc<Planning>> {
@@ -313,6 +399,8 @@ pub struct Document {
     pub stale: bool,
     /// Diagnostics that were found last; edits since have moved them.
     pub found: Arc<Vec<Diagnostic>>,
+    /// Looking for them broke off by a mistake of the server, and the user was told.
+    pub failed: bool,
     /// The line that was edited last: what is visible is around it.
     pub focus: u32,
     /// Worked out once per version.
@@ -321,6 +409,28 @@ pub struct Document {
     pub latest: Arc<AtomicI32>,
     /// See [`View::sent_tokens`].
     pub sent_tokens: Arc<Derived>,
+}
+
+impl Document {
+    /// A document that was just opened.
+    pub fn new(uri: lsp::Uri, path: PathBuf, language: String, version: i32, text: Arc<Text>, kind: Kind, station: Arc<Station>) -> Document {
+        Document {
+            uri,
+            path,
+            language,
+            version,
+            text,
+            kind,
+            station,
+            stale: true,
+            found: Arc::default(),
+            failed: false,
+            focus: 0,
+            derived: Arc::default(),
+            latest: Arc::new(AtomicI32::new(version)),
+            sent_tokens: Arc::default(),
+        }
+    }
 }
 
 /// What a document is, by its language, name and beginning.

@@ -1,6 +1,11 @@
 //! Takes messages that are none out of the client's stream: the server behind ends at the first one it can't read.
-//! After nonsense, reading goes on at the next `Content-Length`.
+//! After nonsense, reading goes on at the next `Content-Length`. Text that is no Unicode is mended, not dropped: an
+//! edit that is lost would leave the server with another text than the client.
 
+use std::borrow::Cow;
+
+use serde::Deserialize;
+use serde_json::{Value, json};
 use tokio::io::{AsyncRead, AsyncReadExt as _, AsyncWrite, AsyncWriteExt as _};
 
 /// A header longer than this is none.
@@ -21,13 +26,15 @@ pub async fn filter(mut from: impl AsyncRead + Unpin, mut to: impl AsyncWrite + 
                     held.drain(..count);
                 }
                 Next::Message(header, length) => {
-                    let body = &held[header..header + length];
-                    let good = serde_json::from_slice::<serde::de::IgnoredAny>(body).is_ok();
-                    if good && to.write_all(&held[..header + length]).await.is_err() {
-                        return;
+                    let message = readable(&held[header..header + length]);
+                    if let Some(body) = &message {
+                        let head = format!("Content-Length: {}\r\n\r\n", body.len());
+                        if to.write_all(head.as_bytes()).await.is_err() || to.write_all(body).await.is_err() {
+                            return;
+                        }
                     }
                     // A wrong length may have swallowed the head of the next message.
-                    let swallowed = if good { None } else { memchr::memmem::find(body, MARK) };
+                    let swallowed = if message.is_some() { None } else { memchr::memmem::find(&held[header..header + length], MARK) };
                     held.drain(..swallowed.map_or(header + length, |at| header + at));
                 }
             }
@@ -36,6 +43,57 @@ pub async fn filter(mut from: impl AsyncRead + Unpin, mut to: impl AsyncWrite + 
             Ok(0) | Err(_) => return,
             Ok(n) => held.extend_from_slice(&buffer[..n]),
         }
+    }
+}
+
+/// What the server behind reads a message as: what it can't read it does not survive.
+#[derive(Deserialize)]
+#[serde(untagged)]
+#[expect(dead_code, reason = "only whether it can be read counts")]
+enum Message {
+    Response(tower_lsp::jsonrpc::Response),
+    Request(tower_lsp::jsonrpc::Request),
+}
+
+/// A message that the server behind can read: as it came, mended, or of a request that is none its name and number
+/// alone, so that it is answered by an error. None: there is nothing to be made of it.
+fn readable(body: &[u8]) -> Option<Cow<'_, [u8]>> {
+    let good = |body: &[u8]| std::str::from_utf8(body).is_ok_and(|b| serde_json::from_str::<Message>(b).is_ok());
+    if good(body) {
+        return Some(Cow::Borrowed(body));
+    }
+    let mut mended = body.to_vec();
+    mend(&mut mended);
+    if good(&mended) {
+        return Some(Cow::Owned(mended));
+    }
+    let message: Value = serde_json::from_slice(&mended).ok()?;
+    let id = message.get("id").filter(|id| id.is_i64() || id.is_string())?;
+    let bare = json!({ "jsonrpc": "2.0", "id": id, "method": message.get("method")?.as_str()? }).to_string().into_bytes();
+    good(&bare).then_some(Cow::Owned(bare))
+}
+
+/// Bytes that are no UTF-8, and halves of surrogate pairs, are replaced; nothing else moves.
+fn mend(body: &mut [u8]) {
+    let mut at = 0;
+    while let Err(e) = std::str::from_utf8(&body[at..]) {
+        at += e.valid_up_to();
+        body[at] = b'?';
+    }
+    let unit = |body: &[u8], at: usize| {
+        let digits = body.get(at..at + 6)?.strip_prefix(b"\\u")?;
+        u32::from_str_radix(std::str::from_utf8(digits).ok()?, 16).ok()
+    };
+    let mut at = 0;
+    while let Some(next) = memchr::memchr(b'\\', &body[at..]) {
+        at += next;
+        let pair = matches!(unit(body, at), Some(0xD800..=0xDBFF)) && matches!(unit(body, at + 6), Some(0xDC00..=0xDFFF));
+        let lone = !pair && matches!(unit(body, at), Some(0xD800..=0xDFFF));
+        if lone {
+            body[at..at + 6].copy_from_slice(b"\\ufffd");
+        }
+        // Past the escape: a backslash behind a backslash begins none.
+        at = (at + if pair { 12 } else { 2 }).min(body.len());
     }
 }
 
@@ -82,16 +140,42 @@ mod tests {
         String::from_utf8(out).expect("text")
     }
 
+    fn framed(body: &str) -> String {
+        format!("Content-Length: {}\r\n\r\n{body}", body.len())
+    }
+
     #[test]
     fn nonsense_is_taken_out() {
-        let good = "Content-Length: 2\r\n\r\n{}";
+        let good = framed(r#"{"jsonrpc":"2.0","method":"a"}"#);
         assert_eq!(through(good.as_bytes()), good);
         assert_eq!(through(format!("noise{good}Content-Length: 3\r\n\r\n{{a}}{good}").as_bytes()), format!("{good}{good}"));
         // The length is too great: at the latest the message after the next is found.
         assert_eq!(through(format!("Content-Length: 9\r\n\r\n{{{good}{good}").as_bytes()), good);
-        assert_eq!(through(format!("Content-Length: 20\r\n\r\n{{{good}{good}").as_bytes()), format!("{good}{good}"));
+        assert_eq!(through(format!("Content-Length: 60\r\n\r\n{{{good}{good}").as_bytes()), format!("{good}{good}"));
         assert_eq!(through(format!("Content-Length: x\r\n\r\n{good}").as_bytes()), good);
-        let both = "Content-Type: a\r\nContent-Length: 2\r\n\r\n[]";
-        assert_eq!(through(both.as_bytes()), both);
+        assert_eq!(through(format!("Content-Type: a\r\n{good}").as_bytes()), good);
+    }
+
+    #[test]
+    fn json_that_is_no_message_is_taken_out() {
+        let good = framed(r#"{"jsonrpc":"2.0","id":1,"result":null}"#);
+        let deep = format!("{}{}", "[".repeat(200), "]".repeat(200));
+        let deep = format!(r#"{{"jsonrpc":"2.0","method":"a","params":{deep}}}"#);
+        for bad in ["[]", "null", "3", "{}", r#"{"jsonrpc":"1.0","method":"a"}"#, r#"{"jsonrpc":"2.0","id":{},"method":"a"}"#, r#"{"jsonrpc":"2.0","method":3}"#, &deep] {
+            assert_eq!(through(format!("{}{good}", framed(bad)).as_bytes()), good, "{bad}");
+        }
+        // A request is answered, if only by an error.
+        let dup = r#"{"jsonrpc":"2.0","id":7,"id":7,"method":"a","params":{"x":1}}"#;
+        assert_eq!(through(framed(dup).as_bytes()), framed(r#"{"id":7,"jsonrpc":"2.0","method":"a"}"#));
+    }
+
+    #[test]
+    fn text_that_is_no_unicode_is_mended() {
+        let message = |text: &str| format!(r#"{{"jsonrpc":"2.0","method":"a","params":["{text}"]}}"#);
+        for (text, mended) in [(r"\ud83d\ude00", r"\ud83d\ude00"), (r"a\ud83d", r"a\ufffd"), (r"\ude00\\ud83d\n", r"\ufffd\\ud83d\n")] {
+            assert_eq!(through(framed(&message(text)).as_bytes()), framed(&message(mended)), "{text}");
+        }
+        let latin = framed(&message("#")).into_bytes().into_iter().map(|b| if b == b'#' { 0xE9 } else { b }).collect::<Vec<u8>>();
+        assert_eq!(through(&latin), framed(&message("?")));
     }
 }

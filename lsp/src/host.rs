@@ -35,6 +35,8 @@ pub struct Station {
     pub files: Vec<PathBuf>,
     /// What is wrong with those files: the file, its text, the finding.
     pub found: Vec<(PathBuf, String, Diagnostic)>,
+    /// What is wrong with what the settings name: no file says it.
+    pub said: Vec<String>,
     /// The command's own.
     pub own: Option<Arc<dyn std::any::Any + Send + Sync>>,
 }
@@ -51,6 +53,7 @@ impl Default for Station {
             machine: None,
             files: Vec::new(),
             found: Vec::new(),
+            said: Vec::new(),
             own: None,
         }
     }

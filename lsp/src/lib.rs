@@ -5,6 +5,7 @@
 //! |---|---|
 //! | `server` | handlers: a message on the queue, then the answer |
 //! | `analysis` | the thread that owns the database, and its workers |
+//! | `closed` | programs of the folders that are not open |
 //! | `documents` | open documents and the views that requests work on |
 //! | `features` | from requests to features and back |
 //! | `protocol` | shapes of the protocol, and of our own requests |
@@ -13,6 +14,7 @@
 //! | `frames` | takes messages that are none out of the stream |
 
 mod analysis;
+mod closed;
 mod documents;
 mod features;
 mod frames;
@@ -36,4 +38,4 @@ pub fn run(host: Arc<dyn host::Host>) -> std::io::Result<()> {
 }
 
 pub use server::serve;
-pub use settings::{Hints, Lints, Settings};
+pub use settings::{Hints, Lints, Read, Settings};

@@ -38,6 +38,8 @@ struct Backend {
     queue: Sender<Message>,
     client: Client,
     abilities: Arc<Mutex<Abilities>>,
+    /// What was wrong with the settings when they were read last.
+    mistakes: Arc<Mutex<Vec<String>>>,
 }
 
 /// The text of an answer that was overtaken.
@@ -59,7 +61,7 @@ impl Backend {
         });
         let abilities: Arc<Mutex<Abilities>> = Arc::default();
         tokio::spawn(speak(client.clone(), abilities.clone(), outbox));
-        Backend { queue, client, abilities }
+        Backend { queue, client, abilities, mistakes: Arc::default() }
     }
 
     fn tell(&self, message: Message) {
@@ -116,9 +118,13 @@ impl Backend {
     }
 
     async fn settings(&self, value: &Value) {
-        match Settings::read(value) {
-            Ok(settings) => self.tell(Message::Settings(Box::new(settings))),
-            Err(why) => self.client.show_message(lsp::MessageType::WARNING, why).await,
+        let read = Settings::read(value);
+        self.tell(Message::Settings(Box::new(read.settings)));
+        let known = std::mem::replace(&mut *self.mistakes.lock().unwrap_or_else(PoisonError::into_inner), read.mistakes.clone());
+        // Clients send all settings again when one changes: the same mistakes are told once.
+        let new: Vec<String> = read.mistakes.into_iter().filter(|m| !known.contains(m)).collect();
+        if !new.is_empty() {
+            self.client.show_message(lsp::MessageType::WARNING, format!("gcc-robot settings: {}", new.join("; "))).await;
         }
     }
 
@@ -144,9 +150,9 @@ async fn speak(client: Client, abilities: Arc<Mutex<Abilities>>, mut outbox: mps
     let mut count = 0;
     while let Some(event) = outbox.recv().await {
         match event {
-            Event::Diagnostics { uri, version, diagnostics } => {
-                // A client that asks for diagnostics itself would show these twice.
-                if !can().pulls {
+            Event::Diagnostics { uri, version, diagnostics, open } => {
+                // A client that asks for diagnostics itself would show those of open documents twice.
+                if !(open && can().pulls) {
                     client.publish_diagnostics(uri, diagnostics, version).await;
                 }
             }
@@ -175,6 +181,7 @@ async fn speak(client: Client, abilities: Arc<Mutex<Abilities>>, mut outbox: mps
                 }
             }
             Event::Busy { .. } => {}
+            Event::Say(kind, text) => client.show_message(kind, text).await,
             Event::Refresh => {
                 let (client, can) = (client.clone(), can());
                 tokio::spawn(async move {
@@ -243,7 +250,7 @@ impl Everything {
     }
 }
 
-fn capabilities(utf8: bool) -> lsp::ServerCapabilities {
+fn capabilities(utf8: bool, pulls: bool) -> lsp::ServerCapabilities {
     let value = json!({
         "positionEncoding": if utf8 { "utf-8" } else { "utf-16" },
         "textDocumentSync": { "openClose": true, "change": 2, "save": { "includeText": false } },
@@ -267,7 +274,7 @@ fn capabilities(utf8: bool) -> lsp::ServerCapabilities {
         "callHierarchyProvider": true,
         "linkedEditingRangeProvider": true,
         "inlayHintProvider": { "resolveProvider": false },
-        "diagnosticProvider": { "identifier": "gcc-robot", "interFileDependencies": true, "workspaceDiagnostics": false },
+        "diagnosticProvider": { "identifier": "gcc-robot", "interFileDependencies": true, "workspaceDiagnostics": pulls },
         "workspace": { "workspaceFolders": { "supported": true, "changeNotifications": true } },
         "semanticTokensProvider": { "legend": features::legend(), "range": true, "full": { "delta": true } },
         "experimental": { "gccRobot": ["preview", "output", "state", "targets", "explain"] },
@@ -287,6 +294,7 @@ impl LanguageServer for Backend {
         let utf8 = offered.contains(&lsp::PositionEncodingKind::UTF8);
         self.tell(Message::Client { columns: if utf8 { Columns::Utf8 } else { Columns::Utf16 } });
         let options = params.initialization_options.unwrap_or_default();
+        let pulls = options.get("pullDiagnostics").and_then(Value::as_bool).unwrap_or(false);
         *self.abilities.lock().unwrap_or_else(PoisonError::into_inner) = Abilities {
             configuration: can("/workspace/configuration"),
             watching: can("/workspace/didChangeWatchedFiles/dynamicRegistration"),
@@ -294,7 +302,7 @@ impl LanguageServer for Backend {
             hint_refresh: can("/workspace/inlayHint/refreshSupport"),
             lens_refresh: can("/workspace/codeLens/refreshSupport"),
             diagnostic_refresh: can("/workspace/diagnostics/refreshSupport") || can("/workspace/diagnostic/refreshSupport"),
-            pulls: options.get("pullDiagnostics").and_then(Value::as_bool).unwrap_or(false),
+            pulls,
         };
         let folders = params.workspace_folders.unwrap_or_default();
         let mut added: Vec<PathBuf> = folders.iter().filter_map(|f| folder(&f.uri)).collect();
@@ -303,11 +311,9 @@ impl LanguageServer for Backend {
             added.extend(params.root_uri.as_ref().and_then(folder));
         }
         self.tell(Message::Folders { added, removed: Vec::new() });
-        if let Ok(settings) = Settings::read(&options) {
-            self.tell(Message::Settings(Box::new(settings)));
-        }
+        self.settings(&options).await;
         Ok(lsp::InitializeResult {
-            capabilities: capabilities(utf8),
+            capabilities: capabilities(utf8, pulls),
             server_info: Some(lsp::ServerInfo { name: "gcc-robot".into(), version: Some(env!("CARGO_PKG_VERSION").into()) }),
             ..lsp::InitializeResult::default()
         })
@@ -485,6 +491,18 @@ impl LanguageServer for Backend {
             })
         };
         Ok(lsp::DocumentDiagnosticReportResult::Report(report))
+    }
+    async fn workspace_diagnostic(&self, p: lsp::WorkspaceDiagnosticParams) -> Result<lsp::WorkspaceDiagnosticReportResult> {
+        let (send, receive) = oneshot::channel();
+        let known = p.previous_result_ids.into_iter().map(|k| (k.uri, k.value)).collect();
+        self.tell(Message::AskClosed {
+            known,
+            work: Box::new(move |items| {
+                let _ = send.send(items);
+            }),
+        });
+        let items = receive.await.map_err(|_| Error::internal_error())?;
+        Ok(lsp::WorkspaceDiagnosticReportResult::Report(lsp::WorkspaceDiagnosticReport { items }))
     }
 }
 

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use gr_ide::gcode::hints::{HintKinds, Positions};
 use serde::Deserialize;
-use serde_json::Value;
+use serde_json::{Map, Value};
 
 /// Settings.
 #[derive(Deserialize, Clone, Debug, PartialEq)]
@@ -115,21 +115,111 @@ impl Hints {
     }
 }
 
+/// Keys of the section, and what each takes; those of lists of their own come with a dot.
+const KEYS: &[(&str, &str)] = &[
+    ("dialect", "the name of a dialect, such as \"linuxcnc\" or \"grbl\""),
+    ("machine", "the id or path of a machine, such as \"generic/mill3\""),
+    ("tools", "the path of a tool table"),
+    ("ini", "the path of an INI file"),
+    ("vars", "the path of a parameter file"),
+    ("machineUnits", "\"mm\" or \"inch\""),
+    ("subs", "a list of folders"),
+    ("blockDelete", "true or false"),
+    ("lints", "an object with strict, allow, warn, deny"),
+    ("lints.strict", "true or false"),
+    ("lints.allow", "a list of codes or slugs of lints"),
+    ("lints.warn", "a list of codes or slugs of lints"),
+    ("lints.deny", "a list of codes or slugs of lints"),
+    ("hints", "an object with motion, position, feed, modes, time, arc, values, attributes"),
+    ("hints.motion", "true or false"),
+    ("hints.position", "\"off\", \"computed\" or \"all\""),
+    ("hints.feed", "true or false"),
+    ("hints.modes", "true or false"),
+    ("hints.time", "true or false"),
+    ("hints.arc", "true or false"),
+    ("hints.values", "true or false"),
+    ("hints.attributes", "true or false"),
+    ("mostProblems", "a whole number"),
+];
+
+/// Keys that the client keeps in the same section for itself.
+const OF_CLIENTS: &[&str] = &["pullDiagnostics", "server", "preview", "trace"];
+
+/// What a client sent, and what could not be understood.
+#[derive(Clone, Debug, PartialEq, Default)]
+pub struct Read {
+    /// The settings; what is not understood is as if it was not sent.
+    pub settings: Settings,
+    /// One sentence for each key that is not understood.
+    pub mistakes: Vec<String>,
+}
+
 impl Settings {
-    /// Reads what a client sent: the section itself or an object that holds it. What can't be read is left as it
-    /// was by default, and said.
-    pub fn read(value: &Value) -> Result<Settings, String> {
+    /// Reads what a client sent: the section itself or an object that holds it.
+    pub fn read(value: &Value) -> Read {
         let section = value.get("gccRobot").or_else(|| value.get("gcc-robot")).unwrap_or(value);
-        if section.is_null() {
-            return Ok(Settings::default());
-        }
-        // An empty string means: not chosen.
-        let mut section = section.clone();
-        if let Some(object) = section.as_object_mut() {
-            object.retain(|_, v| !v.is_null() && v.as_str() != Some(""));
-        }
-        serde_json::from_value(section).map_err(|e| format!("gccRobot settings: {e}"))
+        let mut mistakes = Vec::new();
+        let good = match section {
+            Value::Null => Map::new(),
+            Value::Object(keys) => understood(keys, "", &mut mistakes),
+            other => {
+                mistakes.push(format!("the settings `gccRobot` must be an object, not {}", shown(other)));
+                Map::new()
+            }
+        };
+        let settings = serde_json::from_value(Value::Object(good)).unwrap_or_default();
+        Read { settings, mistakes }
     }
+}
+
+/// The keys that can be read; `within` is the name of the list they are in, with a dot.
+fn understood(keys: &Map<String, Value>, within: &str, mistakes: &mut Vec<String>) -> Map<String, Value> {
+    let mut good = Map::new();
+    for (key, value) in keys {
+        let name = format!("{within}{key}");
+        // An empty string means: not chosen.
+        if value.is_null() || value.as_str() == Some("") || within.is_empty() && OF_CLIENTS.contains(&&**key) {
+            continue;
+        }
+        let Some((_, wanted)) = KEYS.iter().find(|k| k.0 == name) else {
+            let here: Vec<&str> = KEYS.iter().filter_map(|k| k.0.strip_prefix(within)).filter(|k| !k.contains('.')).collect();
+            mistakes.push(format!("there is no setting `gccRobot.{name}`; those here are {}", here.join(", ")));
+            continue;
+        };
+        let value = match value {
+            Value::Object(inner) if matches!(&*name, "lints" | "hints") => Value::Object(understood(inner, &format!("{name}."), mistakes)),
+            other => other.clone(),
+        };
+        if takes(&name, &value) {
+            good.insert(key.clone(), value);
+        } else {
+            mistakes.push(format!("`gccRobot.{name}` must be {wanted}, not {}", shown(&value)));
+        }
+    }
+    good
+}
+
+/// Whether a value fits a key.
+fn takes(name: &str, value: &Value) -> bool {
+    let one_of = |names: &[&str]| value.as_str().is_some_and(|v| names.contains(&v));
+    let lints = |v: &Value| v.as_str().is_some_and(|v| gr_spec::Code::find(v).is_some());
+    match name {
+        "dialect" => value.as_str().is_some_and(|v| gr_spec::Dialect::find(v).is_some()),
+        "machineUnits" => one_of(&["mm", "inch"]),
+        "hints.position" => one_of(&["off", "computed", "all"]),
+        "lints.allow" | "lints.warn" | "lints.deny" => value.as_array().is_some_and(|l| l.iter().all(lints)),
+        "subs" => value.as_array().is_some_and(|l| l.iter().all(Value::is_string)),
+        "machine" | "tools" | "ini" | "vars" => value.is_string(),
+        "mostProblems" => value.as_u64().is_some_and(|n| usize::try_from(n).is_ok()),
+        "lints" | "hints" => value.is_object(),
+        _ => value.is_boolean(),
+    }
+}
+
+/// A value for a message.
+fn shown(value: &Value) -> String {
+    let text = value.to_string();
+    if text.chars().count() <= 60 { text } else { text.chars().take(59).chain(['…']).collect() }
 }
 
 #[cfg(test)]
@@ -139,10 +229,42 @@ mod tests {
 
     #[test]
     fn sections() {
-        let s = Settings::read(&json!({ "gccRobot": { "dialect": "grbl", "machine": "", "hints": { "time": false, "position": "all" } } })).unwrap();
+        let read = Settings::read(&json!({ "gccRobot": { "dialect": "grbl", "machine": "", "hints": { "time": false, "position": "all" }, "server": { "path": "x" } } }));
+        assert_eq!(read.mistakes, [""; 0]);
+        let s = read.settings;
         assert_eq!(s.dialect.as_deref(), Some("grbl"));
         assert!(s.machine.is_none() && !s.hints.kinds().time && s.hints.kinds().position == Positions::All);
-        assert_eq!(Settings::read(&Value::Null), Ok(Settings::default()));
-        assert!(Settings::read(&json!({ "subs": 3 })).is_err());
+        assert_eq!(Settings::read(&Value::Null), Read::default());
+    }
+
+    #[test]
+    fn mistakes_are_told_and_the_rest_is_kept() {
+        let sent = json!({ "subs": 3, "blockDelete": true, "hints": { "tme": true, "arc": "no", "position": "sometimes" }, "mostProblem": 5, "dialect": "elvish", "lints": { "allow": ["spindle/stopped", "a/b"] } });
+        let mut read = Settings::read(&sent);
+        read.mistakes.sort();
+        assert_eq!(
+            read.mistakes,
+            [
+                "`gccRobot.dialect` must be the name of a dialect, such as \"linuxcnc\" or \"grbl\", not \"elvish\"",
+                "`gccRobot.hints.arc` must be true or false, not \"no\"",
+                "`gccRobot.hints.position` must be \"off\", \"computed\" or \"all\", not \"sometimes\"",
+                "`gccRobot.lints.allow` must be a list of codes or slugs of lints, not [\"spindle/stopped\",\"a/b\"]",
+                "`gccRobot.subs` must be a list of folders, not 3",
+                "there is no setting `gccRobot.hints.tme`; those here are motion, position, feed, modes, time, arc, values, attributes",
+                "there is no setting `gccRobot.mostProblem`; those here are dialect, machine, tools, ini, vars, machineUnits, subs, blockDelete, lints, hints, mostProblems",
+            ]
+        );
+        assert_eq!(read.settings, Settings { block_delete: true, ..Settings::default() });
+        assert_eq!(Settings::read(&json!([1])).mistakes, ["the settings `gccRobot` must be an object, not [1]"]);
+    }
+
+    /// Every key of the settings has a row, and no row is of another key.
+    #[test]
+    fn the_table_names_all_keys() {
+        let docs = include_str!("../../docs/editor-features.md");
+        for (key, _) in KEYS {
+            let last = key.rsplit('.').next().unwrap_or(key);
+            assert!(docs.contains(&format!("`{last}`")), "{key} is not in docs/editor-features.md");
+        }
     }
 }

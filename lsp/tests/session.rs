@@ -1,7 +1,11 @@
 //! Random edits over streams in memory: what the server says of a text must not depend on how the text came about.
 
+use std::path::Path;
 use std::sync::Arc;
 
+use gr_lsp::Settings;
+use gr_lsp::host::{Host, Made, OutputJob, Plain, Plan, Station};
+use gr_text::Diagnostic;
 use proptest::prelude::*;
 use serde_json::{Value, json};
 use tokio::io::{AsyncReadExt, AsyncWriteExt, DuplexStream};
@@ -15,9 +19,12 @@ struct Client {
 
 impl Client {
     async fn start() -> Client {
+        Client::of(Arc::new(gr_lsp::host::Plain)).await
+    }
+    async fn of(host: Arc<dyn Host>) -> Client {
         let (to, input) = tokio::io::duplex(1 << 20);
         let (output, from) = tokio::io::duplex(1 << 20);
-        tokio::spawn(gr_lsp::serve(input, output, Arc::new(gr_lsp::host::Plain)));
+        tokio::spawn(gr_lsp::serve(input, output, host));
         let mut c = Client { to, from, pending: Vec::new(), next: 0 };
         let hello = c.request("initialize", json!({ "capabilities": {} })).await;
         assert_eq!(hello["capabilities"]["positionEncoding"], "utf-16");
@@ -64,6 +71,19 @@ impl Client {
     }
     async fn notify(&mut self, method: &str, params: Value) {
         self.send(json!({ "method": method, "params": params })).await;
+    }
+    /// Diagnostics of a version, and what the user is shown until then.
+    async fn published(&mut self, version: i64, said: &mut Vec<String>) -> Vec<Value> {
+        loop {
+            let m = self.receive().await;
+            match m["method"].as_str() {
+                Some("window/showMessage") => said.push(m["params"]["message"].as_str().unwrap_or("").into()),
+                Some("textDocument/publishDiagnostics") if m["params"]["version"] == version => {
+                    return m["params"]["diagnostics"].as_array().cloned().unwrap_or_default();
+                }
+                _ => {}
+            }
+        }
     }
     async fn open(&mut self, uri: &str, text: &str) {
         let document = json!({ "uri": uri, "languageId": "gcode", "version": 1, "text": text });
@@ -169,4 +189,56 @@ proptest! {
         }
         runtime.shutdown_background();
     }
+}
+
+/// A command that can't stand a certain text.
+struct Fragile;
+
+impl Host for Fragile {
+    fn station(&self, _: &Path, _: &Settings) -> Station {
+        Station::default()
+    }
+    fn check_project(&self, _: &Path, _: &str) -> Vec<Diagnostic> {
+        Vec::new()
+    }
+    fn check_exchange(&self, path: &Path, text: &str, station: &Station) -> Vec<Diagnostic> {
+        assert!(!text.contains("BREAK"), "a mistake of the server, on purpose");
+        Plain.check_exchange(path, text, station)
+    }
+    fn plan(&self, _: &Path, _: &str, _: &Station) -> Option<Plan> {
+        None
+    }
+    fn undeclared(&self, _: &Path, _: &str, _: &Settings) -> bool {
+        false
+    }
+    fn output(&self, _: &OutputJob<'_>) -> Result<Made, String> {
+        Err(String::new())
+    }
+}
+
+/// When looking for diagnostics breaks off, those of before stay and the user is told, once.
+#[test]
+fn a_mistake_of_the_server_is_told() {
+    let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_time().build().expect("a runtime");
+    runtime.block_on(async {
+        let mut c = Client::of(Arc::new(Fragile)).await;
+        let uri = "file:///programs/part.p21";
+        c.open(uri, "ISO-10303-21;\nDATA;\n#1=A(#2);\n").await;
+        let mut said = Vec::new();
+        let mut found = Vec::new();
+        for version in 2..5 {
+            found.push(c.published(version - 1, &mut said).await);
+            let text = if version < 4 { "/* BREAK */" } else { "" };
+            let range = json!({ "start": { "line": 0, "character": 0 }, "end": { "line": 0, "character": if version == 4 { 22 } else { 0 } } });
+            let change = json!([{ "range": range, "text": text }]);
+            c.notify("textDocument/didChange", json!({ "textDocument": { "uri": uri, "version": version }, "contentChanges": change })).await;
+        }
+        found.push(c.published(4, &mut said).await);
+        assert!(!found[0].is_empty());
+        let messages = |found: &Vec<Value>| found.iter().map(|d| d["message"].clone()).collect::<Vec<_>>();
+        assert!(found.iter().all(|f| messages(f) == messages(&found[0])), "{found:?}");
+        assert_eq!(said.len(), 1, "{said:?}");
+        assert!(said[0].contains("part.p21"), "{said:?}");
+    });
+    runtime.shutdown_background();
 }

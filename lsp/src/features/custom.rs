@@ -104,10 +104,12 @@ fn shown(v: &serde_json::Value) -> Option<String> {
 }
 
 /// Everything about a block.
-pub fn state(view: View, at: lsp::Position) -> Answer<StateAnswer> {
+pub fn state(mut view: View, at: lsp::Position) -> Answer<StateAnswer> {
     let mut out = StateAnswer { line: at.line, ..StateAnswer::default() };
     let Kind::Gcode(..) = view.kind else { return Ok(out) };
     let Some(t) = super::look::trace_line(&view, at.line, &[])? else { return Ok(out) };
+    let pace = view.pace()?;
+    view.release();
     let m = moves(&t.program, t.before.units());
     out.reached = true;
     out.before = Some(modes(&view, &t.before));
@@ -116,7 +118,7 @@ pub fn state(view: View, at: lsp::Position) -> Answer<StateAnswer> {
     out.block = Some(BlockFacts {
         moves: m.totals.moves as u32,
         length: mm,
-        seconds: (m.totals.untimed == 0).then(|| m.totals.seconds()),
+        seconds: if m.totals.untimed == 0 { pace.seconds(&t).or((m.totals.moves == 0).then_some(0.0)) } else { None },
         center: m.arc.map(|a| a.center),
         radius: m.arc.map(|a| a.radius[0]),
         sweep: m.arc.map(|a| a.sweep),

@@ -14,7 +14,7 @@ use gr_text::Span;
 use tower_lsp::ls_types as lsp;
 
 use super::{Answer, MOST_BLOCKS, MOST_BLOCKS_VISIBLE, doc, exchange_doc};
-use crate::documents::{Kind, Motion, View};
+use crate::documents::{Kind, Motion, Pace, View};
 use crate::protocol::{TOKEN_TYPES, markdown, symbol, symbol_kind, token_type};
 use crate::text::Text;
 
@@ -50,8 +50,9 @@ fn gcode_hover(view: &mut View, offset: u32) -> Answer<Option<gr_ide::Hover>> {
     let traced = trace_line(view, line.line, &wanted)?;
     let moves = traced.as_ref().is_some_and(|t| t.program.steps().any(|s| s.op.moves()));
     let motion = if moves && view.station.machine.is_some() { view.motion()? } else { None };
+    let pace = view.pace()?;
     view.release();
-    let run = traced.map(|t| run_of(view, t, motion.as_deref(), parameter.is_some()));
+    let run = traced.map(|t| run_of(view, t, &pace, motion.as_deref(), parameter.is_some()));
     let written = parameter.and_then(|p| names::last_write(doc, &p, line.line));
     let written = written.and_then(|l| doc.line(l)).map(|l| (l.line, l.text()));
     let setup = &view.station.setup;
@@ -59,10 +60,11 @@ fn gcode_hover(view: &mut View, offset: u32) -> Answer<Option<gr_ide::Hover>> {
     Ok(gcode::hover::hover(doc, offset, facts))
 }
 
-fn run_of(view: &View, t: Traced, motion: Option<&Motion>, valued: bool) -> Run {
+fn run_of(view: &View, t: Traced, pace: &Pace, motion: Option<&Motion>, valued: bool) -> Run {
     let value = valued.then(|| (t.values.first().copied().flatten(), t.values_after.first().copied().flatten()));
     let joints = motion.and_then(|m| joints(view, &t, m)).unwrap_or_default();
-    Run { before: t.before, after: t.after, program: t.program, value, cycle: t.cycle, joints }
+    let seconds = pace.seconds(&t);
+    Run { before: t.before, after: t.after, program: t.program, value, cycle: t.cycle, seconds, joints }
 }
 
 /// Joint values of the chosen machine at the end of a block, in words: those that a build would have, or why they are
@@ -102,9 +104,13 @@ pub fn hints(mut view: View, range: lsp::Range) -> Answer<Vec<lsp::InlayHint>> {
             let tables = (session.file(file)?, dialect);
             let lines = range.start.line..range.end.line.saturating_add(1).min(range.start.line + 2_000);
             let traced = session.trace(file, lines, &[], MOST_BLOCKS_VISIBLE)?;
+            let pace = if kinds.time { view.pace()? } else { Pace::Unknown };
             view.release();
-            let ran: Vec<Ran<'_>> =
-                traced.iter().map(|t| Ran { line: t.line, before: &t.before, after: &t.after, program: &t.program }).collect();
+            let ran = |t| -> Ran<'_> {
+                let t: &Traced = t;
+                Ran { line: t.line, before: &t.before, after: &t.after, program: &t.program, seconds: pace.seconds(t) }
+            };
+            let ran: Vec<Ran<'_>> = traced.iter().map(ran).collect();
             gcode::hints::hints(doc(&tables), &ran, &kinds)
         }
         Kind::Exchange if kinds.attributes => p21::hints::hints(exchange_doc(&view.exchange()), span),
@@ -398,10 +404,16 @@ pub fn pulled(view: View) -> Answer<(String, Vec<lsp::Diagnostic>)> {
     use std::hash::{Hash as _, Hasher as _};
     let own = if let Kind::Gcode(file, _) = view.kind { file } else { gr_text::FileId(0) };
     let (text, columns, uri, most) = (view.text.clone(), view.columns, view.uri.clone(), view.settings.most_problems);
-    let found = super::diagnostics(view)?;
-    let place = |(file, span): (gr_text::FileId, Span)| (file == own).then(|| lsp::Location { uri: uri.clone(), range: text.range(span, columns) });
-    let shown = found.iter().filter(|d| d.primary().0 == own).take(most);
-    let items: Vec<lsp::Diagnostic> = shown.map(|d| crate::protocol::diagnostic(d, &text, columns, &place)).collect();
+    let (found, elsewhere) = super::diagnose(view)?;
+    let place = |(file, span): (gr_text::FileId, Span)| {
+        if file == own {
+            return Some(lsp::Location { uri: uri.clone(), range: text.range(span, columns) });
+        }
+        let (path, text) = elsewhere.get(&file)?;
+        Some(lsp::Location { uri: lsp::Uri::from_file_path(path)?, range: text.range(span, columns) })
+    };
+    let shown = found.iter().filter_map(|d| crate::protocol::in_document(d, own)).take(most);
+    let items: Vec<lsp::Diagnostic> = shown.map(|d| crate::protocol::diagnostic(&d, &text, columns, &place)).collect();
     let mut h = std::collections::hash_map::DefaultHasher::new();
     serde_json::to_string(&items).unwrap_or_default().hash(&mut h);
     Ok((format!("{:016x}", h.finish()), items))

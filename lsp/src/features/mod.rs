@@ -13,12 +13,16 @@ pub use look::*;
 pub use names::*;
 pub use write::*;
 
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::PathBuf;
+
 use gr_driver::Cancelled;
 use gr_ide::gcode;
 use gr_text::{Diagnostic, FileId, Severity, Span, code};
 use tower_lsp::ls_types as lsp;
 
 use crate::documents::{Kind, Motion, View};
+use crate::text::Text;
 
 /// Why a request has no answer.
 #[derive(Clone, Debug, PartialEq)]
@@ -39,15 +43,37 @@ impl From<Cancelled> for Failure {
 pub type Answer<T> = Result<T, Failure>;
 
 /// Everything that is to be said about a document.
-pub fn diagnostics(mut view: View) -> Answer<Vec<Diagnostic>> {
+pub fn diagnostics(view: View) -> Answer<Vec<Diagnostic>> {
+    diagnose(view).map(|found| found.0)
+}
+
+/// Files that a program calls, as they were when it was run: name and text.
+pub type Elsewhere = BTreeMap<FileId, (PathBuf, Text)>;
+
+/// The files besides its own that findings of a program name.
+fn elsewhere(session: &gr_driver::Snapshot, own: FileId, found: &[Diagnostic]) -> Elsewhere {
+    let labels = found.iter().flat_map(|d| d.labels.iter().map(|l| l.file));
+    let files: BTreeSet<FileId> = labels.chain(found.iter().flat_map(|d| d.trace.iter().map(|f| f.file))).filter(|f| *f != own).collect();
+    let of = |id: FileId| {
+        let contents = session.contents(id)?;
+        let text: String = contents.chunks.iter().map(|c| &*c.text).collect();
+        Some((id, (PathBuf::from(&*session.path(id)?), Text::new(&text))))
+    };
+    files.into_iter().filter_map(of).collect()
+}
+
+/// The same, with the other files that it names.
+pub fn diagnose(mut view: View) -> Answer<(Vec<Diagnostic>, Elsewhere)> {
+    let mut others = Elsewhere::default();
     let found = match view.kind {
         Kind::Gcode(..) => {
-            let Some((session, file, dialect)) = view.session() else { return Ok(Vec::new()) };
+            let Some((session, file, dialect)) = view.session() else { return Ok(Default::default()) };
             if undeclared(&view) {
                 let tables = session.file(file)?;
                 syntax_only(&tables, file, dialect)
             } else {
                 let mut found = session.check(file)?.diagnostics;
+                others = elsewhere(session, file, &found);
                 let motion = if asks_machine(&view, &found) { view.motion()? } else { None };
                 view.release();
                 found.extend(motion.into_iter().flat_map(|m| of_machine(&view, &m)));
@@ -60,7 +86,7 @@ pub fn diagnostics(mut view: View) -> Answer<Vec<Diagnostic>> {
             if exchange.text.len() > MOST_PLANNED {
                 gr_step::diagnostics_of(exchange.text.as_bytes(), &exchange.tables, FileId(0))
             } else {
-                return Ok(view.host.check_exchange(&view.path, &exchange.text, &view.station));
+                return Ok((view.host.check_exchange(&view.path, &exchange.text, &view.station), others));
             }
         }
         Kind::Config(schema) => {
@@ -74,7 +100,7 @@ pub fn diagnostics(mut view: View) -> Answer<Vec<Diagnostic>> {
         Kind::Tools => gr_interp::read_tools(&view.text.to_string(), FileId(0)).1,
         Kind::Other => Vec::new(),
     };
-    Ok(found.into_iter().filter_map(|d| view.station.harden(d)).collect())
+    Ok((found.into_iter().filter_map(|d| view.station.harden(d)).collect(), others))
 }
 
 /// In documents above this the lines around an edit are looked at first, bytes.

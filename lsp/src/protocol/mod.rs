@@ -2,8 +2,10 @@
 
 pub mod custom;
 
+use std::borrow::Cow;
+
 use gr_ide::{ActionKind, CompletionKind, Item, ItemKind, TokenKind};
-use gr_text::{Diagnostic, FileId, Severity, Span};
+use gr_text::{Diagnostic, FileId, Label, Severity, Span};
 use serde_json::json;
 use tower_lsp::ls_types as lsp;
 
@@ -11,6 +13,25 @@ use crate::text::{Columns, Text};
 
 /// Where a place of a finding is, in any file.
 pub type Locate<'a> = dyn Fn((FileId, Span)) -> Option<lsp::Location> + 'a;
+
+/// A finding as it is shown in a document: where it is, or where the document calls the file that it is in. None: it
+/// has nothing to do with the document.
+pub fn in_document(d: &Diagnostic, own: FileId) -> Option<Cow<'_, Diagnostic>> {
+    if d.primary().0 == own {
+        return Some(Cow::Borrowed(d));
+    }
+    // The innermost call comes first: the first one in this document is the one that leads out of it.
+    let call = d.trace.iter().find(|f| f.file == own)?;
+    let mut shown = d.clone();
+    let there = shown.message.clone();
+    shown.message = format!("{}: {there}", call.name);
+    shown.fixes.clear();
+    if let Some(label) = shown.labels.first_mut() {
+        label.text = there;
+    }
+    shown.labels.insert(0, Label { file: own, span: call.span, text: String::new() });
+    Some(Cow::Owned(shown))
+}
 
 /// A finding as the protocol has it.
 pub fn diagnostic(d: &Diagnostic, text: &Text, columns: Columns, locate: &Locate<'_>) -> lsp::Diagnostic {

@@ -40,8 +40,8 @@ fn setup_args(settings: &Settings) -> SetupArgs {
     }
 }
 
-/// A finding about something that a project file names, at its name there.
-fn named_in(project: &str, mut d: Diagnostic) -> Diagnostic {
+/// Where a project file names what a finding is about: the longest of its strings that the message has.
+fn named_in(project: &str, d: &Diagnostic) -> Option<Span> {
     let mut at = 0;
     // Every other piece between quotes is a string.
     let strings = project.split('"').enumerate().filter_map(|(n, piece)| {
@@ -49,12 +49,15 @@ fn named_in(project: &str, mut d: Diagnostic) -> Diagnostic {
         at += piece.len() + 1;
         (n % 2 == 1 && !piece.is_empty()).then_some((start, piece))
     });
-    let named = strings.filter(|(_, s)| d.message.contains(s)).max_by_key(|(_, s)| s.len());
-    let place = named.map(|(start, s)| Span::new(start as u32 - 1, (start + s.len()) as u32 + 1));
+    let (start, named) = strings.filter(|(_, s)| d.message.contains(s)).max_by_key(|(_, s)| s.len())?;
+    Some(Span::new(start as u32 - 1, (start + named.len()) as u32 + 1))
+}
+
+/// A finding at a place of the project file.
+fn placed(mut d: Diagnostic, place: Span) -> Diagnostic {
     d.labels.truncate(1);
     for label in &mut d.labels {
-        label.file = FileId(0);
-        label.span = place.unwrap_or(label.span);
+        (label.file, label.span) = (FileId(0), place);
     }
     d
 }
@@ -83,15 +86,18 @@ impl Host for Editor {
     fn station(&self, path: &Path, settings: &Settings) -> Station {
         let (station, sources, found) = own_station(path, settings);
         let project = station.project.as_ref().and_then(|p| Some((p.path.clone(), crate::sources::read(&p.path).ok()?.text)));
-        let found = found.into_iter().filter_map(|d| {
+        let (mut placed_found, mut said) = (Vec::new(), Vec::new());
+        for d in found {
             let own = sources.get(d.primary().0).filter(|f| Path::new(&f.name).is_file());
-            match own {
-                Some(file) => Some((file.name.clone().into(), file.text.to_string(), d)),
-                // A file that is not there, a name that does not exist: told where the project names it.
-                None => project.clone().map(|(path, text)| (path, text.clone(), named_in(&text, d))),
+            // A file that is not there, a name that does not exist: told where the project names it, or else it stands
+            // in the settings.
+            let project = || project.as_ref().and_then(|(path, text)| Some((path, text, named_in(text, &d)?)));
+            match (own, project()) {
+                (Some(file), _) => placed_found.push((file.name.clone().into(), file.text.to_string(), d)),
+                (None, Some((path, text, place))) => placed_found.push((path.clone(), text.clone(), placed(d, place))),
+                (None, None) => said.push(d.message),
             }
-        });
-        let found = found.collect();
+        }
         let chosen = settings.dialect.as_deref().and_then(gr_spec::Dialect::find);
         let shared = Arc::new(station);
         let of = shared.clone();
@@ -108,7 +114,8 @@ impl Host for Editor {
             }),
             machine: shared.machine.clone().map(Arc::new),
             files: shared.files.clone(),
-            found,
+            found: placed_found,
+            said,
             own: Some(shared),
         }
     }
@@ -123,7 +130,10 @@ impl Host for Editor {
             // What its names lead to: dialects, machines, lints and files that are not there. As it is on disk.
             let (_, sources, more) = own_station(path, &Settings::default());
             let here = |d: &Diagnostic| sources.get(d.primary().0).is_none_or(|f| Path::new(&f.name) == path || f.text.is_empty());
-            found.extend(more.into_iter().filter(here).map(|d| named_in(text, d)));
+            found.extend(more.into_iter().filter(here).map(|d| match named_in(text, &d) {
+                Some(place) => placed(d, place),
+                None => d,
+            }));
         }
         found
     }

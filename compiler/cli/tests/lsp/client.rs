@@ -15,7 +15,7 @@ const PATIENCE: Duration = Duration::from_secs(60);
 /// A running server and a folder of files.
 pub struct Client {
     child: Child,
-    to: ChildStdin,
+    to: Option<ChildStdin>,
     from: Receiver<Value>,
     pub folder: tempfile::TempDir,
     next: i64,
@@ -26,6 +26,8 @@ pub struct Client {
     pub found: BTreeMap<String, (i64, Value)>,
     /// Requests of the server that came in.
     pub asked: Vec<String>,
+    /// What the user was shown.
+    pub said: Vec<String>,
     pub capabilities: Value,
 }
 
@@ -72,7 +74,7 @@ impl Client {
         });
         let mut c = Client {
             child,
-            to,
+            to: Some(to),
             from,
             folder,
             next: 0,
@@ -81,6 +83,7 @@ impl Client {
             settings,
             found: BTreeMap::new(),
             asked: Vec::new(),
+            said: Vec::new(),
             capabilities: Value::Null,
         };
         let root = c.uri("");
@@ -108,8 +111,9 @@ impl Client {
         format!("file://{}", self.path(name).display())
     }
     pub fn raw(&mut self, bytes: &[u8]) {
-        self.to.write_all(bytes).expect("the server reads");
-        self.to.flush().expect("flushed");
+        let to = self.to.as_mut().expect("the server is there");
+        to.write_all(bytes).expect("the server reads");
+        to.flush().expect("flushed");
     }
     fn send(&mut self, mut message: Value) {
         message["jsonrpc"] = "2.0".into();
@@ -151,6 +155,8 @@ impl Client {
             let p = &m["params"];
             let uri = p["uri"].as_str().unwrap_or("").to_string();
             self.found.insert(uri, (p["version"].as_i64().unwrap_or(-1), p["diagnostics"].clone()));
+        } else if method == "window/showMessage" {
+            self.said.push(m["params"]["message"].as_str().unwrap_or("").to_string());
         } else if !m["id"].is_null() {
             let result = if method == "workspace/configuration" { json!([self.settings]) } else { Value::Null };
             self.send(json!({ "id": m["id"], "result": result }));
@@ -265,6 +271,18 @@ impl Client {
         self.notify("exit", Value::Null);
         let status = self.child.wait().expect("it ends");
         assert!(status.success(), "{status}");
+    }
+    /// Goes away without a word: whether the server ends too, in time.
+    pub fn hang_up(&mut self) -> bool {
+        self.to = None;
+        let start = std::time::Instant::now();
+        while start.elapsed() < PATIENCE {
+            if !self.lives() {
+                return true;
+            }
+            std::thread::sleep(Duration::from_millis(10));
+        }
+        false
     }
     /// Whether the server still runs.
     pub fn lives(&mut self) -> bool {

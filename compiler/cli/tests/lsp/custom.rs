@@ -23,11 +23,11 @@ fn bytes(v: &Value) -> Vec<u8> {
     out
 }
 
-fn floats(v: &Value) -> Vec<f32> {
+pub fn floats(v: &Value) -> Vec<f32> {
     bytes(v).chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect()
 }
 
-fn integers(v: &Value) -> Vec<u32> {
+pub fn integers(v: &Value) -> Vec<u32> {
     bytes(v).chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect()
 }
 

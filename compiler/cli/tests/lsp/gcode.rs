@@ -445,3 +445,56 @@ fn the_chosen_robot_is_asked() {
     assert_eq!(of_robot(&found), None);
     c.shut_down();
 }
+
+#[test]
+fn mistakes_in_called_files_are_told_at_the_call() {
+    let files = [("a.ngc", "G21 F100\nG0 X1\no<b> call\nM2\n"), ("b.ngc", "o<b> sub\nG1 XO\no<b> endsub\n"), ("gcc-robot.toml", "schema = 1\n[project]\nsubs = [\".\"]\n")];
+    let told = |d: &Value| {
+        let there = &d["relatedInformation"][0]["location"];
+        let name = there["uri"].as_str().unwrap_or("").rsplit('/').next().unwrap_or("").to_string();
+        format!("{}:{} {} -> {name}:{}", d["severity"], d["range"]["start"]["line"], d["message"].as_str().unwrap_or(""), there["range"]["start"]["line"])
+    };
+    let mut c = Client::new(&files, json!({}));
+    let uri = c.open("a.ngc", None);
+    let pushed: Vec<String> = c.diagnostics(&uri).iter().map(told).collect();
+    c.shut_down();
+    let mut c = Client::pulling(&files);
+    let uri = c.open("a.ngc", None);
+    let pulled = c.request("textDocument/diagnostic", json!({ "textDocument": { "uri": uri } }));
+    let pulled: Vec<String> = pulled["items"].as_array().expect("a list").iter().map(told).collect();
+    assert_eq!(pushed, pulled);
+    insta::assert_snapshot!(pushed.join("\n"));
+    c.shut_down();
+}
+
+#[test]
+fn times_are_those_of_the_machine() {
+    // Slow axes: corners, starts and stops cost more than way / feed says.
+    let ini = "[TRAJ]\nLINEAR_UNITS = mm\n[AXIS_X]\nMAX_VELOCITY = 50\nMAX_ACCELERATION = 20\n[AXIS_Y]\nMAX_VELOCITY = 50\nMAX_ACCELERATION = 20\n[AXIS_Z]\nMAX_VELOCITY = 10\nMAX_ACCELERATION = 20\n";
+    let text = "G21 G90 G61\nF1200\nG0 Z5\nG1 X10\nY10\no1 repeat [2]\n  G2 X20 Y20 R10\n  G1 X10 Y10\no1 endrepeat\nM2\n";
+    let mut c = Client::new(&[("a.ngc", text), ("mill.ini", ini)], json!({ "ini": "mill.ini", "hints": { "position": "off", "motion": false, "arc": false, "modes": false } }));
+    let uri = c.open("a.ngc", None);
+    let _ = c.diagnostics(&uri);
+    // The path in the preview has the time of every point.
+    let p = c.request("gccRobot/preview", json!({ "textDocument": { "uri": uri } }));
+    let (lines, times) = (crate::custom::integers(&p["lines"]), crate::custom::floats(&p["times"]));
+    let of_line = |line: u32| {
+        let first = lines.iter().position(|l| *l == line).expect("the line");
+        let end = (first..lines.len()).find(|i| lines[*i] != line).unwrap_or(lines.len());
+        times[end - 1] - if first == 0 { 0.0 } else { times[first - 1] }
+    };
+    let hints = c.request("textDocument/inlayHint", json!({ "textDocument": { "uri": uri }, "range": { "start": { "line": 0, "character": 0 }, "end": { "line": 20, "character": 0 } } }));
+    let shown: Vec<(u64, String)> = hints.as_array().expect("hints").iter().map(|h| (h["position"]["line"].as_u64().expect("a line"), h["label"].as_str().unwrap_or("").into())).collect();
+    assert_eq!(shown.iter().map(|s| s.0).collect::<Vec<_>>(), [2, 3, 4, 6, 7], "{shown:?}");
+    for (line, text) in &shown {
+        let said: f32 = text.trim_end_matches(" s").parse().unwrap_or_else(|_| panic!("{text}"));
+        let path = of_line(*line as u32);
+        assert!((said - path).abs() < 0.011, "line {line}: {said} s, in the preview {path} s");
+    }
+    // 10 mm at 20 mm/s would take 0.5 s; from rest to rest with 20 mm/s² it is about 1.4 s.
+    assert!(shown[1].1.starts_with("1.4"), "{shown:?}");
+    let state = c.request("gccRobot/state", json!({ "textDocument": { "uri": uri }, "position": { "line": 3, "character": 0 } }));
+    assert!(state["block"]["seconds"].as_f64().is_some_and(|s| (s as f32 - of_line(3)).abs() < 0.011), "{state}");
+    assert!(c.hover(&uri, "G1 X|10\nY10").contains("time 1.4"), "{}", c.hover(&uri, "G1 X|10\nY10"));
+    c.shut_down();
+}

@@ -209,3 +209,103 @@ fn clients_that_ask_for_diagnostics_are_told_when_to() {
     assert_eq!(errors(&after), 0, "{after}");
     c.shut_down();
 }
+
+#[test]
+fn messages_that_are_none_do_no_harm() {
+    let mut c = Client::new(&[("a.ngc", "G21\nM2\n")], json!({}));
+    let uri = c.open("a.ngc", None);
+    let bodies: [&[u8]; 9] = [b"[]", b"null", b"7", b"{}", b"\"\xff\"", br#"{"jsonrpc":"1.0","id":1,"method":"x"}"#, br#"{"jsonrpc":"2.0","id":{},"method":"x"}"#, br#"{"jsonrpc":"2.0","method":[]}"#, br#"{"jsonrpc":"2.0","id":5,"result":1e999}"#];
+    for body in bodies {
+        c.raw(format!("Content-Length: {}\r\n\r\n", body.len()).as_bytes());
+        c.raw(body);
+        assert!(c.hover(&uri, "G2|1").starts_with("**G21**"), "{}", String::from_utf8_lossy(body));
+    }
+    // A length that is too great takes the next message along, not the one after it.
+    c.raw(b"Content-Length: 30\r\n\r\n{");
+    c.notify("no/such", json!({ "a long": "one, so that it holds what is missing" }));
+    assert!(c.hover(&uri, "G2|1").starts_with("**G21**"));
+    // Half of a surrogate pair in an edit: a character that is none, and not an edit that is lost.
+    let body = format!(r#"{{"jsonrpc":"2.0","method":"textDocument/didChange","params":{{"textDocument":{{"uri":"{uri}","version":2}},"contentChanges":[{{"range":{{"start":{{"line":0,"character":0}},"end":{{"line":0,"character":0}}}},"text":"(\ud83d)\nG1 XO\n"}}]}}}}"#);
+    c.raw(format!("Content-Length: {}\r\n\r\n{body}", body.len()).as_bytes());
+    let found = c.next_diagnostics(&uri);
+    assert!(found.iter().any(|d| d["range"]["start"]["line"] == 1 && d["severity"] == 1), "{found:?}");
+    c.shut_down();
+}
+
+#[test]
+fn a_client_that_is_gone_takes_the_server_with_it() {
+    let mut c = Client::new(&[("a.ngc", &minutes())], json!({}));
+    let uri = c.open("a.ngc", None);
+    let at = c.at(&uri, "G0 X|1");
+    c.begin("textDocument/hover", at);
+    std::thread::sleep(std::time::Duration::from_millis(200));
+    assert!(c.lives());
+    assert!(c.hang_up());
+}
+
+#[test]
+fn mistakes_in_settings_are_told() {
+    let settings = json!({ "machine": "klingon/1", "tools": "none.tbl", "hints": { "tme": false, "position": "sometimes" }, "mostProblems": -1 });
+    let mut c = Client::new(&[("a.ngc", "G21\nM2\n")], settings);
+    let uri = c.open("a.ngc", None);
+    let _ = c.diagnostics(&uri);
+    assert!(c.hover(&uri, "G2|1").starts_with("**G21**"));
+    let mut said = c.said.join("\n").replace("; ", "\n");
+    said = said.replace(&c.folder.path().display().to_string(), "…");
+    let mut said: Vec<&str> = said.lines().map(|l| l.trim_start_matches("gcc-robot settings: ")).collect();
+    said.sort_unstable();
+    insta::assert_snapshot!(said.join("\n"));
+    // Sent again, they are not told again; put right, the rest is told.
+    let count = c.said.len();
+    c.settings = json!({ "machine": "generic/mill3", "tools": "none.tbl", "hints": { "tme": false } });
+    c.notify("workspace/didChangeConfiguration", json!({ "settings": {} }));
+    for _ in 0..500 {
+        let _ = c.hover(&uri, "G2|1");
+        if c.said.len() > count {
+            break;
+        }
+        std::thread::sleep(std::time::Duration::from_millis(10));
+    }
+    let new = c.said[count..].join("\n");
+    assert!(!new.contains("tme") && !new.contains("klingon") && new.contains("none.tbl"), "{new}");
+    c.shut_down();
+}
+
+#[test]
+fn programs_that_are_not_open_are_looked_at() {
+    let files = [("a.ngc", "G21\nM2\n"), ("b.ngc", "G21\nG1 XO\nM2\n"), ("gcc-robot.toml", "schema = 1\n[project]\nmachine = \"klingon/1\"\n")];
+    let mut c = Client::pulling(&files);
+    assert_eq!(c.capabilities["diagnosticProvider"]["workspaceDiagnostics"], true);
+    let _ = c.open("a.ngc", None);
+    let b = c.uri("b.ngc");
+    let report = |c: &mut Client, have: Value| {
+        for _ in 0..600 {
+            let all = c.request("workspace/diagnostic", json!({ "previousResultIds": have }));
+            if let Some(of_b) = all["items"].as_array().expect("a list").iter().find(|i| i["uri"] == b) {
+                assert_eq!(all["items"].as_array().map(Vec::len), Some(1), "open documents are asked for themselves: {all}");
+                return of_b.clone();
+            }
+            std::thread::sleep(std::time::Duration::from_millis(20));
+        }
+        panic!("nothing about {b}");
+    };
+    let first = report(&mut c, json!([]));
+    assert_eq!((first["kind"].as_str(), first["items"][0]["range"]["start"]["line"].as_u64()), (Some("full"), Some(1)), "{first}");
+    let same = report(&mut c, json!([{ "uri": b, "value": first["resultId"] }]));
+    assert_eq!((same["kind"].as_str(), &same["resultId"]), (Some("unchanged"), &first["resultId"]));
+    // On disk it is put right.
+    c.write("b.ngc", "G21\nG1 X0 F100\nM2\n");
+    let mut now = report(&mut c, json!([]));
+    for _ in 0..100 {
+        if now["items"] == json!([]) {
+            break;
+        }
+        std::thread::sleep(std::time::Duration::from_millis(20));
+        now = report(&mut c, json!([]));
+    }
+    assert_eq!(now["items"], json!([]), "{now}");
+    // What is wrong with the project file is pushed: nobody asks about a file that is not open.
+    let project = c.uri("gcc-robot.toml");
+    assert!(c.found.get(&project).is_some_and(|f| f.1[0]["message"].as_str().is_some_and(|m| m.contains("klingon/1"))), "{:?}", c.found);
+    c.shut_down();
+}

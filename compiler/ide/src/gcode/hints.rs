@@ -58,6 +58,8 @@ pub struct Ran<'a> {
     pub after: &'a Modal,
     /// Its motion.
     pub program: &'a Program,
+    /// The time it takes in the program, s; none where it is not known.
+    pub seconds: Option<f64>,
 }
 
 /// Times below this are not worth a remark, s.
@@ -125,8 +127,12 @@ fn of_line(line: &LineOf<'_>, run: &Ran<'_>, kinds: &HintKinds, found: &mut Vec<
             tail.push((changed, HintKind::Modes));
         }
     }
-    if kinds.time && moved && m.totals.untimed == 0 && m.totals.seconds() >= SHORT {
-        tail.push((duration(m.totals.seconds()), HintKind::Time));
+    if kinds.time
+        && moved
+        && m.totals.untimed == 0
+        && let Some(seconds) = run.seconds.filter(|s| *s >= SHORT)
+    {
+        tail.push((duration(seconds), HintKind::Time));
     }
     for (text, kind) in tail {
         push(end, text, kind, String::new());

@@ -24,6 +24,8 @@ pub struct Run {
     pub value: Option<(Option<f64>, Option<f64>)>,
     /// A canned cycle made the moves.
     pub cycle: bool,
+    /// The time it takes in the program, s; none where it is not worked out.
+    pub seconds: Option<f64>,
     /// Joint values at the end of the block in words, or why they are not known; may be empty.
     pub joints: String,
 }
@@ -240,7 +242,11 @@ pub fn block(run: &Run) -> String {
         if m.feed > 0.0 {
             facts.push(format!("feed {} mm/min", number(m.feed, 1)));
         }
-        facts.push(if m.totals.untimed > 0 { "time unknown: no feed or spindle speed".into() } else { format!("time {}", duration(m.totals.seconds())) });
+        facts.push(match run.seconds {
+            _ if m.totals.untimed > 0 => "time unknown: no feed or spindle speed".into(),
+            Some(seconds) => format!("time {}", duration(seconds)),
+            None => "time not worked out in a program of this size".into(),
+        });
         lines.push(facts.join(", "));
     } else if m.totals.wait_ns > 0 {
         lines.push(format!("waits {}", duration(m.totals.seconds())));
