@@ -30,8 +30,8 @@ pub enum Message {
     Close { uri: lsp::Uri },
     /// Files on disk changed.
     Disk { paths: Vec<PathBuf> },
-    /// The client counts columns in bytes, and asks for diagnostics itself.
-    Client { columns: Columns },
+    /// How the client counts columns, and whether it says which files change on disk.
+    Client { columns: Columns, watching: bool },
     /// Settings.
     Settings(Box<Settings>),
     /// Folders.
@@ -47,7 +47,7 @@ pub enum Message {
     /// Diagnostics of the lines around the last edit were found; those of the rest follow.
     Early { uri: lsp::Uri, version: i32, lines: Range<u32>, found: Vec<Diagnostic> },
     /// Diagnostics of a version were found.
-    Found { uri: lsp::Uri, version: i32, found: Option<Arc<Vec<Diagnostic>>> },
+    Found { uri: lsp::Uri, version: i32, calls: bool, found: Option<Arc<Vec<Diagnostic>>> },
     /// Looking for diagnostics of a version broke off by a mistake of the server.
     Failed { uri: lsp::Uri, version: i32 },
 }
@@ -68,6 +68,9 @@ pub enum Event {
 
 /// Of a text, what says its dialect: more than the first 200 lines of any program that people read.
 pub const HEAD: u32 = 65_536;
+
+/// Larger files are not read from disk, bytes.
+const MOST_ON_DISK: u64 = 1 << 30;
 
 /// Documents of this size are worth a progress report.
 const BIG: u32 = 4_000_000;
@@ -97,6 +100,9 @@ pub struct Analysis {
     documents: HashMap<lsp::Uri, Document>,
     stations: BTreeMap<PathBuf, Arc<Station>>,
     columns: Columns,
+    watching: bool,
+    /// When files on disk were looked at last, for clients that do not watch them.
+    looked: Option<std::time::Instant>,
     settings: Arc<Settings>,
     workspace: Arc<Workspace>,
     host: Arc<dyn Host>,
@@ -105,6 +111,8 @@ pub struct Analysis {
     /// What was said about settings that lead nowhere: once is enough.
     said: BTreeSet<String>,
     closed: Closed,
+    /// Files that are asked about and not open, as they were on disk; the last used at the end.
+    unopened: Vec<(Option<(std::time::SystemTime, u64)>, Document)>,
     reads: Sender<Job>,
     checks: Sender<Job>,
     background: Sender<Job>,
@@ -119,12 +127,15 @@ impl Analysis {
             documents: HashMap::new(),
             stations: BTreeMap::new(),
             columns: Columns::default(),
+            watching: false,
+            looked: None,
             settings: Arc::default(),
             workspace: Arc::default(),
             host,
             told: BTreeMap::new(),
             said: BTreeSet::new(),
             closed: Closed::default(),
+            unopened: Vec::new(),
             reads: workers(2),
             checks: workers(1),
             background: workers(1),
@@ -153,7 +164,7 @@ impl Analysis {
             Message::Change { uri, version, changes } => self.change(&uri, version, changes),
             Message::Close { uri } => self.close(&uri, publish),
             Message::Disk { paths } => self.disk(&paths, publish),
-            Message::Client { columns } => self.columns = columns,
+            Message::Client { columns, watching } => (self.columns, self.watching) = (columns, watching),
             Message::Settings(settings) => {
                 if *settings != *self.settings {
                     self.said.clear();
@@ -171,7 +182,7 @@ impl Analysis {
                 self.workspace.set_folders(folders);
             }
             Message::Ask { uri, work } => {
-                let view = self.view(&uri);
+                let view = self.view(&uri).or_else(|| self.from_disk(&uri, publish));
                 let _ = self.reads.send(Box::new(move || work(view)));
             }
             Message::AskAll { work } => work(self),
@@ -185,7 +196,7 @@ impl Analysis {
             }
             Message::Closed { path, found } => self.closed.put(path, found),
             Message::Early { uri, version, lines, found } => self.early(&uri, version, &lines, found, publish),
-            Message::Found { uri, version, found } => self.found(&uri, version, found, publish),
+            Message::Found { uri, version, calls, found } => self.found(&uri, version, calls, found, publish),
             Message::Failed { uri, version } => self.failed(&uri, version, publish),
         }
     }
@@ -211,11 +222,50 @@ impl Analysis {
 
     /// What a request about a document works on.
     fn view(&self, uri: &lsp::Uri) -> Option<View> {
-        let document = self.documents.get(uri)?;
+        self.documents.get(uri).map(|d| self.view_of(d))
+    }
+
+    /// The same of a file that is not open: editors do not hand over the text of very large ones. The last ones are kept
+    /// until they change on disk.
+    fn from_disk(&mut self, uri: &lsp::Uri, publish: &(impl Fn(Event) + Clone + Send + 'static)) -> Option<View> {
+        const MOST: usize = 2;
+        let path = uri.to_file_path().map(|p| p.into_owned()).filter(|p| self.workspace.holds(p))?;
+        let stamp = crate::closed::stamp(&path).filter(|s| s.1 <= MOST_ON_DISK);
+        if let Some(at) = self.unopened.iter().position(|(s, d)| d.uri == *uri && *s == stamp && stamp.is_some()) {
+            let known = self.unopened.remove(at);
+            self.unopened.push(known);
+        } else {
+            self.forget_unopened(|d| d.uri == *uri);
+            let text = gr_text::decode(std::fs::read(&path).ok().filter(|_| stamp.is_some())?).text;
+            let document = self.document(uri.clone(), String::new(), 0, &text, publish);
+            if matches!(document.kind, Kind::Other) {
+                return None;
+            }
+            self.unopened.push((stamp, document));
+            if self.unopened.len() > MOST {
+                let oldest = self.unopened[0].1.uri.clone();
+                self.forget_unopened(|d| d.uri == oldest);
+            }
+        }
+        self.unopened.last().map(|(_, d)| self.view_of(d))
+    }
+
+    fn forget_unopened(&mut self, which: impl Fn(&Document) -> bool) {
+        let session = &mut self.session;
+        self.unopened.retain(|(_, d)| {
+            let gone = which(d);
+            if let (true, Kind::Gcode(file, _)) = (gone, d.kind) {
+                session.close(file);
+            }
+            !gone
+        });
+    }
+
+    fn view_of(&self, document: &Document) -> View {
         let session = matches!(document.kind, Kind::Gcode(..)).then(|| self.session.snapshot());
-        let others = self.open_files().into_iter().filter(|o| o.uri != *uri).collect();
+        let others = self.open_files().into_iter().filter(|o| o.uri != document.uri).collect();
         let (settings, host, workspace) = (self.settings.clone(), self.host.clone(), self.workspace.clone());
-        Some(View::new(document, self.columns, settings, host, workspace, Arc::new(others), session))
+        View::new(document, self.columns, settings, host, workspace, Arc::new(others), session)
     }
 
     /// What programs below a folder are run with.
@@ -270,14 +320,19 @@ impl Analysis {
     fn open(&mut self, uri: lsp::Uri, language: String, version: i32, text: &str, publish: &(impl Fn(Event) + Clone + Send + 'static)) {
         // A client that opens a document twice means the second text.
         self.forget(&uri);
+        self.forget_unopened(|d| d.uri == uri);
+        let document = self.document(uri.clone(), language, version, text, publish);
+        self.documents.insert(uri, document);
+    }
+
+    fn document(&mut self, uri: lsp::Uri, language: String, version: i32, text: &str, publish: &impl Fn(Event)) -> Document {
         let path = path_of(&uri);
         let station = self.station(&path, publish);
         let kind = kind_of(&path, &language, text).unwrap_or_else(|| {
             let dialect = (station.dialect_of)(&path, text);
             Kind::Gcode(self.session.open(&path.to_string_lossy(), text, station.options(dialect)), dialect)
         });
-        let document = Document::new(uri.clone(), path, language, version, Arc::new(Text::new(text)), kind, station);
-        self.documents.insert(uri, document);
+        Document::new(uri, path, language, version, Arc::new(Text::new(text)), kind, station)
     }
 
     fn change(&mut self, uri: &lsp::Uri, version: i32, changes: Vec<lsp::TextDocumentContentChangeEvent>) {
@@ -302,6 +357,12 @@ impl Analysis {
         document.derived = Arc::default();
         document.stale = true;
         self.look_again(uri);
+        self.callers_again(uri);
+    }
+
+    /// Other programs that call subroutines may call those of this one.
+    fn callers_again(&mut self, changed: &lsp::Uri) {
+        self.documents.values_mut().filter(|d| d.calls && d.uri != *changed).for_each(|d| d.stale = true);
     }
 
     /// The dialect may be declared in the first lines, and what the document is by its first characters.
@@ -372,6 +433,7 @@ impl Analysis {
     fn reload(&mut self, publish: &(impl Fn(Event) + Clone + Send + 'static)) {
         self.stations.clear();
         self.closed.forget();
+        self.forget_unopened(|_| true);
         let uris: Vec<lsp::Uri> = self.documents.keys().cloned().collect();
         for uri in uris {
             let Some(path) = self.documents.get(&uri).map(|d| d.path.clone()) else { continue };
@@ -389,8 +451,19 @@ impl Analysis {
         }
     }
 
+    /// For clients that do not watch files: programs that call others are run with what is on disk now.
+    fn look_at_disk(&mut self) {
+        const EVERY: std::time::Duration = std::time::Duration::from_secs(1);
+        let due = self.looked.is_none_or(|t| t.elapsed() >= EVERY);
+        if !self.watching && due && self.documents.values().any(|d| d.stale && d.calls) {
+            self.session.disk_changed();
+            self.looked = Some(std::time::Instant::now());
+        }
+    }
+
     /// Has diagnostics of changed documents found.
     fn check(&mut self, publish: &(impl Fn(Event) + Clone + Send + 'static)) {
+        self.look_at_disk();
         let stale: Vec<lsp::Uri> = self.documents.values().filter(|d| d.stale).map(|d| d.uri.clone()).collect();
         for uri in stale {
             let Some(view) = self.view(&uri) else { continue };
@@ -407,13 +480,14 @@ impl Analysis {
                 if let Ok(Some((lines, found))) = crate::features::early(&view) {
                     let _ = own.send(Message::Early { uri: uri.clone(), version, lines, found });
                 }
+                let calls = crate::features::calls(&view);
                 let found = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| crate::features::diagnostics(view)));
                 if big {
                     publish(Event::Busy { uri: uri.clone(), begins: false });
                 }
                 let _ = own.send(match found {
                     // Cut short by an edit: the edit has made the document stale again.
-                    Ok(found) => Message::Found { uri, version, found: found.ok().map(Arc::new) },
+                    Ok(found) => Message::Found { uri, version, calls, found: found.ok().map(Arc::new) },
                     Err(_) => Message::Failed { uri, version },
                 });
             };
@@ -421,7 +495,7 @@ impl Analysis {
         }
     }
 
-    fn found(&mut self, uri: &lsp::Uri, version: i32, found: Option<Arc<Vec<Diagnostic>>>, publish: &impl Fn(Event)) {
+    fn found(&mut self, uri: &lsp::Uri, version: i32, calls: bool, found: Option<Arc<Vec<Diagnostic>>>, publish: &impl Fn(Event)) {
         let Some(document) = self.documents.get_mut(uri) else { return };
         let Some(found) = found else {
             // Cut short although nothing changed in this document: another one was edited.
@@ -431,8 +505,14 @@ impl Analysis {
         if document.version != version {
             return;
         }
+        document.calls = calls;
+        // Looked at again for the sake of another document, and nothing is new.
+        if document.published == Some(version) && document.found == found {
+            return;
+        }
         document.found = found;
         document.failed = false;
+        document.published = Some(version);
         self.publish(uri, publish);
         publish(Event::Analysed { uri: uri.clone(), version });
     }

@@ -25,7 +25,8 @@ const MOST_BYTES: u64 = 2_000_000;
 /// What a file is recognized by.
 type Stamp = Option<(SystemTime, u64)>;
 
-fn stamp(path: &Path) -> Stamp {
+/// When a file was changed, and its size.
+pub fn stamp(path: &Path) -> Stamp {
     let meta = std::fs::metadata(path).ok()?;
     Some((meta.modified().ok()?, meta.len()))
 }

@@ -233,6 +233,10 @@ impl View {
             _ => None,
         }
     }
+    /// Breaks off what is asked of the database, from another thread.
+    pub fn canceller(&self) -> Option<gr_driver::Canceller> {
+        self.session.as_ref().map(Snapshot::canceller)
+    }
     /// The document was edited since: work on this view is of no use to anybody.
     pub fn is_overtaken(&self) -> bool {
         self.latest.load(Ordering::Relaxed) != self.version
@@ -399,6 +403,10 @@ pub struct Document {
     pub stale: bool,
     /// Diagnostics that were found last; edits since have moved them.
     pub found: Arc<Vec<Diagnostic>>,
+    /// The version whose diagnostics were sent.
+    pub published: Option<i32>,
+    /// It has subroutines, calls or jumps: what it does may depend on other documents.
+    pub calls: bool,
     /// Looking for them broke off by a mistake of the server, and the user was told.
     pub failed: bool,
     /// The line that was edited last: what is visible is around it.
@@ -424,6 +432,8 @@ impl Document {
             station,
             stale: true,
             found: Arc::default(),
+            published: None,
+            calls: false,
             failed: false,
             focus: 0,
             derived: Arc::default(),

@@ -28,13 +28,13 @@ mod workspace;
 
 use std::sync::Arc;
 
-/// Serves one client on standard input and output until it says `exit`.
-pub fn run(host: Arc<dyn host::Host>) -> std::io::Result<()> {
+/// Serves one client on standard input and output until it says `exit`. Whether it said `shutdown` before.
+pub fn run(host: Arc<dyn host::Host>) -> std::io::Result<bool> {
     let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_time().build()?;
-    runtime.block_on(server::serve(tokio::io::stdin(), tokio::io::stdout(), host));
+    let goodbye = runtime.block_on(server::serve(tokio::io::stdin(), tokio::io::stdout(), host));
     // A worker may still be running a program nobody waits for.
     runtime.shutdown_background();
-    Ok(())
+    Ok(goodbye)
 }
 
 pub use server::serve;

@@ -1,9 +1,12 @@
 //! The handlers: each puts a message on the queue before it waits for anything, so that the queue has the order of the
 //! client.
 
+use std::future::Future as _;
 use std::path::PathBuf;
 use std::sync::mpsc::{Sender, channel};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
+use std::task::Poll;
 
 use serde_json::{Value, json};
 use tokio::io::{AsyncRead, AsyncWrite};
@@ -31,6 +34,9 @@ struct Abilities {
     lens_refresh: bool,
     diagnostic_refresh: bool,
     pulls: bool,
+    /// Of code actions, what they do.
+    resolves: bool,
+    snippets: bool,
 }
 
 #[derive(Clone)]
@@ -40,6 +46,8 @@ struct Backend {
     abilities: Arc<Mutex<Abilities>>,
     /// What was wrong with the settings when they were read last.
     mistakes: Arc<Mutex<Vec<String>>>,
+    /// The client said `shutdown`.
+    goodbye: Arc<AtomicBool>,
 }
 
 /// The text of an answer that was overtaken.
@@ -49,8 +57,20 @@ fn overtaken() -> Error {
     Error { code: ErrorCode::ContentModified, message: OVERTAKEN.into(), data: None }
 }
 
+/// A request that somebody waits for. When it is given up, the worker is told.
+#[derive(Default)]
+struct Waiting(Arc<Mutex<Option<gr_driver::Canceller>>>);
+
+impl Drop for Waiting {
+    fn drop(&mut self) {
+        if let Some(running) = self.0.lock().unwrap_or_else(PoisonError::into_inner).take() {
+            running.cancel();
+        }
+    }
+}
+
 impl Backend {
-    fn new(client: Client, host: Arc<dyn Host>) -> Backend {
+    fn new(client: Client, host: Arc<dyn Host>, goodbye: Arc<AtomicBool>) -> Backend {
         let (queue, inbox) = channel();
         let (publish, outbox) = mpsc::unbounded_channel::<Event>();
         let own = queue.clone();
@@ -61,7 +81,7 @@ impl Backend {
         });
         let abilities: Arc<Mutex<Abilities>> = Arc::default();
         tokio::spawn(speak(client.clone(), abilities.clone(), outbox));
-        Backend { queue, client, abilities, mistakes: Arc::default() }
+        Backend { queue, client, abilities, mistakes: Arc::default(), goodbye }
     }
 
     fn tell(&self, message: Message) {
@@ -76,9 +96,12 @@ impl Backend {
     /// Asks about a document on a worker. `None`: it is not open.
     async fn ask<T: Send + 'static>(&self, uri: lsp::Uri, work: impl FnOnce(View) -> Answer<T> + Send + 'static) -> Result<Option<T>> {
         let (send, receive) = oneshot::channel();
+        let waiting = Waiting::default();
+        let running = waiting.0.clone();
         self.tell(Message::Ask {
             uri,
             work: Box::new(move |view| {
+                *running.lock().unwrap_or_else(PoisonError::into_inner) = view.as_ref().and_then(View::canceller);
                 // Nobody waits any more when the request was cancelled.
                 if !send.is_closed() {
                     let _ = send.send(view.map(work).transpose());
@@ -262,7 +285,7 @@ fn capabilities(utf8: bool, pulls: bool) -> lsp::ServerCapabilities {
         "documentHighlightProvider": true,
         "documentSymbolProvider": true,
         "workspaceSymbolProvider": true,
-        "codeActionProvider": { "codeActionKinds": ["quickfix", "refactor.rewrite", "refactor.inline", "source"] },
+        "codeActionProvider": { "codeActionKinds": ["quickfix", "refactor.rewrite", "refactor.inline", "source"], "resolveProvider": true },
         "codeLensProvider": { "resolveProvider": false },
         "documentFormattingProvider": true,
         "documentRangeFormattingProvider": true,
@@ -292,17 +315,21 @@ impl LanguageServer for Backend {
         let can = |path: &str| wire.pointer(path).and_then(Value::as_bool).unwrap_or(false);
         let offered = params.capabilities.general.and_then(|g| g.position_encodings).unwrap_or_default();
         let utf8 = offered.contains(&lsp::PositionEncodingKind::UTF8);
-        self.tell(Message::Client { columns: if utf8 { Columns::Utf8 } else { Columns::Utf16 } });
+        let watching = can("/workspace/didChangeWatchedFiles/dynamicRegistration");
+        self.tell(Message::Client { columns: if utf8 { Columns::Utf8 } else { Columns::Utf16 }, watching });
         let options = params.initialization_options.unwrap_or_default();
         let pulls = options.get("pullDiagnostics").and_then(Value::as_bool).unwrap_or(false);
         *self.abilities.lock().unwrap_or_else(PoisonError::into_inner) = Abilities {
             configuration: can("/workspace/configuration"),
-            watching: can("/workspace/didChangeWatchedFiles/dynamicRegistration"),
+            watching,
             progress: can("/window/workDoneProgress"),
             hint_refresh: can("/workspace/inlayHint/refreshSupport"),
             lens_refresh: can("/workspace/codeLens/refreshSupport"),
             diagnostic_refresh: can("/workspace/diagnostics/refreshSupport") || can("/workspace/diagnostic/refreshSupport"),
             pulls,
+            resolves: wire.pointer("/textDocument/codeAction/resolveSupport/properties").and_then(Value::as_array).is_some_and(|p| p.iter().any(|p| p == "edit"))
+                && can("/textDocument/codeAction/dataSupport"),
+            snippets: can("/textDocument/completion/completionItem/snippetSupport"),
         };
         let folders = params.workspace_folders.unwrap_or_default();
         let mut added: Vec<PathBuf> = folders.iter().filter_map(|f| folder(&f.uri)).collect();
@@ -329,6 +356,7 @@ impl LanguageServer for Backend {
     }
 
     async fn shutdown(&self) -> Result<()> {
+        self.goodbye.store(true, Ordering::Relaxed);
         Ok(())
     }
 
@@ -367,7 +395,8 @@ impl LanguageServer for Backend {
     }
     async fn completion(&self, p: lsp::CompletionParams) -> Result<Option<lsp::CompletionResponse>> {
         let at = p.text_document_position;
-        let list = self.ask_again(at.text_document.uri, move |v| features::completion(v, at.position)).await?;
+        let snippets = self.abilities().snippets;
+        let list = self.ask_again(at.text_document.uri, move |v| features::completion(v, at.position, snippets)).await?;
         Ok(list.map(lsp::CompletionResponse::List))
     }
     async fn signature_help(&self, p: lsp::SignatureHelpParams) -> Result<Option<lsp::SignatureHelp>> {
@@ -404,9 +433,15 @@ impl LanguageServer for Backend {
         Ok(Some(lsp::WorkspaceSymbolResponse::Nested(found.map_err(|_| Error::internal_error())?)))
     }
     async fn code_action(&self, p: lsp::CodeActionParams) -> Result<Option<lsp::CodeActionResponse>> {
-        let (range, only) = (p.range, p.context.only);
-        let found = self.ask(p.text_document.uri, move |v| features::actions(v, range, only.as_deref())).await?;
+        let (range, only, resolves) = (p.range, p.context.only, self.abilities().resolves);
+        let found = self.ask_again(p.text_document.uri, move |v| features::actions(v, range, only.as_deref(), resolves)).await?;
         Ok(found.map(|f| f.into_iter().map(lsp::CodeActionOrCommand::CodeAction).collect()))
+    }
+    async fn code_action_resolve(&self, p: lsp::CodeAction) -> Result<lsp::CodeAction> {
+        let uri = p.data.as_ref().and_then(|d| serde_json::from_value::<lsp::Uri>(d.get("uri")?.clone()).ok());
+        let Some(uri) = uri else { return Ok(p) };
+        let unknown = p.clone();
+        Ok(self.ask(uri, move |v| features::resolve(v, p)).await?.unwrap_or(unknown))
     }
     async fn code_lens(&self, p: lsp::CodeLensParams) -> Result<Option<Vec<lsp::CodeLens>>> {
         self.ask_again(p.text_document.uri, features::lenses).await
@@ -524,17 +559,33 @@ impl Backend {
     }
 }
 
-/// Serves one client on any pair of streams.
-pub async fn serve(input: impl AsyncRead + Unpin + Send + 'static, output: impl AsyncWrite, host: Arc<dyn Host>) {
+/// A client that is gone gets the answers that are ready within this time.
+const GRACE: std::time::Duration = std::time::Duration::from_secs(2);
+
+/// Serves one client on any pair of streams. Whether it said goodbye (`shutdown`) before it left.
+pub async fn serve(input: impl AsyncRead + Unpin + Send + 'static, output: impl AsyncWrite, host: Arc<dyn Host>) -> bool {
     let (clean, input_of_server) = tokio::io::duplex(1 << 20);
-    tokio::spawn(crate::frames::filter(input, clean));
+    let reading = tokio::spawn(crate::frames::filter(input, clean));
     let input = input_of_server;
-    let (service, socket) = LspService::build(move |client| Backend::new(client, host))
+    let goodbye: Arc<AtomicBool> = Arc::default();
+    let said = goodbye.clone();
+    let (service, socket) = LspService::build(move |client| Backend::new(client, host, said))
         .custom_method("gccRobot/preview", Backend::preview)
         .custom_method("gccRobot/output", Backend::output)
         .custom_method("gccRobot/state", Backend::state)
         .custom_method("gccRobot/targets", Backend::targets)
         .custom_method("gccRobot/explain", Backend::explain)
         .finish();
-    Server::new(input, output, socket).concurrency_level(16).serve(service).await;
+    let serving = Server::new(input, output, socket).concurrency_level(16).serve(service);
+    let gone = async {
+        let _ = reading.await;
+        tokio::time::sleep(GRACE).await;
+    };
+    let (mut serving, mut gone) = (std::pin::pin!(serving), std::pin::pin!(gone));
+    std::future::poll_fn(|cx| match (serving.as_mut().poll(cx), gone.as_mut().poll(cx)) {
+        (Poll::Pending, Poll::Pending) => Poll::Pending,
+        _ => Poll::Ready(()),
+    })
+    .await;
+    goodbye.load(Ordering::Relaxed)
 }

@@ -34,6 +34,16 @@ impl Workspace {
     pub fn folders(&self) -> Vec<PathBuf> {
         self.folders.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
+    /// Whether a file lies in one of the folders, whatever way its name takes.
+    pub fn holds(&self, path: &Path) -> bool {
+        let Ok(real) = path.canonicalize() else { return false };
+        real.is_file() && self.folders().iter().filter_map(|f| f.canonicalize().ok()).any(|f| real.starts_with(f))
+    }
+    /// Whether a file that seems to lie in one of the folders lies elsewhere: a link leads out of them.
+    pub fn strays(&self, path: &Path) -> bool {
+        let seems = std::path::absolute(path).is_ok_and(|p| self.folders().iter().any(|f| p.starts_with(f)));
+        seems && !self.holds(path)
+    }
     /// Forgets what was read.
     pub fn forget(&self) {
         self.files.lock().unwrap_or_else(PoisonError::into_inner).clear();

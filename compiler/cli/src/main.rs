@@ -65,7 +65,9 @@ fn run(cli: Cli) -> ExitCode {
         Command::Rs274(args) => commands::rs274::run("gcc-robot rs274".as_ref(), &args.arguments),
         Command::Init(args) => commands::init::run(global, &args).into(),
         Command::Lsp(_) => match gr_lsp::run(std::sync::Arc::new(commands::lsp::Editor)) {
-            Ok(()) => Exit::Ok.into(),
+            Ok(true) => Exit::Ok.into(),
+            // The protocol wants 1 for a client that leaves without `shutdown`.
+            Ok(false) => Exit::Findings.into(),
             Err(_) => Exit::Io.into(),
         },
         Command::Completions(args) => commands::completions::run(&args).into(),

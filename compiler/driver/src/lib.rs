@@ -31,5 +31,5 @@ pub use hover::StateAt;
 pub use lazy::Lazy;
 pub use lints::{Level, Rules};
 pub use rates::rates;
-pub use session::{Cancelled, Options, Session, Snapshot};
+pub use session::{Canceller, Cancelled, Options, Session, Snapshot};
 pub use stream::{Loaded, Motion, Streamed, lower, scan_file, stream};

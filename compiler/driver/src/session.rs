@@ -217,7 +217,22 @@ pub struct Snapshot {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Cancelled;
 
+/// Breaks off what one [`Snapshot`] is doing, from another thread.
+#[derive(Clone)]
+pub struct Canceller(salsa::CancellationToken);
+
+impl Canceller {
+    /// The query that runs, or else the next one, ends with [`Cancelled`].
+    pub fn cancel(&self) {
+        self.0.cancel();
+    }
+}
+
 impl Snapshot {
+    /// Breaks off what this view is doing.
+    pub fn canceller(&self) -> Canceller {
+        Canceller(salsa::Database::cancellation_token(&self.db))
+    }
     /// Everything that is to be said about a file.
     pub fn check(&self, file: FileId) -> Result<Check, Cancelled> {
         self.guarded(file, check::check)

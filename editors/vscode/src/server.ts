@@ -53,8 +53,8 @@ export class Server implements vscode.Disposable {
         documentSelector: [
           ...LANGUAGES.map((language) => ({ scheme: "file", language })),
           ...LANGUAGES.map((language) => ({ scheme: "untitled", language })),
-          { scheme: "file", pattern: "**/gcc-robot.toml" },
-          { scheme: "file", language: "toml", pattern: "**/*machine*.toml" },
+          // Machine files have any name: the server tells them from others by what is in them.
+          { scheme: "file", pattern: "**/*.toml" },
           { scheme: "file", pattern: "**/*.tbl" },
         ],
         // VS Code asks for diagnostics itself; sent ones too would be shown twice.

@@ -6,26 +6,121 @@ use gr_ide::gcode::actions::{Context, write_moves};
 use gr_ide::gcode::names;
 use gr_ide::{Action, ActionKind, Edit, gcode, p21};
 use gr_ir::{FileId, Program};
-use gr_text::{Diagnostic, Span};
+use gr_text::{Diagnostic, Span, code};
 use tower_lsp::ls_types as lsp;
 
 use super::{Answer, Failure, doc, exchange_doc, text_edits};
 use crate::documents::{Kind, Motion, View};
 use crate::protocol::{self, action_kind};
 
-/// Actions for a place, of the kinds that are asked for.
-pub fn actions(mut view: View, range: lsp::Range, only: Option<&[lsp::CodeActionKind]>) -> Answer<Vec<lsp::CodeAction>> {
+/// Whole files above this are rewritten when the action is chosen, not when it is offered, bytes.
+const LATER_ABOVE: u32 = 20_000;
+
+/// Actions for a place, of the kinds that are asked for. `resolves`: the client asks again for what an action that it
+/// carries out does.
+pub fn actions(mut view: View, range: lsp::Range, only: Option<&[lsp::CodeActionKind]>, resolves: bool) -> Answer<Vec<lsp::CodeAction>> {
     let at = Span::new(view.offset(range.start), view.offset(range.end));
-    let wanted = |kind: &lsp::CodeActionKind| only.is_none_or(|o| o.iter().any(|k| kind.as_str() == k.as_str() || kind.as_str().starts_with(&format!("{}.", k.as_str()))));
-    let mut found = fixes(&view, at)?;
-    let more = match view.kind {
-        Kind::Gcode(..) => gcode_actions(&mut view, at)?,
-        Kind::Exchange => p21::actions::actions(exchange_doc(&view.exchange()), at),
+    let asked = |kind: &str| only.is_none_or(|o| o.iter().any(|k| kind == k.as_str() || kind.strip_prefix(k.as_str()).is_some_and(|r| r.starts_with('.'))));
+    let (fix, source) = (asked("quickfix"), asked("source"));
+    let rewrite = asked("refactor.rewrite") || asked("refactor.inline");
+    let (mut found, endings) = if fix { fixes(&view, at)? } else { Default::default() };
+    let units = if rewrite { units(&view, at, resolves)? } else { None };
+    let whole = if source { of_file(&view, resolves, only.is_some())? } else { Vec::new() };
+    let (mut more, ending) = match view.kind {
+        Kind::Gcode(..) => gcode_actions(&mut view, at, rewrite, source || !endings.is_empty())?,
+        Kind::Exchange if fix => (p21::actions::actions(exchange_doc(&view.exchange()), at), None),
+        _ => (Vec::new(), None),
+    };
+    // What a program leaves out at its end is also the cure of what is said about that.
+    if let Some(ending) = ending {
+        if !endings.is_empty() {
+            let mut cure = action(&view, Action { kind: ActionKind::Fix, ..ending.clone() });
+            (cure.diagnostics, cure.is_preferred) = (Some(endings), Some(true));
+            found.push(cure);
+        }
+        more.push(ending);
+    }
+    found.extend(more.into_iter().map(|a| action(&view, a)));
+    found.extend(units);
+    found.extend(whole);
+    found.retain(|a| a.kind.as_ref().is_none_or(|k| asked(k.as_str())));
+    Ok(found)
+}
+
+/// The program in the other unit, offered at the line that says the unit.
+fn units(view: &View, at: Span, resolves: bool) -> Answer<Option<lsp::CodeAction>> {
+    let Some(t) = tables(view)? else { return Ok(None) };
+    let Some(line) = doc(&t).line_at(at.start) else { return Ok(None) };
+    let Some(title) = gcode::actions::units_title(&line).filter(|_| t.1.family != gr_spec::Family::Ufmg2008) else { return Ok(None) };
+    if view.text.len() <= LATER_ABOVE {
+        return Ok(converted(view, line.line)?.map(|a| action(view, a)));
+    }
+    Ok(resolves.then(|| lsp::CodeAction {
+        title: title.into(),
+        kind: Some(action_kind(ActionKind::Rewrite)),
+        data: Some(serde_json::json!({ "uri": view.uri, "line": line.line })),
+        ..lsp::CodeAction::default()
+    }))
+}
+
+fn converted(view: &View, line: u32) -> Answer<Option<Action>> {
+    let Some(t) = tables(view)? else { return Ok(None) };
+    let traced = super::look::trace_line(view, line, &[])?;
+    let Some(of) = doc(&t).line(line) else { return Ok(None) };
+    Ok(gcode::actions::convert_units(doc(&t), &of, traced.as_ref().map(|t| &t.before)))
+}
+
+/// Rewritings of the whole file: of big ones only their names, when the client asks again for what they do. To a client
+/// that does not, they are told where it asks for such.
+fn of_file(view: &View, resolves: bool, asked: bool) -> Answer<Vec<lsp::CodeAction>> {
+    if view.text.len() <= LATER_ABOVE || (!resolves && asked) {
+        return Ok(rewritten(view)?.into_iter().map(|a| action(view, a)).collect());
+    }
+    let titles: Vec<&str> = match view.kind {
+        _ if !resolves => Vec::new(),
+        Kind::Gcode(..) => tables(view)?.and_then(|t| gcode::actions::renumber_title(doc(&t))).into_iter().collect(),
+        Kind::Exchange => p21::actions::OF_FILE.to_vec(),
         _ => Vec::new(),
     };
-    found.extend(more.into_iter().map(|a| action(&view, a)));
-    found.retain(|a| a.kind.as_ref().is_none_or(&wanted));
-    Ok(found)
+    let later = |title: &str| lsp::CodeAction {
+        title: title.into(),
+        kind: Some(action_kind(ActionKind::Source)),
+        data: Some(serde_json::json!({ "uri": view.uri })),
+        ..lsp::CodeAction::default()
+    };
+    Ok(titles.into_iter().map(later).collect())
+}
+
+fn rewritten(view: &View) -> Answer<Vec<Action>> {
+    Ok(match view.kind {
+        Kind::Gcode(_, dialect) if dialect.family == gr_spec::Family::Ufmg2008 => Vec::new(),
+        Kind::Gcode(..) => tables(view)?.and_then(|t| gcode::actions::renumber(doc(&t))).into_iter().collect(),
+        Kind::Exchange => p21::actions::of_file(exchange_doc(&view.exchange())),
+        _ => Vec::new(),
+    })
+}
+
+/// The program of a view; the database is not released.
+fn tables(view: &View) -> Answer<Option<(std::sync::Arc<gr_gcode::File>, &'static gr_spec::Dialect)>> {
+    Ok(match view.session() {
+        Some((session, file, dialect)) => Some((session.file(file)?, dialect)),
+        None => None,
+    })
+}
+
+/// What an action does that was offered by its name.
+pub fn resolve(view: View, mut chosen: lsp::CodeAction) -> Answer<lsp::CodeAction> {
+    if let Some(line) = chosen.data.as_ref().and_then(|d| d.get("line")).and_then(serde_json::Value::as_u64) {
+        let done = converted(&view, u32::try_from(line).unwrap_or(u32::MAX))?;
+        let done = done.ok_or_else(|| Failure::Refused("not every length and feed of this program is a plain number in the one unit".into()))?;
+        chosen.edit = action(&view, done).edit;
+        return Ok(chosen);
+    }
+    let found = rewritten(&view)?.into_iter().find(|a| a.title == chosen.title);
+    // Nothing to be done is done, too.
+    let done = found.unwrap_or(Action { title: String::new(), kind: ActionKind::Source, edits: Vec::new() });
+    chosen.edit = action(&view, done).edit;
+    Ok(chosen)
 }
 
 fn action(view: &View, a: Action) -> lsp::CodeAction {
@@ -39,8 +134,8 @@ fn action(view: &View, a: Action) -> lsp::CodeAction {
     }
 }
 
-/// Fixes of the diagnostics around a place.
-fn fixes(view: &View, at: Span) -> Answer<Vec<lsp::CodeAction>> {
+/// Fixes of the diagnostics around a place; and those of them that are about the end of the program.
+fn fixes(view: &View, at: Span) -> Answer<(Vec<lsp::CodeAction>, Vec<lsp::Diagnostic>)> {
     let own = if let Kind::Gcode(file, _) = view.kind { file } else { FileId(0) };
     // The diagnostics of the last version are what the client shows, but their places may have moved.
     let found: Vec<Diagnostic> = match view.session() {
@@ -53,8 +148,11 @@ fn fixes(view: &View, at: Span) -> Answer<Vec<lsp::CodeAction>> {
         let here = view.range(at);
         file == own && lines.start.line <= here.end.line && here.start.line <= lines.end.line
     };
-    let mut out = Vec::new();
+    let (mut out, mut endings) = (Vec::new(), Vec::new());
     for d in found.iter().filter(touches).take(50) {
+        if [code::PROGRAM_ENDS_EARLY, code::PROGRAM_END_MISSING, code::END_SPINDLE_ON].contains(&d.code) {
+            endings.push(protocol::diagnostic(d, &view.text, view.columns, &|_| None));
+        }
         for (n, fix) in d.fixes.iter().enumerate() {
             let edits: Vec<Edit> =
                 fix.edits.iter().filter(|(file, ..)| *file == own).map(|(_, span, text)| Edit { span: *span, text: text.clone() }).collect();
@@ -70,7 +168,7 @@ fn fixes(view: &View, at: Span) -> Answer<Vec<lsp::CodeAction>> {
             out.extend(d.code.def().lint.then(|| allow(view, d)).flatten());
         }
     }
-    Ok(out)
+    Ok((out, endings))
 }
 
 /// A lint can be switched off for the project.
@@ -83,6 +181,11 @@ fn allow(view: &View, d: &Diagnostic) -> Option<lsp::CodeAction> {
     };
     let slug = d.code.def().slug;
     let (at, new) = allowed(&text, slug);
+    // `lints = { … }` and `lints.strict = …` can't be followed by a table of that name.
+    let after = format!("{}{new}{}", text.get(..at)?, text.get(at..)?);
+    if view.host.check_project(path, &after).iter().any(|d| d.code == code::PROJECT_SYNTAX) {
+        return None;
+    }
     let place = crate::text::Text::new(&text).range(Span::new(at as u32, at as u32), view.columns);
     let mut changes = HashMap::new();
     changes.insert(lsp::Uri::from_file_path(path)?, vec![lsp::TextEdit { range: place, new_text: new }]);
@@ -119,13 +222,21 @@ fn allowed(text: &str, slug: &str) -> (usize, String) {
     }
 }
 
-fn gcode_actions(view: &mut View, at: Span) -> Answer<Vec<Action>> {
-    let Some((session, file, dialect)) = view.session() else { return Ok(Vec::new()) };
-    if dialect.family == gr_spec::Family::Ufmg2008 {
-        return Ok(Vec::new());
+/// Rewritings of a place, and what the program leaves out at its end; each when it is asked for.
+fn gcode_actions(view: &mut View, at: Span, rewrite: bool, ending: bool) -> Answer<(Vec<Action>, Option<Action>)> {
+    let Some((session, file, dialect)) = view.session() else { return Ok(Default::default()) };
+    if dialect.family == gr_spec::Family::Ufmg2008 || !(rewrite || ending) {
+        return Ok(Default::default());
     }
     let tables = (session.file(file)?, dialect);
     let doc = doc(&tables);
+    // Before M2 the state is what it leaves on; behind the last block, what it left.
+    let (last, ends) = gcode::actions::end_line(doc);
+    let end = if ending { session.state_at(file, last)?.map(|s| if ends { s.before } else { s.after }) } else { None };
+    let ending = gcode::actions::missing_end(doc, end.as_ref());
+    if !rewrite {
+        return Ok((Vec::new(), ending));
+    }
     let line = doc.line_at(at.start).map_or(0, |l| l.line);
     let traced = super::look::trace_line(view, line, &[])?;
     let contour = gcode::actions::compensated_lines(doc, line);
@@ -133,37 +244,82 @@ fn gcode_actions(view: &mut View, at: Span) -> Answer<Vec<Action>> {
         Some(lines) => Some((lines.clone(), session.trace(file, lines, &[], super::MOST_BLOCKS)?)),
         None => None,
     };
-    let count = doc.count();
-    let last = session.state_at(file, count.saturating_sub(1))?;
-    // Before M2 the state is what it leaves on; behind the last block, what it left.
-    let ends = doc.line(count.saturating_sub(1)).is_some_and(|l| l.has_code(b'm', 20) || l.has_code(b'm', 300));
-    let end = last.map(|s| if ends { s.before } else { s.after });
-    let calls = names::calls(doc).into_iter().find(|c| c.line == line);
-    let motion = if calls.is_some() && traced.is_some() { view.motion()? } else { None };
+    let may_call = doc.line(line).is_some_and(|l| l.has_code(b'm', 980) || l.words().iter().any(|w| w.form == gr_gcode::Form::Control));
+    let call = if may_call { names::calls(doc).into_iter().find(|c| c.line == line) } else { None };
+    let behind = if call.is_some() { session.state_at(file, line + 1)?.map(|s| s.before) } else { None };
+    let flows = tables.0.chunks.iter().any(|c| !c.scan.controls.is_empty()) || call.is_some();
+    let motion = if traced.is_some() && flows { view.motion()? } else { None };
     view.release();
+    // A block that is run twice can't be written out once.
+    let once = |lines: std::ops::Range<u32>| !flows || motion.as_ref().is_some_and(|m| lines.clone().all(|l| runs_once(m, l)));
     let run = traced.as_ref().map(|t| (&t.before, &t.after, &t.program));
-    let mut found = gcode::actions::actions(doc, at, Context { run, end: end.as_ref() });
-    if let Some((lines, traced)) = &contour {
-        let ran: Vec<(u32, &gr_interp::Modal, &Program)> = traced.iter().map(|t| (t.line, &t.before, &t.program)).collect();
+    let mut found = gcode::actions::actions(doc, at, Context { run, once: once(line..line + 1) });
+    if let Some((lines, traced)) = &contour
+        && once(lines.clone())
+    {
+        let ran: Vec<(u32, &gr_interp::Modal, &gr_interp::Modal, &Program)> = traced.iter().map(|t| (t.line, &t.before, &t.after, &t.program)).collect();
         found.extend(gcode::actions::write_out_compensation(doc, lines.clone(), &ran));
     }
-    if let (Some(t), Some(call), Some(motion)) = (&traced, &calls, &motion) {
-        found.extend(expand_call(motion, doc, call, &t.before));
+    if let (Some(t), Some(call), Some(motion), Some(behind)) = (&traced, &call, &motion, &behind)
+        && !leaves_values(doc, call)
+    {
+        found.extend(expand_call(motion, doc, call, &t.before, behind));
     }
-    Ok(found)
+    Ok((found, ending))
+}
+
+/// Whether a line is run exactly once: it moves in one stretch of the program, or leads to one call or pass.
+fn runs_once(motion: &Motion, line: u32) -> bool {
+    let calls = motion.program.frames.iter().filter(|f| f.file == motion.main && f.line == line).count();
+    let mut cursor = motion.program.cursor();
+    let (mut stretches, mut last) = (0, None);
+    while let Some(view) = cursor.next() {
+        if !view.op.moves() {
+            continue;
+        }
+        let own = view.source.file == motion.main && view.source.line == line;
+        let now = own.then_some(view.source.frame);
+        stretches += usize::from(own && last != now);
+        last = now;
+    }
+    calls <= 1 && stretches <= 1
+}
+
+/// Whether a subroutine, or one that it calls, sets what lives on after it: global parameters and return values. Also
+/// when its text is not in this file.
+fn leaves_values(doc: gcode::Doc<'_>, call: &names::CallSite) -> bool {
+    let (subs, calls) = (names::subs(doc), names::calls(doc));
+    let (mut open, mut seen) = (vec![call.label.clone()], std::collections::BTreeSet::new());
+    while let Some(label) = open.pop() {
+        if !seen.insert(label.clone()) {
+            continue;
+        }
+        let Some(at) = subs.iter().position(|s| s.label == label) else { return true };
+        let lines = subs[at].first..subs[at].last + 1;
+        if gcode::actions::sets_globals(doc, lines) {
+            return true;
+        }
+        open.extend(calls.iter().filter(|c| c.from == Some(at)).map(|c| c.label.clone()));
+    }
+    false
 }
 
 /// Writes the moves that the subroutine called here makes, in place of the call.
-fn expand_call(motion: &Motion, doc: gcode::Doc<'_>, call: &names::CallSite, before: &gr_interp::Modal) -> Option<Action> {
+fn expand_call(motion: &Motion, doc: gcode::Doc<'_>, call: &names::CallSite, before: &gr_interp::Modal, after: &gr_interp::Modal) -> Option<Action> {
+    if gcode::actions::is_shifted(before) || gcode::actions::is_shifted(after) || !runs_once(motion, call.line) {
+        return None;
+    }
     let moves = called_from(&motion.program, motion.main, call.line)?;
     let of = doc.line(call.line)?;
     let words = of.words();
     let first = words.iter().find(|w| w.form != gr_gcode::Form::Comment && w.letter != b'n')?;
     let last = words.iter().rfind(|w| w.form != gr_gcode::Form::Comment)?;
     let span = Span::new(of.tight(first).start, of.tight(last).end);
-    let text = write_moves(&moves, before)?;
+    let (text, code) = write_moves(&moves, before, after, false)?;
+    let mut edits = vec![Edit { span, text }];
+    edits.extend(gcode::actions::goes_on(doc, call.line, code, after)?);
     let title = format!("Write out this call of {}", names::label_text(&call.label));
-    Some(Action { title, kind: ActionKind::Inline, edits: vec![Edit { span, text }] })
+    Some(Action { title, kind: ActionKind::Inline, edits })
 }
 
 /// The operations of the first call from a line of the main file; none when there are too many.

@@ -53,11 +53,27 @@ fn gcode_hover(view: &mut View, offset: u32) -> Answer<Option<gr_ide::Hover>> {
     let pace = view.pace()?;
     view.release();
     let run = traced.map(|t| run_of(view, t, &pace, motion.as_deref(), parameter.is_some()));
-    let written = parameter.and_then(|p| names::last_write(doc, &p, line.line));
+    // The text tells which assignment was the last only where lines are run one after the other.
+    let straight = |p: &Parameter| is_programs_own(p) && tables.0.chunks.iter().all(|c| c.scan.controls.is_empty() && c.scan.lines.iter().all(|l| !l.deleted));
+    let written = parameter.filter(straight).and_then(|p| names::last_write(doc, &p, line.line));
     let written = written.and_then(|l| doc.line(l)).map(|l| (l.line, l.text()));
     let setup = &view.station.setup;
-    let facts = Facts { run: run.as_ref(), tools: Some((&setup.tools, setup.machine_units)), last_write: written };
+    let facts = Facts { run: run.as_ref(), tools: Some((&setup.tools, setup.machine_units)), last_write: written, repeats: repeats(doc, line.line) };
     Ok(gcode::hover::hover(doc, offset, facts))
+}
+
+/// Whether nothing but assignments changes a parameter: system parameters follow offsets, positions, probes.
+fn is_programs_own(p: &Parameter) -> bool {
+    match p {
+        Parameter::Number(n) => *n < 5_000,
+        Parameter::Named(n) => gr_spec::parameter(n).is_none(),
+    }
+}
+
+/// Whether a line stands in a subroutine or a loop.
+fn repeats(doc: gcode::Doc<'_>, line: u32) -> bool {
+    let controls = doc.file.chunks.iter().any(|c| !c.scan.controls.is_empty());
+    controls && gcode::outline::loops(doc).iter().any(|f| f.contains(&line))
 }
 
 fn run_of(view: &View, t: Traced, pace: &Pace, motion: Option<&Motion>, valued: bool) -> Run {
@@ -275,10 +291,13 @@ fn encode(view: &View, tokens: &[Token]) -> Vec<lsp::SemanticToken> {
     out
 }
 
-/// Positions of rising offsets without a search for each.
+/// Positions of rising offsets without a search for each: lines are walked over once.
 struct Cursor<'t> {
     text: &'t Text,
     columns: crate::text::Columns,
+    pieces: Vec<(u32, &'t str)>,
+    /// The piece that the line is in; lines lie in one piece each.
+    piece: usize,
     line: u32,
     start: u32,
     next: u32,
@@ -287,21 +306,38 @@ struct Cursor<'t> {
 
 impl<'t> Cursor<'t> {
     fn new(text: &'t Text, columns: crate::text::Columns) -> Cursor<'t> {
-        Cursor { text, columns, line: 0, start: 0, next: 0, ascii: false }
+        let pieces = text.pieces().collect();
+        let mut cursor = Cursor { text, columns, pieces, piece: 0, line: 0, start: 0, next: 0, ascii: false };
+        cursor.measure();
+        cursor
+    }
+    /// The line's text from its first byte to the end of its piece.
+    fn rest(&self) -> &'t str {
+        self.pieces.get(self.piece).and_then(|(base, text)| text.get((self.start - base) as usize..)).unwrap_or("")
+    }
+    /// Finds the end of the line that begins at `start`.
+    fn measure(&mut self) {
+        let bytes = self.rest().as_bytes();
+        let end = memchr::memchr2(b'\n', b'\r', bytes).map(|at| if bytes[at] == b'\r' && bytes.get(at + 1) == Some(&b'\n') { at + 2 } else { at + 1 });
+        self.next = end.map_or(u32::MAX, |e| self.start + e as u32);
+        self.ascii = bytes[..end.unwrap_or(bytes.len())].is_ascii();
     }
     fn position(&mut self, offset: u32) -> lsp::Position {
-        if offset < self.start || offset >= self.next {
-            let p = self.text.position(offset, self.columns);
-            self.line = p.line;
-            self.start = self.text.line_start(p.line);
-            self.next = self.text.line_start(p.line + 1).max(self.start);
-            self.ascii = self.text.slice(Span::new(self.start, self.next)).is_ascii();
-            return p;
+        if offset < self.start || offset > self.text.len() {
+            return self.text.position(offset, self.columns);
         }
-        if self.ascii {
+        while offset >= self.next {
+            (self.line, self.start) = (self.line + 1, self.next);
+            while self.pieces.get(self.piece + 1).is_some_and(|(base, _)| *base <= self.start) {
+                self.piece += 1;
+            }
+            self.measure();
+        }
+        if self.ascii || self.columns == crate::text::Columns::Utf8 {
             return lsp::Position { line: self.line, character: offset - self.start };
         }
-        self.text.position(offset, self.columns)
+        let before = self.rest().get(..(offset - self.start) as usize);
+        before.map_or_else(|| self.text.position(offset, self.columns), |b| lsp::Position { line: self.line, character: b.encode_utf16().count() as u32 })
     }
 }
 
@@ -380,7 +416,7 @@ pub fn links(mut view: View) -> Answer<Vec<lsp::DocumentLink>> {
     let mut found = Vec::new();
     for call in names::calls(doc).into_iter().filter(|c| !own.contains(&c.label)).take(2_000) {
         let name = super::names::file_name(&call.label);
-        let path = gr_interp::subroutine_paths(&setup, &name).into_iter().chain(super::names::beside(&view, &name)).find(|p| p.is_file());
+        let path = gr_interp::subroutine_paths(&setup, &name).into_iter().chain(super::names::beside(&view, &name)).find(|p| p.is_file() && !view.workspace.strays(p));
         if let Some(path) = path
             && let Some(target) = lsp::Uri::from_file_path(&path)
         {
@@ -417,4 +453,27 @@ pub fn pulled(view: View) -> Answer<(String, Vec<lsp::Diagnostic>)> {
     let mut h = std::collections::hash_map::DefaultHasher::new();
     serde_json::to_string(&items).unwrap_or_default().hash(&mut h);
     Ok((format!("{:016x}", h.finish()), items))
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::Cursor;
+    use crate::text::{Columns, Text};
+
+    proptest! {
+        #[test]
+        fn the_cursor_finds_what_a_search_finds(parts in prop::collection::vec(prop::sample::select(vec!["G1 X1", "\n", "\r\n", "\r", "é", "𝄞", " "]), 0..60), utf8 in any::<bool>()) {
+            let (plain, columns) = (parts.concat(), if utf8 { Columns::Utf8 } else { Columns::Utf16 });
+            let text = Text::new(&plain);
+            let mut cursor = Cursor::new(&text, columns);
+            for (at, _) in plain.char_indices() {
+                // Between the two characters of a line end is no place of a token.
+                if plain.as_bytes().get(at) != Some(&b'\n') || at == 0 || plain.as_bytes()[at - 1] != b'\r' {
+                    prop_assert_eq!(cursor.position(at as u32), text.position(at as u32, columns), "{} of {:?}", at, plain);
+                }
+            }
+        }
+    }
 }

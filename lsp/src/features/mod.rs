@@ -103,6 +103,12 @@ pub fn diagnose(mut view: View) -> Answer<(Vec<Diagnostic>, Elsewhere)> {
     Ok((found.into_iter().filter_map(|d| view.station.harden(d)).collect(), others))
 }
 
+/// Whether what a program does may depend on other files: it has control flow, which calls are part of.
+pub fn calls(view: &View) -> bool {
+    let Some((session, file, dialect)) = view.session() else { return false };
+    dialect.id.starts_with("fanuc") || session.file(file).is_ok_and(|f| f.chunks.iter().any(|c| !c.scan.controls.is_empty()))
+}
+
 /// In documents above this the lines around an edit are looked at first, bytes.
 const EARLY_ABOVE: u32 = 500_000;
 /// So many of them.

@@ -19,6 +19,8 @@ use crate::text::Text;
 pub(super) fn file_name(label: &Label) -> String {
     match label {
         Label::Number(n) => n.to_string(),
+        // A name is no way through folders.
+        Label::Named(n) if n.contains(['/', '\\']) || n.contains("..") => String::new(),
         Label::Named(n) => n.to_string(),
         Label::Dynamic => String::new(),
     }
@@ -27,8 +29,8 @@ pub(super) fn file_name(label: &Label) -> String {
 /// A subroutine file beside the program: where programs keep them when no search path is named.
 pub(super) fn beside(view: &View, name: &str) -> Option<PathBuf> {
     let path = view.path.parent()?.join(format!("{name}.ngc"));
-    let inside = view.workspace.folders().iter().any(|f| path.starts_with(f)) || view.workspace.folders().is_empty();
-    (inside && path.is_file()).then_some(path)
+    let inside = view.workspace.holds(&path) || view.workspace.folders().is_empty() && path.is_file();
+    (inside && !name.is_empty()).then_some(path)
 }
 
 fn location(uri: &lsp::Uri, file: &gr_gcode::File, span: Span, view: &View) -> lsp::Location {
@@ -93,7 +95,7 @@ fn sub_elsewhere(view: &View, label: &Label, dialect: &'static gr_spec::Dialect)
         let span = names::definitions(doc, &Name::Sub(label.clone()), None).first().copied()?;
         Some((uri, file, span))
     };
-    for path in paths.filter(|p| p.is_file()) {
+    for path in paths.filter(|p| p.is_file() && !view.workspace.strays(p)) {
         if let Some(found) = view.file_at(&path).and_then(|(uri, file)| in_file(uri, file)) {
             return Some(found);
         }

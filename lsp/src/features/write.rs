@@ -11,8 +11,8 @@ use super::{Answer, doc, exchange_doc, text_edits};
 use crate::documents::{Kind, View};
 use crate::protocol::{completion_kind, markdown};
 
-/// What can be written next.
-pub fn completion(mut view: View, at: lsp::Position) -> Answer<lsp::CompletionList> {
+/// What can be written next; `snippets`: the client knows fields to fill in.
+pub fn completion(mut view: View, at: lsp::Position, snippets: bool) -> Answer<lsp::CompletionList> {
     let offset = view.offset(at);
     let found = match view.kind {
         Kind::Gcode(..) => gcode_completion(&mut view, offset)?,
@@ -23,8 +23,28 @@ pub fn completion(mut view: View, at: lsp::Position) -> Answer<lsp::CompletionLi
     };
     // A list that was cut must be asked for again when more is typed.
     let is_incomplete = found.len() >= 200;
-    let items = found.into_iter().enumerate().map(|(n, c)| item(&view, n, c)).collect();
+    let plain = |c: Completion| if c.snippet && !snippets { Completion { insert: without_fields(&c.insert), snippet: false, ..c } } else { c };
+    let items = found.into_iter().map(plain).enumerate().map(|(n, c)| item(&view, n, c)).collect();
     Ok(lsp::CompletionList { is_incomplete, items, ..lsp::CompletionList::default() })
+}
+
+/// A snippet as text: `X${1:10}` → `X10`; `$0` and `${1}` are nothing, `\$` is a dollar sign.
+fn without_fields(snippet: &str) -> String {
+    let mut out = String::new();
+    let mut rest = snippet.chars().peekable();
+    while let Some(c) = rest.next() {
+        match c {
+            '\\' => out.extend(rest.next()),
+            '$' if rest.next_if_eq(&'{').is_some() => {
+                while rest.next_if(char::is_ascii_digit).is_some() {}
+                rest.next_if_eq(&':');
+            }
+            '$' => while rest.next_if(char::is_ascii_digit).is_some() {},
+            '}' => {}
+            c => out.push(c),
+        }
+    }
+    out
 }
 
 fn gcode_completion(view: &mut View, offset: u32) -> Answer<Vec<Completion>> {
@@ -181,4 +201,14 @@ fn next_number(doc: gcode::Doc<'_>, line: u32) -> Option<Edit> {
     let before = (0..line.saturating_sub(1)).rev().take(50).find_map(number);
     let step = before.map_or(10, |b| (last - b).clamp(1, 1_000));
     Some(Edit { span, text: format!("N{} ", last + step) })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::without_fields;
+
+    #[test]
+    fn snippets_as_text() {
+        assert_eq!(without_fields("G83 X${1:0} R${2} Q$3 \\$5$0"), "G83 X0 R Q $5");
+    }
 }

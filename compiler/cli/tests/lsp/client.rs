@@ -39,15 +39,20 @@ impl Client {
 
     /// … and further capabilities of the client.
     pub fn with(files: &[(&str, &str)], settings: Value, general: Value) -> Client {
-        Client::made(files, settings, general, false)
+        Client::made(files, settings, general, false, false)
+    }
+
+    /// A client that can nothing but the protocol's first version.
+    pub fn bare(files: &[(&str, &str)]) -> Client {
+        Client::made(files, json!({}), json!({}), false, true)
     }
 
     /// A client that asks for diagnostics itself.
     pub fn pulling(files: &[(&str, &str)]) -> Client {
-        Client::made(files, json!({}), json!({}), true)
+        Client::made(files, json!({}), json!({}), true, false)
     }
 
-    fn made(files: &[(&str, &str)], settings: Value, general: Value, pulls: bool) -> Client {
+    fn made(files: &[(&str, &str)], settings: Value, general: Value, pulls: bool, bare: bool) -> Client {
         let folder = tempfile::tempdir().expect("a folder");
         for (name, text) in files {
             let path = folder.path().join(name);
@@ -89,16 +94,20 @@ impl Client {
         let root = c.uri("");
         let mut options = c.settings.clone();
         options["pullDiagnostics"] = pulls.into();
-        let hello = json!({
+        let mut hello = json!({
             "processId": null,
             "capabilities": {
                 "general": general,
                 "workspace": { "configuration": true, "didChangeWatchedFiles": { "dynamicRegistration": true }, "inlayHint": { "refreshSupport": true }, "diagnostics": { "refreshSupport": true } },
+                "textDocument": { "completion": { "completionItem": { "snippetSupport": true } }, "codeAction": { "dataSupport": true, "resolveSupport": { "properties": ["edit"] } } },
                 "window": { "workDoneProgress": true },
             },
             "initializationOptions": options,
             "workspaceFolders": [{ "uri": root.trim_end_matches('/'), "name": "parts" }],
         });
+        if bare {
+            hello["capabilities"] = json!({});
+        }
         c.capabilities = c.request("initialize", hello)["capabilities"].clone();
         c.notify("initialized", json!({}));
         c

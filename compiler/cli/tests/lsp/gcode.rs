@@ -370,7 +370,8 @@ fn actions_for_cycles_compensation_units_and_ends() {
     insta::assert_snapshot!(act(&mut c, &uri, "X|20\n", "Write out this contour"));
     assert_eq!(act(&mut c, &uri, "G2|1", "Add M5 M2"), format!("{text}M5\nM2\n"));
     let inch = act(&mut c, &uri, "G2|1", "Convert the program to inch");
-    assert!(inch.starts_with("G20 G90 G17 F3.93701 S1000 M3\nG0 X0 Y0 Z0.19685\n"), "{inch}");
+    // F is read before the unit of its block: the unit comes in a block of its own.
+    assert!(inch.starts_with("G20\nG90 G17 F3.93701 S1000 M3\nG0 X0 Y0 Z0.19685\n"), "{inch}");
     c.shut_down();
 }
 
@@ -496,5 +497,144 @@ fn times_are_those_of_the_machine() {
     let state = c.request("gccRobot/state", json!({ "textDocument": { "uri": uri }, "position": { "line": 3, "character": 0 } }));
     assert!(state["block"]["seconds"].as_f64().is_some_and(|s| (s as f32 - of_line(3)).abs() < 0.011), "{state}");
     assert!(c.hover(&uri, "G1 X|10\nY10").contains("time 1.4"), "{}", c.hover(&uri, "G1 X|10\nY10"));
+    c.shut_down();
+}
+
+/// What a program does: lengths, box, time, points.
+fn doing(c: &mut Client, text: &str) -> (Vec<f64>, Vec<f32>) {
+    c.notify("textDocument/didClose", json!({ "textDocument": { "uri": c.uri("doing.ngc") } }));
+    let uri = c.open("doing.ngc", Some(text));
+    let p = c.request("gccRobot/preview", json!({ "textDocument": { "uri": uri } }));
+    let number = |v: &Value| v.as_f64().unwrap_or(f64::NAN);
+    let mut sums: Vec<f64> = ["cutLength", "rapidLength", "seconds", "rapidSeconds"].iter().map(|k| number(&p[*k])).collect();
+    for corner in p["bounds"].as_array().into_iter().flatten().chain(p["cut"].as_array().into_iter().flatten()) {
+        sums.extend(corner.as_array().expect("a corner").iter().map(number));
+    }
+    (sums, crate::custom::floats(&p["positions"]))
+}
+
+/// Programs in which rewriting is hard: what is written in place of a block must do the same.
+const HARD: [&str; 18] = [
+    // Straight ahead: holes after each other, a whole contour.
+    "G21 G90 G17 F100\nS1000 M3\nG0 X0 Y0 Z5\nG98 G83 X5 Y5 Z-2 R1 Q1\nX8\nG99 X9 Y2\nG80\nG0 Z10\nG41.1 D4\nG1 X20 Y0\nX30\nG3 X40 Y10 R10\nG40\nG1 X50\nM5\nM2\n",
+    "G21 G90 F200\nG0 X0 Y0 Z5\nG2 X10 Y10 R10\nG3 X20 Y0 I0 J-10\nG91 G2 X5 Y5 R5\nG1 X1\nG90 G1 X0\nM2\n",
+    // Loops and subroutines that run twice.
+    "G21 G90 F100\n#1=0\no10 while [#1 LT 3]\nG81 X[#1*10] Y0 Z-1 R2\nG80\n#1=[#1+1]\no10 endwhile\nM2\n",
+    "G21 G90 F100\no1 repeat [3]\nG91 G81 X5 Z-1 R2\nG80 G90\no1 endrepeat\nM2\n",
+    "G21 G90 F100\no<h> sub\nG1 X[#1+1] Y2\nG0 Z3\no<h> endsub\n#1=0\no10 while [#1 LT 3]\no<h> call [#1*10]\n#1=[#1+1]\no10 endwhile\nM2\n",
+    "G21 G90 F100\no<a> sub\nG3 X5 Y#1 R10\nG1 X0 Y0\no<a> endsub\no<a> call [5]\no<a> call [8]\nM2\n",
+    // What subroutines leave behind.
+    "G21 G90 F100\no<a> sub\nG1 X5\n#<_n>=7\no<a> endsub\no<a> call\nG1 X#<_n>\nM2\n",
+    "G21 G90 F100\no<a> sub\nG1 X5\nG91\no<a> endsub\no<a> call\nX5\nM2\n",
+    "G21 G90 F100\no<a> sub\nG1 X5 F500\nG0 Y1\no<a> endsub\no<a> call\nX7\nG1 X9\nM2\n",
+    "G21 G90 F100\no<a> sub\nG1 X5\nG90.1\no<a> endsub\no<a> call\nG2 X10 Y0 I7.5 J0\nM2\n",
+    "G21 G90 F100\no<a> sub\nG81 X5 Y1 Z-1 R2\no<a> endsub\no<a> call\nX7\nG80\nM2\n",
+    // Modes that the block itself changes.
+    "G21 G91 F100\nG90 G81 X1 Y1 Z-1 R2\nX5\nG80\nG1 X9\nM2\n",
+    "G21 G90 F100\nG0 Z5\nG91 G81 X1 Y1 Z-3 R-2 L3\nX5\nG80\nG1 X9\nM2\n",
+    "G21 G90 F100\nG0 Z5\nG81 X1 Y1 Z-1 R2 #5=3\nG80\nG1 X#5\nM2\n",
+    // Diameters, and arcs under compensation.
+    "G21 G90 G18 G7 F100\nG0 X20 Z5\nG81 X10 Z5 Y-3 R1\nG80\nG1 X30\nG2 X40 Z0 R5\nM2\n",
+    "G21 G90 F100\nG0 X0 Y0\nG41.1 D4\nG1 X10 Y10\nX20\nG2 X30 Y0 R10\nG2 X20 Y-10 I-10 J0\nG91\nG1 X-5\nG90\nG40\nG1 X0\nM2\n",
+    "G21 G90 F100\nG0 X0 Y0\nG41.1 D4\nG1 X10 Y10\nX20\nG2 X30 Y0 R10\nG91\nG1 Y-5\nG90\nG40 G0 X50 Y-20\nX60\nM2\n",
+    // Units: feed beside the unit, moves before it, surface speed.
+    "G0 X3\nG20 G90 F10\nG1 X1\nG64 P0.01\nG2 X2 Y0 I0.5 J0\nG21 F100\nG1 X5\nM2\n",
+];
+
+#[test]
+fn rewritings_do_the_same() {
+    let mut c = Client::new(&[], json!({}));
+    let mut told = String::new();
+    for (n, text) in HARD.iter().enumerate() {
+        let uri = c.open(&format!("{n}.ngc"), Some(text));
+        let (sums, points) = doing(&mut c, text);
+        for (line, shown) in text.lines().enumerate() {
+            let at = json!({ "line": line, "character": 0 });
+            let ask = json!({ "textDocument": { "uri": uri }, "range": { "start": at, "end": at }, "context": { "diagnostics": [], "only": ["refactor", "source"] } });
+            let actions = c.request("textDocument/codeAction", ask);
+            for action in actions.as_array().expect("a list") {
+                let title = action["title"].as_str().unwrap_or("");
+                let new = c.edited(&uri, &action["edit"]);
+                let (new_sums, new_points) = doing(&mut c, &new);
+                let near = |a: &f64, b: &f64| (a - b).abs() < 0.01 + 1e-3 * b.abs() || a.is_nan() && b.is_nan();
+                assert!(new_sums.len() == sums.len() && new_sums.iter().zip(&sums).all(|(a, b)| near(a, b)), "{title} at `{shown}`: {new_sums:?} instead of {sums:?} in\n{new}");
+                if new_points.len() == points.len() {
+                    assert!(new_points.iter().zip(&points).all(|(a, b)| (a - b).abs() < 0.02), "{title} at `{shown}`:\n{new}");
+                }
+                if !title.contains("umber blocks") && !title.starts_with("Add ") {
+                    told.push_str(&format!("{n}: {shown}: {title}\n"));
+                }
+            }
+        }
+    }
+    insta::assert_snapshot!(told);
+    c.shut_down();
+}
+
+#[test]
+fn what_a_program_leaves_out_is_a_fix() {
+    for (text, wanted) in [("G21\nS100 M3\nG1 X1 F100\n", "M5\nM2\n"), ("%\nG21\nS100 M3\nG1 X1 F100\n%\n", "M5\nM2\n%\n"), ("G21\nG1 X1 F100", "\nM2\n")] {
+        let mut c = Client::new(&[("a.ngc", text)], json!({}));
+        let uri = c.open("a.ngc", None);
+        let found = c.diagnostics(&uri);
+        let d = found.iter().find(|d| ["E0252", "E0283", "E0292"].contains(&d["code"].as_str().unwrap_or(""))).unwrap_or_else(|| panic!("{found:?}"));
+        let ask = json!({ "textDocument": { "uri": uri }, "range": d["range"], "context": { "diagnostics": [d], "only": ["quickfix"] } });
+        let actions = c.request("textDocument/codeAction", ask);
+        let fix = actions.as_array().and_then(|a| a.iter().find(|a| a["title"].as_str().is_some_and(|t| t.starts_with("Add ")))).unwrap_or_else(|| panic!("{actions}"));
+        assert_eq!(fix["kind"], "quickfix");
+        let new = c.edited(&uri, &fix["edit"]);
+        assert!(new.ends_with(wanted), "{new:?}");
+        c.shut_down();
+    }
+    // Behind M2 nothing else counts: blank lines, `%`.
+    for tail in ["M30\n%\n", "M2\n\n\n", "M2\n"] {
+        let text = format!("G21\nS100 M3 M8\nG1 X1 F100\n{tail}");
+        let mut c = Client::new(&[("a.ngc", &text)], json!({}));
+        let uri = c.open("a.ngc", None);
+        let new = act(&mut c, &uri, "G2|1", "Add M5 M9 before the end");
+        assert_eq!(new, text.replace("M2\n", "M5\nM9\nM2\n").replace("M30", "M5\nM9\nM30"));
+        c.shut_down();
+    }
+}
+
+#[test]
+fn numbers_of_big_programs_are_worked_out_when_chosen() {
+    let text = format!("G21 F100\n{}M2\n", "G1 X1\nG1 X2\n".repeat(3_000));
+    let mut c = Client::new(&[], json!({}));
+    let uri = c.open("a.ngc", Some(&text));
+    let at = c.position(&uri, "G2|1");
+    let ask = json!({ "textDocument": { "uri": uri }, "range": { "start": at, "end": at }, "context": { "diagnostics": [] } });
+    let actions = c.request("textDocument/codeAction", ask);
+    let offered = actions.as_array().and_then(|a| a.iter().find(|a| a["title"] == "Number blocks in steps of 10")).cloned().unwrap_or_else(|| panic!("{actions}"));
+    assert!(offered.get("edit").is_none());
+    let resolved = c.request("codeAction/resolve", offered);
+    assert_eq!(resolved["edit"]["changes"][&uri].as_array().map(Vec::len), Some(6_002));
+    // A computed jump needs the numbers as they are.
+    let uri = c.open("b.nc", Some("#101=20\nGOTO #101\nN20 G1 X1 F100\nM30\n"));
+    let ask = json!({ "textDocument": { "uri": uri }, "range": { "start": { "line": 0, "character": 0 }, "end": { "line": 0, "character": 0 } }, "context": { "diagnostics": [], "only": ["source"] } });
+    c.settings = json!({ "dialect": "fanuc-mill" });
+    c.notify("workspace/didChangeConfiguration", json!({ "settings": {} }));
+    let mut left = Value::Null;
+    for _ in 0..300 {
+        left = c.request("textDocument/codeAction", ask.clone());
+        if left == json!([]) {
+            break;
+        }
+        std::thread::sleep(std::time::Duration::from_millis(10));
+    }
+    assert_eq!(left, json!([]));
+    c.shut_down();
+}
+
+#[test]
+fn values_in_hints_are_values() {
+    let text = "G21 G90 F100\n#1=2\nG1 X[1+2] Y[#1] Z-[2+1]\nG83 X[1+2] Y[1+1] Z-[2+1] R[1] Q1\nG80\nG10 L2 P[1+1] X[3+4]\nG91 G1 X[1+1]\nG90\nG28 X[1+1]\nG7\nG1 X[#1]\nG8\nG93 G1 X[5] F[2]\nG94\nG1 X[1] Y[1/0]\nM2\n";
+    let mut c = Client::new(&[], json!({ "hints": { "position": "off", "motion": false, "arc": false, "modes": false, "time": false, "feed": false } }));
+    let uri = c.open("a.ngc", Some(text));
+    let all = c.request("textDocument/inlayHint", json!({ "textDocument": { "uri": uri }, "range": { "start": { "line": 0, "character": 0 }, "end": { "line": 40, "character": 0 } } }));
+    let shown: Vec<String> = all.as_array().expect("a list").iter().map(|h| format!("{}: {}", h["position"]["line"], h["label"].as_str().unwrap_or(""))).collect();
+    assert_eq!(shown, ["2: = 3", "2: = 2", "2: = -3", "12: = 5"]);
+    let h = c.hover(&uri, "X[5] F|[2]");
+    assert!(h.contains("G93: every feed move takes 1/F minutes") && !h.contains("now "), "{h}");
     c.shut_down();
 }

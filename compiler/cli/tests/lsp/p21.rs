@@ -196,7 +196,7 @@ fn actions() {
         let action = action.unwrap_or_else(|| panic!("{wanted} is not among {titles:?}"));
         c.edited(&uri, &action["edit"])
     };
-    let less = act(&mut c, "#1|0=", "Remove 1 instances");
+    let less = act(&mut c, "#1|0=", "Remove instances that");
     assert_eq!(less, PLAN.replace("#99=CARTESIAN_POINT('UNUSED',(1.,2.,3.));\n", ""));
     let numbered = act(&mut c, "#1|0=", "Number instances");
     assert!(numbered.contains("#7=MACHINING_WORKINGSTEP('WS DRILL',"), "{numbered}");

@@ -110,9 +110,14 @@ fn requests_can_be_cancelled() {
     c.notify("$/cancelRequest", json!({ "id": id }));
     let answer = c.answer(id);
     assert_eq!(answer["error"]["code"], -32800, "{answer}");
-    // Everything goes on.
+    // More than there are workers: each is broken off, and everything goes on.
+    let ids: Vec<i64> = (0..4).map(|_| c.begin("textDocument/hover", at.clone())).collect();
+    std::thread::sleep(std::time::Duration::from_millis(300));
+    ids.iter().for_each(|id| c.notify("$/cancelRequest", json!({ "id": id })));
+    let begun = std::time::Instant::now();
     let other = c.open("b.ngc", Some("G21\nM2\n"));
     assert!(c.hover(&other, "G2|1").starts_with("**G21**"));
+    assert!(begun.elapsed() < std::time::Duration::from_secs(4), "{:?}", begun.elapsed());
     c.shut_down();
 }
 
@@ -240,7 +245,9 @@ fn a_client_that_is_gone_takes_the_server_with_it() {
     c.begin("textDocument/hover", at);
     std::thread::sleep(std::time::Duration::from_millis(200));
     assert!(c.lives());
+    let begun = std::time::Instant::now();
     assert!(c.hang_up());
+    assert!(begun.elapsed() < std::time::Duration::from_secs(30), "{:?}", begun.elapsed());
 }
 
 #[test]
@@ -307,5 +314,74 @@ fn programs_that_are_not_open_are_looked_at() {
     // What is wrong with the project file is pushed: nobody asks about a file that is not open.
     let project = c.uri("gcc-robot.toml");
     assert!(c.found.get(&project).is_some_and(|f| f.1[0]["message"].as_str().is_some_and(|m| m.contains("klingon/1"))), "{:?}", c.found);
+    c.shut_down();
+}
+
+#[test]
+fn files_that_are_not_open_are_read_from_disk() {
+    let outside = tempfile::tempdir().expect("a folder");
+    std::fs::write(outside.path().join("far.ngc"), "o<far> sub\nG1 X1\no<far> endsub\nG21\nM2\n").expect("written");
+    let far = outside.path().display().to_string();
+    let up = format!("../{}/far", outside.path().file_name().expect("a name").to_string_lossy());
+    let caller = format!("G21\no<{up}> call\no<linked> call\nM2\n");
+    let mut c = Client::new(&[("big.ngc", "G21 G90 F100\nT1 M6\nG1 X5\nG1 XO\nM2\n"), ("caller.ngc", &caller), ("note.txt", "none of ours")], json!({}));
+    let uri = c.uri("big.ngc");
+    let of = |uri: &str| json!({ "textDocument": { "uri": uri } });
+    let found = c.request("textDocument/diagnostic", of(&uri));
+    assert!(found["items"].as_array().is_some_and(|l| l.iter().any(|d| d["severity"] == 1 && d["range"]["start"]["line"] == 3)), "{found}");
+    assert_eq!(c.request("textDocument/documentSymbol", of(&uri))[0]["name"], "T1");
+    assert!(c.request("gccRobot/preview", of(&uri))["count"].as_u64() > Some(0));
+    assert!(c.request("textDocument/hover", json!({ "textDocument": { "uri": uri }, "position": { "line": 2, "character": 0 } }))["contents"]["value"].as_str().is_some_and(|h| h.starts_with("**G1**")));
+    let out = c.request("gccRobot/output", json!({ "textDocument": { "uri": uri }, "target": "rs274ngc", "options": {} }));
+    assert_eq!(out["files"], json!([]), "it has an error");
+    // It changes on disk.
+    std::fs::write(c.path("big.ngc"), "G21 G90 F100\nG1 X5\nM2\n").expect("written");
+    assert_eq!(c.request("textDocument/diagnostic", of(&uri))["items"], json!([]));
+    // Opened, it is what the client says.
+    let uri = c.open("big.ngc", Some("G21\nG1 XO\nM2\n"));
+    assert!(c.diagnostics(&uri).iter().any(|d| d["severity"] == 1));
+    // Nothing outside of the folders is read, by whatever name; nor what is no program.
+    let text = c.uri("note.txt");
+    for other in [format!("file://{far}/far.ngc"), c.uri(&format!("{up}.ngc")), text] {
+        assert_eq!(c.request("textDocument/documentSymbol", of(&other)), Value::Null, "{other}");
+    }
+    #[cfg(unix)]
+    std::os::unix::fs::symlink(outside.path().join("far.ngc"), c.path("linked.ngc")).expect("a link");
+    let caller = c.open("caller.ngc", None);
+    assert_eq!(c.request("textDocument/documentLink", of(&caller)), json!([]));
+    for at in ["o<|..", "o<|linked"] {
+        let at = c.at(&caller, at);
+        assert_eq!(c.request("textDocument/definition", at), json!([]));
+    }
+    c.shut_down();
+}
+
+#[test]
+fn callers_are_looked_at_again() {
+    let mut c = Client::new(&[("m.ngc", "G21 F100\no<p> call\nM2\n"), ("p.ngc", "o<p> sub\nG1 X1\no<p> endsub\nM2\n"), ("gcc-robot.toml", "schema = 1\n[project]\nsubs = [\".\"]\n")], json!({}));
+    let m = c.open("m.ngc", None);
+    assert_eq!(c.diagnostics(&m), Vec::<Value>::new());
+    let p = c.open("p.ngc", None);
+    let _ = c.diagnostics(&p);
+    c.edit(&p, "G1 X1", "G1 XO");
+    let found = c.next_diagnostics(&m);
+    assert!(found.iter().any(|d| d["range"]["start"]["line"] == 1 && d["severity"] == 1), "{found:?}");
+    c.edit(&p, "G1 XO", "G1 X1");
+    assert_eq!(c.next_diagnostics(&m), Vec::<Value>::new());
+    c.shut_down();
+}
+
+#[test]
+fn clients_without_snippets_get_text() {
+    let mut c = Client::bare(&[("a.ngc", "G21 F100\nG8\nM2\n")]);
+    let uri = c.open("a.ngc", None);
+    let at = c.at(&uri, "G8|\n");
+    let list = c.request("textDocument/completion", at);
+    let items = list["items"].as_array().expect("a list");
+    assert!(!items.is_empty() && items.iter().all(|i| i["insertTextFormat"] == 1 && !i["textEdit"]["newText"].as_str().unwrap_or("").contains("${")), "{items:?}");
+    // Nor do they ask again for what an action does: it is told at once, when it is small.
+    let ask = json!({ "textDocument": { "uri": uri }, "range": { "start": { "line": 0, "character": 0 }, "end": { "line": 0, "character": 0 } }, "context": { "diagnostics": [] } });
+    let actions = c.request("textDocument/codeAction", ask);
+    assert!(actions.as_array().is_some_and(|a| !a.is_empty() && a.iter().all(|a| a["edit"].is_object())), "{actions}");
     c.shut_down();
 }

@@ -16,32 +16,35 @@ use crate::{Action, ActionKind, Edit};
 pub struct Context<'a> {
     /// The block under the cursor as it is run: state before and after, and motion.
     pub run: Option<(&'a Modal, &'a Modal, &'a Program)>,
-    /// State at the end of the program, when it ends without M2, M30 or `%`, or leaves something on.
-    pub end: Option<&'a Modal>,
+    /// It is run exactly once: what is written in its place then is right every time.
+    pub once: bool,
 }
 
 /// Moves that one block is expanded into, at most.
 const MOST_MOVES: usize = 5_000;
 
-/// Actions at a byte of the file.
+/// Rewritings of what stands at a byte of the file.
 pub fn actions(doc: Doc<'_>, at: Span, context: Context<'_>) -> Vec<Action> {
     let mut found = Vec::new();
     if let Some(line) = doc.line_at(at.start) {
-        if let Some((before, after, program)) = context.run {
-            found.extend(other_arc_form(&line, before, program));
-            found.extend(expand(&line, before, after, program));
+        if let Some((before, after, program)) = context.run.filter(|_| context.once) {
+            found.extend(other_arc_form(&line, before, after, program));
+            found.extend(expand(doc, &line, before, after, program));
         }
-        found.extend(convert_units(doc, &line));
-    }
-    found.extend(missing_end(doc, context.end));
-    if doc.len() < 4_000_000 {
-        found.extend(renumber(doc));
     }
     found
 }
 
+/// Cutter compensation and diameters: the words of such blocks are not the tool's way.
+pub fn is_shifted(m: &Modal) -> bool {
+    m.side() != Side::Off || m.lathe_diameter != 0
+}
+
 /// I J K ↔ R.
-fn other_arc_form(line: &LineOf<'_>, before: &Modal, program: &Program) -> Option<Action> {
+fn other_arc_form(line: &LineOf<'_>, before: &Modal, after: &Modal, program: &Program) -> Option<Action> {
+    if is_shifted(before) || is_shifted(after) {
+        return None;
+    }
     let arc_words = |w: &&gr_gcode::Word| matches!(w.letter, b'i' | b'j' | b'k' | b'r');
     let words: Vec<&gr_gcode::Word> = line.words().iter().filter(arc_words).collect();
     let literal = words.iter().all(|w| w.form == Form::Literal);
@@ -79,20 +82,119 @@ fn other_arc_form(line: &LineOf<'_>, before: &Modal, program: &Program) -> Optio
 }
 
 /// Writes the moves that a cycle makes.
-fn expand(line: &LineOf<'_>, before: &Modal, after: &Modal, program: &Program) -> Option<Action> {
+fn expand(doc: Doc<'_>, line: &LineOf<'_>, before: &Modal, after: &Modal, program: &Program) -> Option<Action> {
     let cycle = (730..=899).contains(&after.motion) && after.motion != 800;
     let moves = program.steps().filter(|s| s.op.moves()).count();
-    if moves == 0 || moves > MOST_MOVES || !cycle {
+    // A setting in the block would be lost with its words.
+    let sets = line.words().iter().any(|w| matches!(w.form, Form::Setting | Form::Control | Form::Bad));
+    if moves == 0 || moves > MOST_MOVES || !cycle || sets || is_shifted(before) || is_shifted(after) {
         return None;
     }
     let title = format!("Write out this {}", code_name(b'g', f64::from(after.motion) / 10.0));
-    // The next block of plain axis words would go on with the last motion, not with the cycle.
-    let text = format!("{}\n(the cycle ends here: write G80 or the next motion code)", write_moves(program, before)?);
+    let (text, code) = write_moves(program, before, after, false)?;
     let words = line.words();
     let first = words.iter().find(|w| w.form != Form::Comment && !(w.letter == b'n'))?;
     let last = words.iter().rfind(|w| w.form != Form::Comment)?;
     let span = Span::new(line.tight(first).start, line.tight(last).end);
-    Some(Action { title, kind: ActionKind::Inline, edits: vec![Edit { span, text }] })
+    let mut edits = vec![Edit { span, text }];
+    edits.extend(goes_on(doc, line.line, code, after)?);
+    Some(Action { title, kind: ActionKind::Inline, edits })
+}
+
+/// What the next block with axis words needs when it goes on with the motion of a line whose words are replaced: the
+/// motion's code, and for a cycle the words that it remembers. `code`: the last one written there. `None`: that can't be
+/// told from the text.
+pub fn goes_on(doc: Doc<'_>, line: u32, code: &str, after: &Modal) -> Option<Option<Edit>> {
+    const MOST_LINES: u32 = 2_000;
+    let wanted = code_name(b'g', f64::from(after.motion) / 10.0);
+    // Behind G80 nothing goes on.
+    if after.motion < 0 || after.motion == 800 || wanted == code {
+        return Some(None);
+    }
+    let motion = |l: &LineOf<'_>| {
+        let code = |w: &&gr_gcode::Word| w.letter == b'g' && w.form == Form::Literal;
+        l.words().iter().filter(code).any(|w| doc.dialect.code(&code_name(w.letter, w.value)).is_some_and(|c| c.group == "motion"))
+    };
+    let unclear = |l: &LineOf<'_>| l.words().iter().any(|w| matches!(w.form, Form::Control | Form::Bad) || w.form == Form::Expr && w.letter == b'g') || l.has_code(b'm', 980) || l.has_code(b'm', 990);
+    let axis = |w: &&gr_gcode::Word| matches!(w.letter, b'x' | b'y' | b'z' | b'a' | b'b' | b'c' | b'u' | b'v' | b'w' | b'@' | b'^');
+    let mut next = None;
+    for l in doc.lines(line + 1..line + 1 + MOST_LINES) {
+        if motion(&l) || l.has_code(b'm', 20) || l.has_code(b'm', 300) {
+            break;
+        }
+        if unclear(&l) {
+            return None;
+        }
+        // Back to the old level, which a cycle that begins anew does not know.
+        if next.is_some() && after.retract_r != 0 && l.has_code(b'g', 980) {
+            return None;
+        }
+        if next.is_none() && l.words().iter().find(axis).is_some() {
+            next = Some(l);
+        }
+    }
+    let Some(next) = next else { return Some(None) };
+    let at = next.tight(next.words().iter().find(axis)?).start;
+    let mut text = format!("{wanted} ");
+    if (730..=899).contains(&after.motion) {
+        // Levels that count from the last one would count from another.
+        if after.incremental != 0 {
+            return None;
+        }
+        let (_, _, normal) = gr_ir::plane_axes(after.plane());
+        let deep = [b'x', b'y', b'z', b'a', b'b', b'c', b'u', b'v', b'w'].get(normal).copied()?;
+        for letter in [deep, b'r', b'q', b'p'] {
+            if next.word(letter).is_some() {
+                continue;
+            }
+            // The block of the cycle that says it last, back to the one with the code.
+            for l in (line.saturating_sub(MOST_LINES)..=line).rev().filter_map(|n| doc.line(n)) {
+                if unclear(&l) || l.words().iter().any(|w| w.form == Form::Setting) {
+                    return None;
+                }
+                if let Some(w) = l.word(letter) {
+                    let w = Some(w).filter(|w| w.form == Form::Literal)?;
+                    text.push_str(l.slice(l.tight(w)));
+                    text.push(' ');
+                    break;
+                }
+                if motion(&l) {
+                    break;
+                }
+            }
+        }
+    }
+    Some(Some(Edit { span: Span::new(at, at), text }))
+}
+
+/// Whether lines set parameters that outlive a subroutine, or give values back.
+pub fn sets_globals(doc: Doc<'_>, lines: std::ops::Range<u32>) -> bool {
+    use gr_gcode::{Keyword, Target};
+    let local = |l: &LineOf<'_>, w: &gr_gcode::Word| {
+        let scan = &l.chunk.scan;
+        match w.form {
+            Form::Setting => scan.settings.get(w.index()).is_some_and(|s| match s.target {
+                Target::Named(name) => scan.names.get(name as usize).is_some_and(|n| !n.starts_with('_')),
+                Target::Number(n) => matches!(scan.nodes.get(n.0 as usize), Some(gr_gcode::Node::Number(v)) if (1.0..31.0).contains(v)),
+            }),
+            Form::Control => scan.controls.get(w.index()).is_some_and(|c| c.arg_count == 0 || !matches!(c.keyword, Keyword::Endsub | Keyword::Return)),
+            Form::Bad => false,
+            _ => true,
+        }
+    };
+    doc.lines(lines).any(|l| l.words().iter().any(|w| !local(&l, w)))
+}
+
+/// Whether a jump goes where a value says (`GOTO #1`): line numbers then are more than names. The same of contours that
+/// a turning cycle names.
+fn jumps_by_value(doc: Doc<'_>) -> bool {
+    let dynamic = |c: &gr_gcode::Chunk| {
+        let jump = |k| matches!(k, gr_gcode::Keyword::MacroGoto | gr_gcode::Keyword::MacroIfGoto);
+        let statements = gr_gcode::symbols(&c.text, &c.scan).statements;
+        statements.iter().any(|s| jump(s.what.keyword) && s.what.label == gr_gcode::Label::Dynamic)
+    };
+    let with_control = || doc.file.chunks.iter().filter(|c| !c.scan.controls.is_empty());
+    with_control().any(dynamic) || doc.dialect.id == "fanuc-turn" && doc.lines(0..doc.count()).any(|l| [700, 710, 720, 730].iter().any(|c| l.has_code(b'g', *c)))
 }
 
 /// Lines from the G41 or G42 before a line to the G40 behind it; none when the line is not between such.
@@ -106,28 +208,58 @@ pub fn compensated_lines(doc: Doc<'_>, line: u32) -> Option<std::ops::Range<u32>
 }
 
 /// Writes the tool's own path in place of a contour under cutter compensation: the blocks of
-/// [`compensated_lines`] as they are run. Only where they hold nothing but motion.
-pub fn write_out_compensation(doc: Doc<'_>, lines: std::ops::Range<u32>, ran: &[(u32, &Modal, &Program)]) -> Option<Action> {
-    let plain = |w: &&gr_gcode::Word| matches!(w.letter, b'm' | b's' | b't') || matches!(w.form, Form::Setting | Form::Control | Form::Bad);
-    if doc.lines(lines.clone()).any(|l| l.words().iter().find(plain).is_some()) {
+/// [`compensated_lines`] as they are run, each exactly once. Only where they hold nothing but motion.
+pub fn write_out_compensation(doc: Doc<'_>, lines: std::ops::Range<u32>, ran: &[(u32, &Modal, &Modal, &Program)]) -> Option<Action> {
+    let other = |w: &&gr_gcode::Word| matches!(w.letter, b'm' | b's' | b't' | b'h') || matches!(w.form, Form::Setting | Form::Control | Form::Bad);
+    if doc.lines(lines.clone()).any(|l| l.words().iter().find(other).is_some()) {
         return None;
     }
-    let mut edits = Vec::new();
+    let (first, last) = (ran.first()?, ran.last()?);
+    if is_shifted(first.1) || is_shifted(last.2) || ran.iter().any(|r| r.1.lathe_diameter != 0) {
+        return None;
+    }
+    // Compensation that ends without a move leaves the tool beside its place: the next move also brings it there.
+    let scale = if last.2.units() == Units::Inch { 25.4 } else { 1.0 };
+    let end = ran.iter().rev().find_map(|r| r.3.steps().filter(|s| s.op.moves()).last().map(|s| s.end.axes));
+    let there = end.is_some_and(|e| (0..3).all(|i| (e[i] / scale - last.2.current[i]).abs() < 1e-6));
+    if !there && doc.lines(last.0 + 1..doc.count()).any(|l| l.words().iter().any(|w| matches!(w.letter, b'x' | b'y' | b'z' | b'u' | b'v' | b'w' | b'@' | b'^') || w.form == Form::Control)) {
+        return None;
+    }
+    let (mut edits, mut code) = (Vec::new(), "");
     for line in doc.lines(lines) {
         let words = line.words();
         let Some(first) = words.iter().find(|w| w.form != Form::Comment && w.letter != b'n') else { continue };
         let last = words.iter().rfind(|w| w.form != Form::Comment)?;
-        let (_, before, program) = ran.iter().find(|r| r.0 == line.line)?;
-        let text = write_moves(program, before)?;
+        let (_, before, after, program) = ran.iter().find(|r| r.0 == line.line)?;
+        let (text, last_code) = write_moves(program, before, after, true)?;
+        code = if last_code.is_empty() { code } else { last_code };
         edits.push(Edit { span: Span::new(line.tight(first).start, line.tight(last).end), text });
     }
+    // Blocks behind it that say no code go on with the last one.
+    edits.extend(goes_on(doc, last.0, code, last.2)?);
     Some(Action { title: "Write out this contour without compensation".into(), kind: ActionKind::Inline, edits })
 }
 
-/// Moves as plain G0 G1 G2 G3 G4 in absolute distance, the mode before put back. None where the program does more than
-/// these can say, or where F is not a feed per minute.
-pub fn write_moves(program: &Program, before: &Modal) -> Option<String> {
-    if before.feed_mode != 0 {
+/// Whether two states differ in nothing but place, feed, distance mode, level of return, motion code and the memory
+/// of cycles; `compensated`: and in what compensation is about.
+fn alike(before: &Modal, after: &Modal, compensated: bool) -> bool {
+    let mut m = *after;
+    (m.current, m.program, m.feed) = (before.current, before.program, before.feed);
+    (m.incremental, m.retract_r, m.motion, m.n_number) = (before.incremental, before.retract_r, before.motion, before.n_number);
+    (m.cycle_cc, m.cycle_i, m.cycle_j, m.cycle_k) = (before.cycle_cc, before.cycle_i, before.cycle_j, before.cycle_k);
+    (m.cycle_p, m.cycle_q, m.cycle_r, m.cycle_l) = (before.cycle_p, before.cycle_q, before.cycle_r, before.cycle_l);
+    (m.cycle_il, m.cycle_il_set, m.before_cycle, m.spline_tail) = (before.cycle_il, before.cycle_il_set, before.before_cycle, before.spline_tail);
+    if compensated {
+        (m.comp_side, m.comp_first, m.comp_radius) = (before.comp_side, before.comp_first, before.comp_radius);
+        (m.comp_orientation, m.arc_not_allowed) = (before.comp_orientation, before.arc_not_allowed);
+    }
+    m.bytes() == before.bytes()
+}
+
+/// Moves as plain G0 G1 G2 G3 G4 in absolute distance, with what else the block leaves behind, and the last code of them.
+/// None where the program does more than these can say, or where F is not a feed per minute.
+pub fn write_moves(program: &Program, before: &Modal, after: &Modal, compensated: bool) -> Option<(String, &'static str)> {
+    if before.feed_mode != 0 || !alike(before, after, compensated) {
         return None;
     }
     let scale = if before.units() == Units::Inch { 25.4 } else { 1.0 };
@@ -136,9 +268,6 @@ pub fn write_moves(program: &Program, before: &Modal) -> Option<String> {
     let mut code = "";
     let mut told_feed = before.feed;
     let mut path = before.path_mode;
-    if before.incremental != 0 {
-        lines.push("G90".into());
-    }
     let mut cursor = program.cursor();
     while let Some(view) = cursor.next() {
         let axes = |from: &[f64; 9], to: &[f64; 9], all: bool| {
@@ -201,18 +330,40 @@ pub fn write_moves(program: &Program, before: &Modal) -> Option<String> {
         lines.push(format!("{}{feed}", if code == new { words.trim_start().to_string() } else { format!("{new}{words}") }));
         code = new;
     }
-    if before.incremental != 0 {
-        lines.push("G91".into());
+    if before.incremental != 0 && !lines.is_empty() {
+        lines.insert(0, "G90".into());
     }
-    Some(lines.join("\n"))
+    let absolute = before.incremental == 0 || !lines.is_empty();
+    if after.incremental != u8::from(!absolute) {
+        lines.push(if after.incremental != 0 { "G91" } else { "G90" }.into());
+    }
+    if after.retract_r != before.retract_r {
+        lines.push(if after.retract_r != 0 { "G99" } else { "G98" }.into());
+    }
+    if (after.feed - told_feed).abs() > 1e-9 * after.feed.abs() {
+        lines.push(format!("F{}", number(after.feed, 4)));
+    }
+    Some((lines.join("\n"), code))
+}
+
+/// The line of the M2 or M30 that ends the program, or its last line with words: where the state at the end is asked for.
+/// True: it is the former.
+pub fn end_line(doc: Doc<'_>) -> (u32, bool) {
+    let count = doc.count();
+    let ends = |l: &LineOf<'_>| l.has_code(b'm', 20) || l.has_code(b'm', 300);
+    let tail = || doc.lines(count.saturating_sub(2_000)..count);
+    match tail().filter(ends).last() {
+        Some(end) => (end.line, true),
+        None => (tail().filter(|l| !l.words().is_empty()).last().map_or(count.saturating_sub(1), |l| l.line), false),
+    }
 }
 
 /// Adds what a program leaves out at its end.
-fn missing_end(doc: Doc<'_>, end: Option<&Modal>) -> Vec<Action> {
-    let Some(m) = end else { return Vec::new() };
+pub fn missing_end(doc: Doc<'_>, end: Option<&Modal>) -> Option<Action> {
+    let m = end?;
     let count = doc.count();
     let tail = || doc.lines(count.saturating_sub(2_000)..count);
-    let has_end = tail().any(|l| l.has_code(b'm', 20) || l.has_code(b'm', 300));
+    let (end, has_end) = end_line(doc);
     let mut lines: Vec<&str> = Vec::new();
     let spindle = m.active_spindle.clamp(0, 7) as usize;
     if m.side() != Side::Off {
@@ -224,49 +375,72 @@ fn missing_end(doc: Doc<'_>, end: Option<&Modal>) -> Vec<Action> {
     if m.flood != 0 || m.mist != 0 {
         lines.push("M9");
     }
-    let mut found = Vec::new();
     let (at, title) = if has_end {
-        let Some(last) = tail().filter(|l| l.has_code(b'm', 20) || l.has_code(b'm', 300)).last() else { return found };
-        (last.span().start, "before the end")
+        (doc.line(end)?.span().start, "before the end")
     } else {
         lines.push("M2");
-        let text_end = doc.len();
         let percent = tail().filter(|l| l.chunk.scan.lines[l.at as usize].kind == gr_gcode::LineKind::Percent).last();
-        (percent.filter(|l| l.line > 0).map_or(text_end, |l| l.span().start), "at the end")
+        (percent.filter(|l| l.line > 0).map_or(doc.len(), |l| l.span().start), "at the end")
     };
     if lines.is_empty() {
-        return found;
+        return None;
     }
     let open = at == doc.len() && doc.line(count.saturating_sub(1)).is_some_and(|l| l.span().end == at && l.span().start != at);
     let lead = if open { "\n" } else { "" };
     let text = format!("{lead}{}\n", lines.join("\n"));
-    found.push(Action { title: format!("Add {} {title}", lines.join(" ")), kind: ActionKind::Source, edits: vec![Edit { span: Span::new(at, at), text }] });
-    found
+    Some(Action { title: format!("Add {} {title}", lines.join(" ")), kind: ActionKind::Source, edits: vec![Edit { span: Span::new(at, at), text }] })
+}
+
+/// What [`renumber`] is called for a file; none where it can't be done.
+pub fn renumber_title(doc: Doc<'_>) -> Option<&'static str> {
+    if doc.len() >= 4_000_000 || jumps_by_value(doc) {
+        return None;
+    }
+    Some(if is_numbered(doc) { "Renumber blocks in steps of 10" } else { "Number blocks in steps of 10" })
+}
+
+fn is_numbered(doc: Doc<'_>) -> bool {
+    doc.lines(0..doc.count().min(1_000)).any(|l| l.literal(b'n').is_some())
 }
 
 /// Numbers all blocks anew; jumps follow.
-fn renumber(doc: Doc<'_>) -> Option<Action> {
-    let numbered = doc.lines(0..doc.count().min(1_000)).any(|l| l.literal(b'n').is_some());
+pub fn renumber(doc: Doc<'_>) -> Option<Action> {
+    let title = renumber_title(doc)?;
     let options = FormatOptions {
         case: gr_gcode::Case::Keep,
         o_word_case: gr_gcode::Case::Keep,
-        renumber: Some(Renumber { start: 10, step: 10, all: !numbered }),
+        renumber: Some(Renumber { start: 10, step: 10, all: !is_numbered(doc) }),
         ..FormatOptions::default()
     };
     let edits = super::format::edits(doc, &options, 0..doc.count());
-    let title = if numbered { "Renumber blocks in steps of 10" } else { "Number blocks in steps of 10" };
     (!edits.is_empty()).then(|| Action { title: title.into(), kind: ActionKind::Source, edits })
 }
 
-/// G20 ↔ G21: every length and feed of the file in the other unit. Only offered where each of them is a number.
-fn convert_units(doc: Doc<'_>, line: &LineOf<'_>) -> Option<Action> {
-    let here = line.words().iter().find(|w| w.letter == b'g' && w.form == Form::Literal && matches!(w.value as i64, 20 | 21))?;
-    let to_inch = here.value == 21.0;
+fn is_unit(w: &&gr_gcode::Word) -> bool {
+    w.letter == b'g' && w.form == Form::Literal && matches!((w.value * 10.0).round() as i64, 200 | 210)
+}
+
+/// What [`convert_units`] is called at a line; none where there is no unit.
+pub fn units_title(line: &LineOf<'_>) -> Option<&'static str> {
+    let inch = line.words().iter().find(is_unit)?.value == 21.0;
+    Some(if inch { "Convert the program to inch (G20)" } else { "Convert the program to millimetres (G21)" })
+}
+
+/// G20 ↔ G21: every length and feed of the file in the other unit. Only offered where each of them is a number, where the
+/// unit is said before the first of them, and where nothing else depends on it. `before`: the state before the line.
+pub fn convert_units(doc: Doc<'_>, line: &LineOf<'_>, before: Option<&Modal>) -> Option<Action> {
+    let title = units_title(line)?;
+    let to_inch = line.words().iter().find(is_unit)?.value == 21.0;
     if doc.len() > 4_000_000 {
         return None;
     }
+    // Inverse time, tables and surface speed: numbers whose unit is another, or of another block.
+    let strange = |l: LineOf<'_>| [930, 100, 960].iter().any(|c| l.has_code(b'g', *c)) || l.has_code(b'm', 980) || l.has_code(b'g', 650) || l.has_code(b'g', 660);
+    if doc.lines(0..doc.count()).any(strange) {
+        return None;
+    }
     let (factor, places) = if to_inch { (1.0 / 25.4, 5) } else { (25.4, 4) };
-    let mut edits = Vec::new();
+    let (mut edits, mut said) = (Vec::new(), false);
     let mut codes_before: Vec<&'static gr_spec::CodeDef> = Vec::new();
     for l in doc.lines(0..doc.count()) {
         let codes: Vec<_> = l
@@ -278,33 +452,53 @@ fn convert_units(doc: Doc<'_>, line: &LineOf<'_>) -> Option<Action> {
         if let Some(motion) = codes.iter().find(|c| c.group == "motion") {
             codes_before = vec![motion];
         }
+        let says = l.words().iter().find(is_unit);
+        let feeds = l.word(b'f').is_some();
+        if let Some(w) = says {
+            if (w.value == 21.0) != to_inch || (!said && l.line != line.line) {
+                return None;
+            }
+            edits.extend(other_unit(&l, w, to_inch, feeds && !said, before)?);
+            said = true;
+        }
         for w in l.words() {
             let letter = w.letter.to_ascii_uppercase() as char;
             match w.form {
-                Form::Comment | Form::Bad => continue,
-                Form::Setting | Form::Control => return None,
-                Form::Expr => return None,
+                Form::Comment => continue,
+                Form::Setting | Form::Control | Form::Expr | Form::Bad => return None,
                 Form::Literal => {}
-            }
-            if w.letter == b'g' && matches!(w.value as i64, 20 | 21) && w.value.fract() == 0.0 {
-                if (w.value == 21.0) != to_inch {
-                    return None;
-                }
-                edits.push(Edit { span: l.tight(w), text: if to_inch { "G20" } else { "G21" }.into() });
-                continue;
             }
             let arg = codes.iter().chain(&codes_before).find_map(|c| c.args.iter().find(|a| a.letters.contains(letter)));
             let unit = arg.map(|a| a.unit).or_else(|| doc.dialect.word(letter).map(|w| w.unit)).unwrap_or("");
-            let inverse = l.has_code(b'g', 930);
-            if matches!(unit, "length" | "feed") && !(unit == "feed" && inverse) {
+            if matches!(unit, "length" | "feed") && !matches!(w.letter, b'g' | b'm') {
+                if !said {
+                    return None;
+                }
                 let span = l.tight(w);
                 edits.push(Edit { span: Span::new(span.start + 1, span.end), text: number(w.value * factor, places) });
             }
         }
     }
-    if doc.lines(0..doc.count()).any(|l| l.has_code(b'g', 930) || l.has_code(b'g', 100)) {
+    Some(Action { title: title.into(), kind: ActionKind::Rewrite, edits })
+}
+
+/// The other unit code in place of one. F is read before the unit of its block: where it stands with the first code, the
+/// code comes in a block of its own before it, and the unit of before must be the one that the code says.
+fn other_unit(line: &LineOf<'_>, code: &gr_gcode::Word, to_inch: bool, alone: bool, before: Option<&Modal>) -> Option<Vec<Edit>> {
+    let new = if to_inch { "G20" } else { "G21" };
+    let span = line.tight(code);
+    if !alone {
+        return Some(vec![Edit { span, text: new.into() }]);
+    }
+    let same = before?.units() == if to_inch { Units::Mm } else { Units::Inch };
+    let start = line.span().start;
+    if !same || line.text().trim_start().starts_with('/') {
         return None;
     }
-    let title = if to_inch { "Convert the program to inch (G20)" } else { "Convert the program to millimetres (G21)" };
-    Some(Action { title: title.into(), kind: ActionKind::Rewrite, edits })
+    let blank = line.slice(Span::new(span.end, line.span().end)).len() - line.slice(Span::new(span.end, line.span().end)).trim_start().len();
+    let gone = Span::new(span.start, span.end + blank as u32);
+    if gone.start == start {
+        return Some(vec![Edit { span: gone, text: format!("{new}\n") }]);
+    }
+    Some(vec![Edit { span: Span::new(start, start), text: format!("{new}\n") }, Edit { span: gone, text: String::new() }])
 }

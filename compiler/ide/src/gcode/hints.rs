@@ -92,7 +92,7 @@ fn of_line(line: &LineOf<'_>, run: &Ran<'_>, kinds: &HintKinds, found: &mut Vec<
         push(line.tight(first).start, format!("{text} "), HintKind::Motion, format!("{text} is still in force"));
     }
     if kinds.values {
-        values(line, run, &mut push);
+        values(line, run, m.totals.moves, &mut push);
     }
     if kinds.feed
         && let Some(f) = line.word(b'f')
@@ -167,21 +167,30 @@ fn computed(line: &LineOf<'_>, run: &Ran<'_>, moves: u64) -> bool {
         || [280, 281, 300, 301, 530].iter().any(|c| line.has_code(b'g', *c))
 }
 
-/// Values of computed words: `X[#1 * 2]` = 10.
-fn values(line: &LineOf<'_>, run: &Ran<'_>, push: &mut impl FnMut(u32, String, HintKind, String)) {
+/// Values of computed words: `X[#1 * 2]` = 10. Only where the state behind the block has them: those of words that are
+/// the end of one plain move, and of F, S and T in a block that is good.
+fn values(line: &LineOf<'_>, run: &Ran<'_>, moves: u64, push: &mut impl FnMut(u32, String, HintKind, String)) {
+    let other = [50, 51, 52, 53, 100, 280, 281, 300, 301, 520, 530, 920, 921, 922, 923];
+    let plain = moves == 1
+        && matches!(run.after.motion, 0 | 10 | 20 | 30)
+        && run.before.incremental == 0
+        && run.after.incremental == 0
+        && run.before.comp_side == 0
+        && run.after.comp_side == 0
+        && run.after.lathe_diameter == 0
+        && !other.iter().any(|c| line.has_code(b'g', *c));
+    let good = moves > 0 || run.before.bytes() != run.after.bytes();
     for w in line.words().iter().filter(|w| w.form == Form::Expr) {
         let value = match w.letter {
-            l if is_axis(l) && run.before.incremental == 0 && !line.has_code(b'g', 530) => {
-                let i = AXES.iter().position(|a| a.eq_ignore_ascii_case(&(l as char)));
-                i.filter(|_| run.after.comp_side == 0).map(|i| run.after.current[i])
-            }
-            b'f' => Some(run.after.feed),
-            b's' => Some(run.after.speed[run.after.active_spindle.clamp(0, 7) as usize]),
-            b't' => Some(f64::from(run.after.selected_tool)),
+            l if is_axis(l) && plain => AXES.iter().position(|a| a.eq_ignore_ascii_case(&(l as char))).map(|i| run.after.current[i]),
+            // In inverse time F is of the block alone.
+            b'f' if good && run.after.feed_mode != 1 => Some(run.after.feed),
+            b's' if good => Some(run.after.speed[run.after.active_spindle.clamp(0, 7) as usize]),
+            b't' if good => Some(f64::from(run.after.selected_tool)),
             _ => None,
         };
         if let Some(value) = value {
-            push(line.tight(w).end, format!("= {}", number(value, 4)), HintKind::Value, String::new());
+            push(line.tight(w).end, format!("= {}", number(value, 4)), HintKind::Value, "when the block is run for the first time".into());
         }
     }
 }

@@ -39,6 +39,8 @@ pub struct Facts<'a> {
     pub tools: Option<(&'a ToolTable, Units)>,
     /// Line of the assignment that was last before this one, with its text.
     pub last_write: Option<(u32, &'a str)>,
+    /// The line stands in a loop or a subroutine: it may be run again with other values.
+    pub repeats: bool,
 }
 
 /// The parameter under the cursor, whose value a run should report.
@@ -101,7 +103,7 @@ fn explain(line: &LineOf<'_>, word: &Word, dialect: &'static Dialect, facts: &Fa
     if letter == 'F'
         && let Some(run) = facts.run
     {
-        text.push_str(&format!("\n\n{}", feed(&run.after)));
+        text.push_str(&format!("\n\n{}", feed(&run.after, word)));
     }
     Some(text)
 }
@@ -145,12 +147,16 @@ pub fn code(def: &CodeDef, dialect: &Dialect) -> String {
     text
 }
 
-fn feed(m: &Modal) -> String {
+fn feed(m: &Modal, word: &Word) -> String {
     let inch = m.units() == Units::Inch;
     let unit = if inch { "inch" } else { "mm" };
     let value = number(m.feed, 4);
     match m.feed_mode {
-        1 => format!("G93: every feed move takes 1/F minutes; now {value} 1/min"),
+        // F is of its block alone, and not remembered.
+        1 if word.form == Form::Literal && word.value > 0.0 => {
+            format!("G93: every feed move takes 1/F minutes: this one 1/{} min = {}", number(word.value, 4), duration(60.0 / word.value))
+        }
+        1 => "G93: every feed move takes 1/F minutes".into(),
         2 => {
             let s = m.active_spindle.clamp(0, 7) as usize;
             format!("G95: {value} {unit} per revolution, at S{} = {} {unit}/min", number(m.speed[s], 1), number(m.feed * m.speed[s], 3))
@@ -206,10 +212,11 @@ fn parameter(p: &Parameter, facts: &Facts<'_>) -> String {
         && let Some((before, after)) = run.value
     {
         let value = |v: Option<f64>| v.map_or("not set".to_string(), |v| number(v, 6));
+        let first = if facts.repeats { " (when it is run for the first time)" } else { "" };
         if before == after {
-            text.push_str(&format!("\n\nHere: `{}`", value(before)));
+            text.push_str(&format!("\n\nHere: `{}`{first}", value(before)));
         } else {
-            text.push_str(&format!("\n\nBefore this block: `{}`, after it: `{}`", value(before), value(after)));
+            text.push_str(&format!("\n\nBefore this block: `{}`, after it: `{}`{first}", value(before), value(after)));
         }
     }
     if let Some((line, written)) = facts.last_write {
@@ -233,7 +240,8 @@ pub fn block(run: &Run) -> String {
             (_, 1, None) => "straight feed".into(),
             (_, n, _) => format!("{n} moves"),
         };
-        lines.push(format!("**{what}** from {} to {} ({unit})", position(b, None), position(a, None)));
+        let radius = if b.lathe_diameter != 0 || a.lathe_diameter != 0 { ", X as a radius" } else { "" };
+        lines.push(format!("**{what}** from {} to {} ({unit}{radius})", position(b, None), position(a, None)));
         if let Some(arc) = m.arc.filter(|_| m.totals.moves == 1) {
             lines.push(arc_text(&arc, unit));
         }

@@ -146,6 +146,28 @@ pub fn folds(doc: Doc<'_>) -> Vec<Fold> {
     found
 }
 
+/// Lines that are run more than once, or may be: of loops and subroutines.
+pub fn loops(doc: Doc<'_>) -> Vec<std::ops::RangeInclusive<u32>> {
+    let (mut open, mut found): (Vec<(u32, Keyword, String)>, Vec<std::ops::RangeInclusive<u32>>) = (Vec::new(), Vec::new());
+    for (c, chunk) in doc.file.chunks.iter().enumerate().filter(|(_, c)| !c.scan.controls.is_empty()) {
+        let first = doc.file.first_lines[c];
+        for s in gr_gcode::symbols(&chunk.text, &chunk.scan).statements {
+            let (line, label) = (s.line + first, label_text(&s.what.label));
+            let ends = matches!(s.what.keyword, Keyword::Endsub | Keyword::Endrepeat | Keyword::Endwhile | Keyword::While | Keyword::MacroEnd);
+            let begun = open.iter().rposition(|o| o.2 == label).filter(|_| ends);
+            if let Some((start, ..)) = begun.map(|at| open.remove(at)) {
+                found.push(start..=line);
+            } else if matches!(s.what.keyword, Keyword::Sub | Keyword::Repeat | Keyword::Do | Keyword::While | Keyword::MacroWhile | Keyword::MacroDo) {
+                open.push((line, s.what.keyword, label));
+            }
+            if found.len() >= MOST_ITEMS {
+                return found;
+            }
+        }
+    }
+    found
+}
+
 /// Two or more lines of nothing but comments.
 fn comments(doc: Doc<'_>, found: &mut Vec<Fold>) {
     let mut run: Option<(u32, u32)> = None;

@@ -13,13 +13,22 @@ const MOST_BYTES: usize = 8_000_000;
 
 /// Actions at a byte.
 pub fn actions(doc: Doc<'_>, at: Span) -> Vec<Action> {
-    let mut found: Vec<Action> = missing(doc, at).into_iter().collect();
-    if doc.text.len() <= MOST_BYTES {
-        found.extend(renumber(doc));
-        found.extend(drop_unreferenced(doc));
-    }
-    found
+    missing(doc, at).into_iter().collect()
 }
+
+/// Rewritings of the whole file.
+pub fn of_file(doc: Doc<'_>) -> Vec<Action> {
+    if doc.text.len() > MOST_BYTES {
+        return Vec::new();
+    }
+    renumber(doc).into_iter().chain(drop_unreferenced(doc)).collect()
+}
+
+/// Names of [`of_file`], for files in which it takes a while to know what is to be done.
+pub const OF_FILE: [&str; 2] = [NUMBER, DROP];
+
+const NUMBER: &str = "Number instances 1, 2, 3 … in file order";
+const DROP: &str = "Remove instances that no project leads to";
 
 /// Creates the instance that a reference names and the file does not have.
 fn missing(doc: Doc<'_>, at: Span) -> Option<Action> {
@@ -67,7 +76,7 @@ fn renumber(doc: Doc<'_>) -> Option<Action> {
     }
     let text = String::from_utf8(new).ok()?;
     let span = Span::new(0, doc.text.len() as u32);
-    Some(Action { title: "Number instances 1, 2, 3 … in file order".into(), kind: ActionKind::Source, edits: vec![Edit { span, text }] })
+    Some(Action { title: NUMBER.into(), kind: ActionKind::Source, edits: vec![Edit { span, text }] })
 }
 
 /// Removes what no project leads to.
@@ -90,8 +99,7 @@ fn drop_unreferenced(doc: Doc<'_>) -> Option<Action> {
             Edit { span: Span::new(i.start, i.end + line_end as u32), text: String::new() }
         })
         .collect();
-    let title = format!("Remove {} instances that no project leads to", unused.len());
-    Some(Action { title, kind: ActionKind::Source, edits })
+    Some(Action { title: DROP.into(), kind: ActionKind::Source, edits })
 }
 
 /// Statements that cannot be reached from a project; none when the file has no project or is damaged.
