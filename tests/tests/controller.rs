@@ -10,13 +10,13 @@ use gr_tests::full;
 use gr_tests::oracle::{Job, Verdict, differ, gcc_robot, kept, reference, root, score};
 use gr_tests::process::{end, run};
 
-/// Files that become programs for a mill with three axes.
-const PARTS: [&str; 5] = [
-    "docs/examples/stepnc/case-study.p21",
-    "tests/linuxcnc/quick.p21",
-    "tests/golden/unb2013/fig4-45_slot-square-u.p21",
-    "tests/golden/unb2013/example-a_conical-hole.p21",
-    "tests/golden/ufsc2016/example1.p21",
+/// Files that become programs for a mill with three axes, and how they mean their numbers.
+const PARTS: [(&str, &[&str]); 5] = [
+    ("docs/examples/stepnc/case-study.p21", &[]),
+    ("tests/linuxcnc/quick.p21", &[]),
+    ("tests/golden/unb2013/fig4-45_slot-square-u.p21", &["--step-units", "step-modeler"]),
+    ("tests/golden/unb2013/example-a_conical-hole.p21", &["--step-units", "step-modeler"]),
+    ("tests/golden/ufsc2016/example1.p21", &["--step-overlap", "percent"]),
 ];
 
 fn ours(folder: &Path, args: &[&str]) -> String {
@@ -44,11 +44,12 @@ fn lengths(table: &str) -> Vec<(i32, f64)> {
 #[test]
 fn written_programs_pass_the_interpreter() {
     let Some(rs274) = reference() else { return };
-    for part in PARTS {
+    for (part, meant) in PARTS {
         let folder = tempfile::tempdir().expect("a folder");
         let source = root().join(part);
         for options in [&[][..], &["--cycles"], &["--tool-change-at", "g53"], &["--tool-change-at", "g55"], &["--tool-change-at", "g30"], &["--units", "inch"]] {
             let mut args = vec!["build", "-q", source.to_str().expect("UTF-8"), "-o", "part.ngc"];
+            args.extend(meant);
             args.extend(options);
             ours(folder.path(), &args);
             let program = std::fs::read(folder.path().join("part.ngc")).expect("written");
@@ -58,18 +59,20 @@ fn written_programs_pass_the_interpreter() {
             let accepted = job.reference(&rs274);
             assert!(accepted.ok(), "{part} {options:?}: {}", accepted.ended.errors());
         }
-        in_full_precision(part, folder.path(), &source);
+        in_full_precision(part, meant, folder.path(), &source);
     }
 }
 
 /// As a machine in millimeters with the table as it was written: every move ends where ours ends.
-fn in_full_precision(part: &str, folder: &Path, source: &Path) {
-    ours(folder, &["build", "-q", source.to_str().expect("UTF-8"), "-o", "mm.ngc", "--decimals", "7"]);
+fn in_full_precision(part: &str, meant: &[&str], folder: &Path, source: &Path) {
+    let source = source.to_str().expect("UTF-8");
+    let ours = |args: &[&str]| ours(folder, &[&["build", "-q", source], meant, args].concat());
+    ours(&["-o", "mm.ngc", "--decimals", "7"]);
     let Some(path) = full::path(&folder.join("mm.ngc"), Some(&folder.join("mm.tbl"))) else { return };
     assert_eq!(path.end, "ok", "{part}");
     let table = std::fs::read_to_string(folder.join("mm.tbl")).expect("written");
     let theirs: Vec<[f64; 3]> = path.moves.iter().map(|m| [m.end[0], m.end[1], m.end[2]]).collect();
-    let csv = ours(folder, &["build", "-q", source.to_str().expect("UTF-8"), "--target", "csv"]);
+    let csv = ours(&["--target", "csv"]);
     let mut at = 0;
     for p in ends(&csv, &lengths(&table)) {
         // A move of nothing has no counterpart there.

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use gr_interp::{ToolTable, read_tools};
 use gr_planner::reference::{ufsc2016, unb2013};
-use gr_planner::{Loaded, Process, Tool, table};
+use gr_planner::{Loaded, Process, Tool, Units, table};
 use gr_text::{Diagnostic, FileId, LineIndex, Severity, code};
 
 use crate::commands::check::Checked;
@@ -111,9 +111,40 @@ fn add(found: &mut Vec<Diagnostic>, more: Vec<Diagnostic>, levels: &Levels) {
 
 /// Syntax, schema, rules and lints; the plan follows only where there are no errors.
 fn syntax(unit: &Unit) -> Vec<Diagnostic> {
-    let mut found = Vec::new();
-    add(&mut found, gr_step::diagnostics(&unit.text, FILE), &unit.lints);
-    found
+    let mut found = gr_step::diagnostics(&unit.text, FILE);
+    if unit.step_overlap.is_some() || unit.step_units == Some(Units::StepModeler) {
+        found.retain(|d| d.code != code::STEP_OVERLAP);
+    }
+    let mut all = Vec::new();
+    add(&mut all, found, &unit.lints);
+    all
+}
+
+/// A file that is only listed, or read as a published system read it: what its units leave open is a warning.
+fn leniently(unit: &Unit) -> Result<(Process, Vec<Tool>, Checked), Checked> {
+    let text = unit.text.as_bytes();
+    let mut found = gr_step::diagnostics(&unit.text, FILE);
+    let units = unit.step_units.unwrap_or_else(|| gr_planner::evident_units(text));
+    let (process, tools, more) = gr_planner::process(text, FILE, Some(units));
+    let open = gr_planner::process(text, FILE, unit.step_units).2.into_iter().find(|d| d.code == code::PLAN_UNITS_OPEN);
+    found.extend(open);
+    found.retain(|d| d.code != code::STEP_OVERLAP || unit.step_overlap.is_none());
+    for d in &mut found {
+        if [code::STEP_OVERLAP, code::PLAN_UNITS_OPEN].contains(&d.code) {
+            d.severity = Severity::Warning;
+        }
+    }
+    let mut all = Vec::new();
+    add(&mut all, found, &unit.lints);
+    if !bad(&all) {
+        add(&mut all, more, &unit.lints);
+    }
+    let failed = bad(&all);
+    let checked = with_source(&unit.name(), unit, all);
+    match process {
+        Some(process) if !failed => Ok((process, tools, checked)),
+        _ => Err(checked),
+    }
 }
 
 /// What the control calls the tools of a file.
@@ -136,7 +167,7 @@ fn plan(unit: &Unit) -> (Option<gr_planner::Planned>, Vec<Diagnostic>) {
     let text = unit.text.as_bytes();
     let (_, tools, _) = gr_planner::process(text, FILE, unit.step_units);
     let (loaded, missing) = loaded(unit, &tools);
-    let options = gr_planner::Options { units: unit.step_units, name: unit.name(), tools: loaded, ..Default::default() };
+    let options = gr_planner::Options { units: unit.step_units, overlap: unit.step_overlap, name: unit.name(), tools: loaded, ..Default::default() };
     let (planned, more) = gr_planner::plan(text, FILE, &options);
     add(&mut found, more, &unit.lints);
     add(&mut found, missing, &unit.lints);
@@ -181,7 +212,7 @@ pub fn process(unit: &Unit) -> Result<(Process, Vec<Tool>, Checked), Checked> {
 
 /// The table of workingsteps, as text or JSON.
 pub fn list(unit: &Unit, json: bool) -> Result<(String, Checked), Checked> {
-    let (process, tools, checked) = process(unit)?;
+    let (process, tools, checked) = leniently(unit)?;
     let text = if json { table::json(&process, &tools) } else { table::text(&process, &tools) };
     Ok((text, checked))
 }
@@ -198,7 +229,7 @@ pub struct Converted {
 
 /// Converts as the system of Brasília 2013 did, with its settings file if there is one.
 pub fn unb2013(unit: &Unit, settings: Option<&Path>) -> Result<(Converted, Checked), Checked> {
-    let (process, _, mut checked) = process(unit)?;
+    let (process, _, mut checked) = leniently(unit)?;
     let mut config = unb2013::Config::default();
     if let Some(path) = settings {
         let name = path.display().to_string();
@@ -229,7 +260,7 @@ pub fn unb2013(unit: &Unit, settings: Option<&Path>) -> Result<(Converted, Check
 
 /// Motion as the system of Florianópolis 2016 made it: its points, one move each.
 pub fn ufsc2016(unit: &Unit) -> Result<(Motion, Checked), Checked> {
-    let (process, tools, mut checked) = process(unit)?;
+    let (process, tools, mut checked) = leniently(unit)?;
     match ufsc2016::points(&process, FILE) {
         Ok(points) => {
             let lines = LineIndex::new(unit.text.as_bytes());

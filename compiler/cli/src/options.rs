@@ -113,9 +113,34 @@ pub struct SetupArgs {
     /// Folder with subroutine files; may be given several times
     #[arg(long = "subs", value_name = "FOLDER")]
     pub subs: Vec<PathBuf>,
-    /// STEP-NC: how feeds, speeds and angles are meant [default: as the header of the file says, with a warning]
+    /// STEP-NC: how feeds, speeds and angles are meant [default: as the standard says; an error where speeds contradict it]
     #[arg(long, value_enum, value_name = "UNITS")]
     pub step_units: Option<StepUnits>,
+    /// STEP-NC: how the overlap of two passes is meant [default: a ratio; millimetres in step-modeler's units]
+    #[arg(long, value_enum, value_name = "HOW")]
+    pub step_overlap: Option<StepOverlap>,
+}
+
+/// How STEP-NC files write the overlap of two passes.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum StepOverlap {
+    /// Share of the tool's diameter, 0 to 1: ISO 14649
+    Ratio,
+    /// Percent of the diameter: the printed example of ISO 14649-11
+    Percent,
+    /// Millimetres: STEP Modeler
+    Mm,
+}
+
+impl From<StepOverlap> for gr_planner::Overlap {
+    fn from(o: StepOverlap) -> gr_planner::Overlap {
+        match o {
+            StepOverlap::Ratio => gr_planner::Overlap::Ratio,
+            StepOverlap::Percent => gr_planner::Overlap::Percent,
+            StepOverlap::Mm => gr_planner::Overlap::Millimetres,
+        }
+    }
 }
 
 /// Units of technology in STEP-NC files.

@@ -29,8 +29,10 @@ pub struct Unit {
     pub lints: Levels,
     /// A STEP-NC file.
     pub exchange: bool,
-    /// How its technology is read; none: as it says.
+    /// How its technology is read; none: as the standard says.
     pub step_units: Option<gr_planner::Units>,
+    /// How its overlaps are read; none: as its units say.
+    pub step_overlap: Option<gr_planner::Overlap>,
     /// Name of the machine's tool table; none: every tool exists.
     pub tools: Option<String>,
 }
@@ -46,6 +48,7 @@ impl Unit {
             encoding,
             lints: station.lints.clone(),
             step_units: station.step_units,
+            step_overlap: station.step_overlap,
             tools: station.tools.as_ref().map(|p| p.display().to_string()),
         }
     }

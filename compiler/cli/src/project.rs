@@ -50,6 +50,7 @@ pub struct Section {
     pub block_delete: bool,
     pub subs: Vec<PathBuf>,
     pub step_units: Option<crate::options::StepUnits>,
+    pub step_overlap: Option<crate::options::StepOverlap>,
     pub reference: Option<crate::emit::Reference>,
 }
 

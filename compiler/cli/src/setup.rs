@@ -18,8 +18,10 @@ use crate::sources::{Sources, read};
 pub struct Station {
     /// What the interpreter starts from; the dialect may still depend on the file.
     pub setup: Setup,
-    /// How technology of STEP-NC files is read; none: as the file says.
+    /// How technology of STEP-NC files is read; none: as the standard says.
     pub step_units: Option<gr_planner::Units>,
+    /// How their overlaps are read; none: as their units say.
+    pub step_overlap: Option<gr_planner::Overlap>,
     /// The machine's tool table, if one was named.
     pub tools: Option<PathBuf>,
     /// Asked for by an option.
@@ -110,8 +112,9 @@ pub fn assembled(args: &SetupArgs, lints: &LintArgs, from: &Path, sources: &mut 
     }
     let lints = reader.levels(lints, project.as_ref());
     let step_units = args.step_units.or(section.and_then(|s| s.step_units)).map(gr_planner::Units::from);
+    let step_overlap = args.step_overlap.or(section.and_then(|s| s.step_overlap)).map(gr_planner::Overlap::from);
     let Reader { files, .. } = reader;
-    Station { setup, step_units, tools, dialect, machine, files, project, lints }
+    Station { setup, step_units, step_overlap, tools, dialect, machine, files, project, lints }
 }
 
 fn units(args: &SetupArgs, section: Option<&crate::project::Section>) -> Option<Units> {

@@ -106,15 +106,22 @@ fn every_target() {
 #[test]
 fn written_programs_move_as_planned() {
     let f = Folder::new();
-    for file in [case_study(), golden("unb2013/fig4-45_slot-square-u.p21"), golden("unb2013/example-a_conical-hole.p21"), golden("ufsc2016/example1.p21")] {
+    let modeler = ["--step-units", "step-modeler"];
+    for (file, meant) in [
+        (case_study(), &[][..]),
+        (golden("unb2013/fig4-45_slot-square-u.p21"), &modeler),
+        (golden("unb2013/example-a_conical-hole.p21"), &modeler),
+        (golden("ufsc2016/example1.p21"), &["--step-overlap", "percent"]),
+    ] {
         for options in [&[][..], &["--cycles"], &["--units", "inch"], &["--arcs", "r"], &["--to", "fanuc-mill"], &["--cycles", "--to", "fanuc-mill"]] {
             let mut args = vec!["verify", &file];
+            args.extend(meant);
             args.extend(options);
             let o = f.run(&args);
             assert_eq!(code(&o), 0, "{args:?}: {}{}", out(&o), err(&o));
         }
-        f.ok(&["build", "-q", &file, "-o", "part.ngc"]);
-        let same = f.run(&["diff", &file, "part.ngc", "--tools", "part.tbl", "--tolerance", "0.001"]);
+        f.ok(&[&["build", "-q", &file, "-o", "part.ngc"], meant].concat());
+        let same = f.run(&[&["diff", &file, "part.ngc", "--tools", "part.tbl", "--tolerance", "0.001"], meant].concat());
         assert_eq!(code(&same), 0, "{}{}", out(&same), err(&same));
     }
 }

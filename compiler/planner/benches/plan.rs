@@ -4,7 +4,7 @@
 #[allow(dead_code)]
 mod part;
 
-use gr_planner::{Options, plan};
+use gr_planner::{Options, Overlap, Units, plan};
 use gr_text::FileId;
 use part::{Mill, Part};
 
@@ -15,13 +15,13 @@ fn main() {
 #[divan::bench]
 fn example_1() {
     let text = include_bytes!("../../../tests/golden/ufsc2016/example1.p21");
-    divan::black_box(plan(text, FileId(0), &Options::default()));
+    divan::black_box(plan(text, FileId(0), &Options { overlap: Some(Overlap::Percent), ..Options::default() }));
 }
 
 #[divan::bench]
 fn example_2_of_26_workingsteps() {
     let text = include_bytes!("../../../tests/golden/ufsc2016/example2_3caras.p21");
-    divan::black_box(plan(text, FileId(0), &Options::default()));
+    divan::black_box(plan(text, FileId(0), &Options { units: Some(Units::StepModeler), ..Options::default() }));
 }
 
 /// Pockets in a row, each with tools and technology of its own.

@@ -17,7 +17,7 @@ pub mod table;
 
 use gr_text::{Diagnostic, FileId};
 pub use plan::{Loaded, Options, Planned, plan};
-pub use process::{Process, Tool, Units};
+pub use process::{Overlap, Process, Tool, Units};
 
 /// Reads the process of a file. Faults of syntax and schema are not told here.
 pub fn process(text: &[u8], file: FileId, units: Option<Units>) -> (Option<Process>, Vec<Tool>, Vec<Diagnostic>) {
@@ -27,6 +27,12 @@ pub fn process(text: &[u8], file: FileId, units: Option<Units>) -> (Option<Proce
         return ap238::read(&model, file);
     }
     read::read(&model, file, units)
+}
+
+/// How the published systems read a file: as the standard says where its speeds allow that, as STEP Modeler otherwise.
+pub fn evident_units(text: &[u8]) -> Units {
+    let open = |d: &Diagnostic| d.code == gr_text::code::PLAN_UNITS_OPEN;
+    if process(text, FileId(0), None).2.iter().any(open) { Units::StepModeler } else { Units::Iso }
 }
 
 /// The tools as LinuxCNC's tool table, in mm: number, pocket, length, diameter, and what the tool is.

@@ -18,8 +18,10 @@ const BLEND_SHARE: f64 = 5.0;
 /// What can be chosen.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Options {
-    /// How technology is read; none: as the header says.
+    /// How technology is read; none: as the standard says, and where its speeds contradict that, not at all.
     pub units: Option<Units>,
+    /// How overlaps are read; none: millimetres in STEP Modeler's units, else a ratio.
+    pub overlap: Option<Overlap>,
     /// Name of the file, for messages and the sources of operations.
     pub name: String,
     /// Greatest distance of a rough wall or a scallop from the true surface, mm; none: the part's tolerance, or 0.05.
@@ -87,6 +89,10 @@ pub fn plan(text: &[u8], file: FileId, options: &Options) -> (Option<Planned>, V
         axes: Vec::new(),
         tolerance: tolerance(&process, options),
         tells: tells(&process),
+        overlap: options.overlap.unwrap_or(match process.units {
+            Units::StepModeler => Overlap::Millimetres,
+            Units::Iso => Overlap::Ratio,
+        }),
     };
     p.e.b.file(file, &options.name);
     p.e.begin();
@@ -138,6 +144,8 @@ struct Planner<'a> {
     tolerance: f64,
     /// Workingsteps that say what is left of their features.
     tells: BTreeSet<u64>,
+    /// How overlaps are written.
+    overlap: Overlap,
 }
 
 impl Planner<'_> {
@@ -265,7 +273,7 @@ impl Planner<'_> {
                 }
             }
             OperationKind::Mill(m) => {
-                let given = mill::Given { security, tolerance: self.tolerance, tells: self.tells.contains(&s.origin.id) };
+                let given = mill::Given { security, tolerance: self.tolerance, tells: self.tells.contains(&s.origin.id), overlap: self.overlap };
                 for f in targets(s) {
                     mill::mill(&mut self.e, s, m, f, &given);
                     self.e.cut.insert(f.origin.id);

@@ -28,6 +28,17 @@ pub enum Units {
     StepModeler,
 }
 
+/// How the overlap of two passes is written.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Overlap {
+    /// Share of the tool's diameter, 0 to 1: ISO 14649.
+    Ratio,
+    /// Percent of it: the printed example of ISO 14649-11.
+    Percent,
+    /// Millimetres: STEP Modeler.
+    Millimetres,
+}
+
 /// A project.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Process {

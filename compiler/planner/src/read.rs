@@ -53,7 +53,6 @@ pub(crate) fn title(node: Node<'_>) -> String {
 
 /// Reads the process of a file.
 pub(crate) fn read<'m>(model: &'m Model<'m>, file: FileId, units: Option<Units>) -> (Option<Process>, Vec<Tool>, Vec<Diagnostic>) {
-    let guess = if step_modeler(model) { Units::StepModeler } else { Units::Iso };
     let mut parents = BTreeMap::new();
     for kind in ["compound_feature", "replicate_feature"] {
         for parent in model.all(kind) {
@@ -64,7 +63,7 @@ pub(crate) fn read<'m>(model: &'m Model<'m>, file: FileId, units: Option<Units>)
     let mut r = Reader {
         model,
         file,
-        units: units.unwrap_or(guess),
+        units: units.unwrap_or(Units::Iso),
         out: Vec::new(),
         tools: Vec::new(),
         parents,
@@ -79,11 +78,6 @@ pub(crate) fn read<'m>(model: &'m Model<'m>, file: FileId, units: Option<Units>)
     };
     let process = r.project();
     (process, r.tools, r.out)
-}
-
-fn step_modeler(model: &Model<'_>) -> bool {
-    let Some(name) = model.header("FILE_NAME") else { return false };
-    name.parameters().any(|v| v.string().is_some_and(|s| s.contains("ST-GENERATOR")))
 }
 
 impl<'m> Reader<'m> {
@@ -166,10 +160,11 @@ impl<'m> Reader<'m> {
             Units::StepModeler => v,
         }
     }
-    pub fn units_were_read(&mut self, node: Node<'_>, as_read: &str, otherwise: &str) {
+    /// Told once in a file: nothing in it says which of two readings is meant.
+    pub fn units_are_open(&mut self, node: Node<'_>, iso: &str, other: &str) {
         if !self.units_said {
             self.units_said = true;
-            self.say(code::PLAN_UNITS_READ, node, &[as_read, otherwise]);
+            self.say_at(code::PLAN_UNITS_OPEN, node, "spindle", &[iso, other]);
         }
     }
 

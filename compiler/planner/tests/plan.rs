@@ -1,7 +1,7 @@
 //! The default planner: what it makes of published files, and what the original systems did wrong.
 
 use gr_ir::{Marker, Op, Program, Turn};
-use gr_planner::{Options, Planned, plan};
+use gr_planner::{Options, Overlap, Planned, Units, plan};
 use gr_text::{Diagnostic, FileId, Severity, code};
 
 const SLOT: &str = include_str!("../../../tests/golden/unb2013/fig4-45_slot-square-u.p21");
@@ -9,15 +9,21 @@ const HOLE: &str = include_str!("../../../tests/golden/unb2013/example-a_conical
 const PART1: &str = include_str!("../../../tests/golden/ufsc2016/example1.p21");
 const PART2: &str = include_str!("../../../tests/golden/ufsc2016/example2_3caras.p21");
 
+/// As the files mean their numbers: the ones of STEP Modeler, and the standard's example with overlaps in percent.
+fn options(text: &str) -> Options {
+    let modeler = text.contains("ST-GENERATOR").then_some(Units::StepModeler);
+    Options { units: modeler, overlap: text.contains("'example1.p21'").then_some(Overlap::Percent), ..Options::default() }
+}
+
 fn planned(text: &str) -> (Planned, Vec<Diagnostic>) {
-    let (planned, out) = plan(text.as_bytes(), FileId(0), &Options::default());
+    let (planned, out) = plan(text.as_bytes(), FileId(0), &options(text));
     let errors: Vec<_> = out.iter().filter(|d| d.severity == Severity::Error).collect();
     assert!(errors.is_empty(), "{errors:#?}");
     (planned.expect("a program"), out)
 }
 
 fn faults(text: &str) -> Vec<Diagnostic> {
-    let (planned, out) = plan(text.as_bytes(), FileId(0), &Options::default());
+    let (planned, out) = plan(text.as_bytes(), FileId(0), &options(text));
     assert!(planned.is_none(), "no program with errors: {out:#?}");
     out
 }
@@ -43,12 +49,40 @@ fn conical_hole() {
     safe(&p.program, 30.0);
     insta::assert_snapshot!(text(&p.program));
     // What the original did: feed at machine speed, rapid onto the surface, no coolant, no speed.
-    let reading = out.iter().find(|d| d.code == code::PLAN_UNITS_READ).expect("the reading of units is told");
-    assert!(reading.message.contains("1/s") || reading.message.contains("rpm"), "{}", reading.message);
+    assert!(out.iter().all(|d| d.code != code::PLAN_UNITS_OPEN), "the units are stated");
     let bottom = p.program.steps().filter(|s| s.op.moves()).map(|s| s.end.axes[2]).fold(f64::INFINITY, f64::min);
     assert!((bottom - (30.0 - 11.819851171331011)).abs() < 1e-9, "{bottom}");
     assert!(p.program.steps().any(|s| s.op == Op::Flood(true)));
     assert!(p.program.steps().any(|s| s.op == Op::SpindleTurn { spindle: 0, turn: Turn::Cw }));
+}
+
+/// Two readings of a file: neither is chosen, both are offered, once.
+#[test]
+fn open_units_are_an_error() {
+    for (file, iso, modeler) in [(HOLE, "350.1 rpm, feed 10500.0", "583.6 rpm, feed 102.1"), (SLOT, "", ""), (PART2, "", "")] {
+        let (planned, out) = plan(file.as_bytes(), FileId(0), &Options::default());
+        let open: Vec<_> = out.iter().filter(|d| d.code == code::PLAN_UNITS_OPEN).collect();
+        assert!(planned.is_none() && open.len() == 1, "{out:#?}");
+        assert!(open[0].message.contains(iso) && open[0].message.contains(modeler), "{}", open[0].message);
+    }
+    // Values in the standard's units, and both speeds where they agree: 1.2566 m/s on 20 mm are 20 1/s.
+    let both = PART1.replace("(0.04,.TCP.,$,-12.0", "(0.04,.TCP.,0.754,-12.0");
+    assert!(both != PART1 && !plan(both.as_bytes(), FileId(0), &options(&both)).1.iter().any(|d| d.code == code::PLAN_UNITS_OPEN));
+    let open = PART1.replace("(0.04,.TCP.,$,-12.0", "(0.04,.TCP.,45.2,-12.0");
+    assert!(plan(open.as_bytes(), FileId(0), &options(&open)).1.iter().any(|d| d.code == code::PLAN_UNITS_OPEN));
+}
+
+/// An overlap is what the options say it is.
+#[test]
+fn overlaps() {
+    let passes = |overlap| {
+        let options = Options { overlap, ..Options::default() };
+        plan(PART1.as_bytes(), FileId(0), &options).0.map(|p| p.program.steps().filter(|s| matches!(s.op, Op::Linear)).count())
+    };
+    let (percent, mm) = (passes(Some(Overlap::Percent)), passes(Some(Overlap::Millimetres)));
+    assert!(percent.is_some() && mm > percent, "5 mm of 20 overlap more than 5 percent: {percent:?} {mm:?}");
+    assert_eq!(passes(None), None, "no reading is chosen");
+    assert_eq!(passes(Some(Overlap::Ratio)), None);
 }
 
 #[test]
@@ -98,7 +132,6 @@ fn example_1() {
     assert!(drill[2].end.axes[2] < -30.0);
     let feeds: Vec<f64> = p.program.steps().filter_map(|s| if let Op::Feed { linear, .. } = s.op { Some(linear) } else { None }).collect();
     assert!(feeds.contains(&15.0) && feeds.contains(&30.0) && feeds.contains(&22.5), "{feeds:?}");
-    assert!(out.iter().any(|d| d.code == code::PLAN_OVERLAP_NOT_A_RATIO), "5.0 is percent");
     // The stop at the reamed bottom and nothing left of allowance in the finishing of the pocket.
     let z = p.program.steps().filter(|s| s.op.feeds() && s.end.axes[0] > 50.0).map(|s| s.end.axes[2]).fold(0.0, f64::min);
     assert_eq!(z, -30.0);

@@ -2,10 +2,14 @@
 
 use gr_ir::{Op, Stop};
 use gr_planner::process::Element;
-use gr_planner::{Options, Process, plan, process};
+use gr_planner::{Options, Process, Units, plan, process};
 use gr_text::{Diagnostic, FileId, Severity, code};
 
 const HOLE: &str = include_str!("../../../tests/golden/unb2013/example-a_conical-hole.p21");
+
+fn modeler() -> Options {
+    Options { units: Some(Units::StepModeler), ..Options::default() }
+}
 
 /// The hole's file with another main workplan and further instances.
 fn with(elements: &str, more: &str) -> String {
@@ -13,7 +17,7 @@ fn with(elements: &str, more: &str) -> String {
 }
 
 fn read(text: &str) -> (Process, Vec<Diagnostic>) {
-    let (process, _, out) = process(text.as_bytes(), FileId(0), None);
+    let (process, _, out) = process(text.as_bytes(), FileId(0), Some(Units::StepModeler));
     (process.expect("a process"), out)
 }
 
@@ -71,7 +75,7 @@ fn a_plan_that_contains_itself() {
 fn functions_of_the_control() {
     let more = "#70=DISPLAY_MESSAGE('m','turn the part');\n#71=PROGRAM_STOP('s');\n#72=OPTIONAL_STOP('o');\n";
     let text = with("#47,#70,#71,#72,#58", more);
-    let (planned, out) = plan(text.as_bytes(), FileId(0), &Options::default());
+    let (planned, out) = plan(text.as_bytes(), FileId(0), &modeler());
     assert_eq!(codes(&out), []);
     let planned = planned.expect("a program");
     let stops: Vec<Stop> = planned.program.steps().filter_map(|s| if let Op::Stop(k) = s.op { Some(k) } else { None }).collect();
@@ -98,7 +102,7 @@ fn patterns_repeat_their_feature() {
     let copies = &p.steps()[0].feature.copies;
     assert_eq!(copies.len(), 4);
     assert!((copies[1].origin[0]).abs() < 1e-9 && (copies[1].origin[1] - 10.0).abs() < 1e-9);
-    let (planned, _) = plan(base.replace("#91=", &format!("{circle}#91=")).as_bytes(), FileId(0), &Options::default());
+    let (planned, _) = plan(base.replace("#91=", &format!("{circle}#91=")).as_bytes(), FileId(0), &modeler());
     let bottoms = planned.expect("a program").program.steps().filter(|s| s.op == Op::Linear && s.end.axes[2] < 20.0).count();
     assert_eq!(bottoms, 4);
 }
@@ -114,14 +118,14 @@ fn patterns_inside_patterns() {
     let round = |v: f64| v.round() as i64;
     let places: Vec<(i64, i64)> = p.steps()[0].feature.copies.iter().map(|f| (round(f.origin[0]), round(f.origin[1]))).collect();
     assert_eq!(places, [(10, 0), (0, 10), (-10, 0), (0, -10), (-190, 0), (-200, 10), (-210, 0), (-200, -10)]);
-    let (_, out) = plan(base.replace("#91=", &format!("{inner}{}#91=", outer.replace("#90", "#80"))).as_bytes(), FileId(0), &Options::default());
+    let (_, out) = plan(base.replace("#91=", &format!("{inner}{}#91=", outer.replace("#90", "#80"))).as_bytes(), FileId(0), &modeler());
     assert_eq!(codes(&out), [code::PLAN_GOES_ROUND]);
 }
 
 #[test]
 fn files_without_a_plan() {
     for text in ["", "ISO-10303-21;\nHEADER;\nFILE_SCHEMA(('AUTOMOTIVE_DESIGN'));\nENDSEC;\nDATA;\n#1=CARTESIAN_POINT('',(0.,0.,0.));\nENDSEC;\nEND-ISO-10303-21;\n", "\u{0}\u{1}#1="] {
-        let (planned, out) = plan(text.as_bytes(), FileId(0), &Options::default());
+        let (planned, out) = plan(text.as_bytes(), FileId(0), &modeler());
         assert!(planned.is_none());
         assert_eq!(codes(&out), [code::PLAN_NO_PROJECT]);
     }
@@ -131,7 +135,7 @@ fn files_without_a_plan() {
 fn bad_numbers_are_told() {
     for (old, new) in [("MILLING_TOOL_DIMENSION(10.0,", "MILLING_TOOL_DIMENSION(0.0,"), ("11.819851171331011", "-1.0"), ("(0.0,0.0,-10.0)", "(0.0,0.0,10.0)")] {
         let text = HOLE.replace(old, new);
-        let (planned, out) = plan(text.as_bytes(), FileId(0), &Options::default());
+        let (planned, out) = plan(text.as_bytes(), FileId(0), &modeler());
         assert!(planned.is_none(), "{new}");
         assert!(codes(&out).contains(&code::PLAN_BAD_SIZE), "{new}: {out:#?}");
     }
@@ -140,14 +144,14 @@ fn bad_numbers_are_told() {
 #[test]
 fn a_drill_wider_than_its_hole() {
     let text = HOLE.replace("#44=TOLERANCED_LENGTH_MEASURE(10.0,#45)", "#44=TOLERANCED_LENGTH_MEASURE(8.0,#45)");
-    let (_, out) = plan(text.as_bytes(), FileId(0), &Options::default());
+    let (_, out) = plan(text.as_bytes(), FileId(0), &modeler());
     assert_eq!(codes(&out), [code::PLAN_TOOL_WIDER_THAN_FEATURE]);
 }
 
 #[test]
 fn a_security_plane_inside_the_part_is_not_used() {
     let text = HOLE.replace("'',(0.0,0.0,55.0)", "'',(0.0,0.0,25.0)");
-    let (planned, out) = plan(text.as_bytes(), FileId(0), &Options::default());
+    let (planned, out) = plan(text.as_bytes(), FileId(0), &modeler());
     assert!(out.iter().any(|d| d.code == code::PLAN_APPROACH_CHANGED));
     let high = planned.expect("a program").program.steps().filter(|s| s.op == Op::Rapid).map(|s| s.end.axes[2]).fold(0.0, f64::max);
     assert_eq!(high, 35.0);
@@ -157,7 +161,7 @@ fn a_security_plane_inside_the_part_is_not_used() {
 fn multistep_drilling_pecks() {
     let text = HOLE.replace("DRILLING($,$,'Drilling',5.0,#56,#49,#54,#55,$,11.819851171331011,$,$,$,#57)", "MULTISTEP_DRILLING($,$,'Drilling',5.0,#56,#49,#54,#55,$,10.,$,0.5,$,#57,20.,4.,3.,$)")
         .replace("CENTER_MULTISTEP", "CENTER");
-    let (planned, out) = plan(text.as_bytes(), FileId(0), &Options::default());
+    let (planned, out) = plan(text.as_bytes(), FileId(0), &modeler());
     assert_eq!(codes(&out), []);
     let program = planned.expect("a program").program;
     let depths: Vec<f64> = program.steps().filter(|s| s.op == Op::Linear).map(|s| 30.0 - s.end.axes[2]).collect();
@@ -175,7 +179,7 @@ fn a_step_is_cut_to_the_side_of_the_block() {
         .replace("#39=SLOT('ranhura com perfil U',#2,(#25,#71),#40,#48,#53,#57,(#68,#69));", "#39=STEP('step',#2,(#25),#40,#48,#53,$,());")
         .replace("'',(0.0,50.0,20.0)", "'',(0.0,80.0,20.0)")
         .replace("#86=WORKPLAN('workplan setup plano: XY',(#70,#85),$,#10,$)", "#86=WORKPLAN('workplan setup plano: XY',(#70),$,#10,$)");
-    let (planned, out) = plan(text.as_bytes(), FileId(0), &Options::default());
+    let (planned, out) = plan(text.as_bytes(), FileId(0), &modeler());
     assert_eq!(codes(&out), [], "{out:#?}");
     let program = planned.expect("a program").program;
     let y: Vec<f64> = program.steps().filter(|s| s.op.feeds() && s.end.axes[2] < 20.0).map(|s| s.end.axes[1]).collect();
@@ -197,7 +201,7 @@ proptest::proptest! {
         let at = at % text.len();
         let end = (at + len).min(text.len());
         text.splice(at..end, with.bytes());
-        let (planned, out) = plan(&text, FileId(0), &Options::default());
+        let (planned, out) = plan(&text, FileId(0), &modeler());
         proptest::prop_assert!(planned.is_none() == (!codes(&out).is_empty()));
     }
 }

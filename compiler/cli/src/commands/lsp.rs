@@ -37,6 +37,7 @@ fn setup_args(settings: &Settings) -> SetupArgs {
         block_delete: settings.block_delete,
         subs: settings.subs.clone(),
         step_units: None,
+        step_overlap: None,
     }
 }
 

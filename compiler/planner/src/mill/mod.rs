@@ -37,6 +37,8 @@ pub(crate) struct Given {
     pub tolerance: f64,
     /// It is the one that says what no tool of the plan reaches in its feature.
     pub tells: bool,
+    /// How overlaps are written.
+    pub overlap: Overlap,
 }
 
 #[derive(Clone, Copy)]
@@ -150,7 +152,7 @@ fn job<'a>(e: &mut Emit<'_>, step: &'a Workingstep, m: &'a Milling, feature: &'a
         let name = format!("T{} '{}'", o.tool.number, o.tool.name);
         e.say(code::PLAN_DEEPER_THAN_EDGE, o.origin, &[&o.keyword, &bottom.to_string(), &name, &l.to_string()]);
     }
-    let by = stepover(e, step, m)?;
+    let by = stepover(e, step, m, given.overlap)?;
     let top = feature.frame.origin[2];
     let usual = if feature.frame.upright() { (given.security - top).max(1.0) } else { 5.0 };
     let retract = o.retract.filter(|r| *r > 0.0).unwrap_or(usual);
@@ -184,25 +186,17 @@ fn job<'a>(e: &mut Emit<'_>, step: &'a Workingstep, m: &'a Milling, feature: &'a
 }
 
 /// From the radial depth and the overlap: the smaller of the two.
-fn stepover(e: &mut Emit<'_>, step: &Workingstep, m: &Milling) -> Option<f64> {
+fn stepover(e: &mut Emit<'_>, step: &Workingstep, m: &Milling, written: Overlap) -> Option<f64> {
     let d = step.operation.tool.diameter;
     let mut by = m.radial.filter(|r| *r > 0.0).unwrap_or(d).min(d * 0.9);
     if let Some((s, o)) = m.strategy.as_ref().and_then(|s| Some((s, s.overlap?))) {
-        // More than one is no ratio: millimetres, as STEP Modeler writes, or percent, as the standard's example.
-        let millimetres = (o - 0.2 * d).abs() < 1e-6;
-        let ratio = if o > 0.0 && o < 1.0 && !millimetres {
-            o
-        } else if o == 0.0 {
-            0.0
-        } else if millimetres {
-            e.say(code::PLAN_OVERLAP_NOT_A_RATIO, s.origin, &[&o.to_string(), &format!("{o} mm, 0.2 of the tool's diameter")]);
-            0.2
-        } else {
-            e.say(code::PLAN_OVERLAP_NOT_A_RATIO, s.origin, &[&o.to_string(), &format!("{o} percent")]);
-            o / 100.0
+        let (ratio, must) = match written {
+            Overlap::Ratio => (o, "a ratio of 0 to below 1"),
+            Overlap::Percent => (o / 100.0, "a percentage of 0 to below 100"),
+            Overlap::Millimetres => (o / d, "a length of 0 to below the diameter of the tool"),
         };
         if !(0.0..1.0).contains(&ratio) {
-            e.say(code::PLAN_BAD_SIZE, s.origin, &[&s.keyword, "overlap", &o.to_string(), "a ratio of 0 to 1"]);
+            e.say(code::PLAN_BAD_SIZE, s.origin, &[&s.keyword, "overlap", &o.to_string(), must]);
             return None;
         }
         by = by.min(d * (1.0 - ratio));

@@ -7,6 +7,16 @@ use super::{Reader, origin};
 use crate::frame::{add, cross, dot, scale, sub, unit};
 use crate::process::*;
 
+/// Largest cutting speed, m/s, and spindle speed, 1/s, that a mill may mean.
+const FASTEST: [f64; 2] = [50.0, 1000.0];
+
+/// Whether a spindle speed and a cutting speed on the round of a tool say the same in 1/s and m/s. The numbers agree in
+/// rpm and m/min as well, but are then too large for the standard's units.
+fn agree(spindle: f64, cut: f64, round: f64) -> bool {
+    let turns = spindle.abs();
+    round <= 0.0 || turns == 0.0 || ((turns * round - cut * 1000.0).abs() <= 0.02 * cut.abs() * 1000.0 && cut.abs() <= FASTEST[0] && turns <= FASTEST[1])
+}
+
 impl<'m> Reader<'m> {
     pub fn operation(&mut self, node: Node<'m>) -> Option<Operation> {
         let tool = node.node("its_tool");
@@ -282,11 +292,13 @@ impl<'m> Reader<'m> {
             (None, Some(f), Some(n)) => Some(f * n / 60.0),
             _ => None,
         };
-        if !iso {
-            let n = speed.unwrap_or(0.0);
-            let read = format!("S{n:.1} rpm, F{:.1} mm/min", feed_mm.unwrap_or(0.0) * 60.0);
-            let other = format!("S{:.1}, F{:.1}", spindle.unwrap_or(0.0).abs() * 60.0, feed.unwrap_or(0.0) * 60_000.0);
-            self.units_were_read(node, &read, &other);
+        if let (Some(n), Some(vc)) = (spindle, cut)
+            && !agree(n, vc, round)
+        {
+            let iso = format!("{:.1} rpm, feed {:.1} mm/min", n.abs() * 60.0, feed.unwrap_or(0.0) * 60_000.0);
+            let rpm = vc * 1000.0 / round;
+            let other = format!("{rpm:.1} rpm, feed {:.1} mm/min", feed.or(per_rev).unwrap_or(0.0) * rpm);
+            self.units_are_open(node, &iso, &other);
         }
         for (a, v) in [("feedrate", feed), ("feedrate_per_tooth", tooth)] {
             if let Some(v) = v {
