@@ -44,7 +44,9 @@ pub(crate) fn drill(e: &mut Emit<'_>, step: &Workingstep, d: &Drilling, feature:
     checks(e, step, d, feature, depth);
     for frame in &feature.copies {
         let top = frame.origin[2].max(frame.point([0.0, 0.0, 0.0])[2]);
-        let retract = step.operation.retract.unwrap_or(if frame.upright() { security - top } else { 5.0 }).max(0.0);
+        let usual = if frame.upright() { (security - top).max(0.0) } else { 5.0 };
+        let retract = step.operation.retract.filter(|r| *r > 0.0).unwrap_or(usual);
+        crate::mill::retract_is_above(e, &step.operation, retract);
         let job = Job { step, d, frame: *frame, depth, retract, feed };
         e.travel(job.at(retract), frame.z, security);
         e.technology(&step.operation.technology, step.operation.functions);
@@ -66,9 +68,7 @@ impl Job<'_> {
 
 fn depth(e: &mut Emit<'_>, step: &Workingstep, d: &Drilling, feature: &Feature) -> Option<f64> {
     let tool = &step.operation.tool;
-    let r = tool.diameter / 2.0;
-    // Half angle at the tip: the standard measures it from the axis.
-    let tip = tool.tip_angle.map(|a| r / libm::tan(a)).filter(|t| t.is_finite() && *t > 0.0);
+    let tip = Some(tip(tool)).filter(|t| *t > 0.0);
     let hole = match &feature.shape {
         Shape::Hole { diameter, bottom, .. } => Some((*diameter, *bottom)),
         _ => None,
@@ -141,8 +141,8 @@ fn back(e: &mut Emit<'_>, job: &Job<'_>, aside: [f64; 2]) {
         e.push(Op::SpindleOrient { spindle: 0, angle: 0.0, direction: 0 });
     };
     orient(e);
-    e.rapid(over(job.retract));
-    e.rapid(over(-below));
+    e.rapid_as_written(over(job.retract));
+    e.rapid_as_written(over(-below));
     e.feed(job.feed);
     e.line(job.at(-below));
     e.turn(way);
@@ -153,8 +153,8 @@ fn back(e: &mut Emit<'_>, job: &Job<'_>, aside: [f64; 2]) {
     e.line(job.at(-below));
     orient(e);
     e.line(over(-below));
-    e.rapid(over(job.retract));
-    e.rapid(job.at(job.retract));
+    e.rapid_as_written(over(job.retract));
+    e.rapid_as_written(job.at(job.retract));
     e.turn(way);
 }
 
@@ -170,11 +170,79 @@ fn checks(e: &mut Emit<'_>, step: &Workingstep, d: &Drilling, feature: &Feature,
         let of = format!("#{} {}", step.operation.origin.id, step.operation.keyword);
         e.say(code::PLAN_NO_EFFECT, step.operation.origin, &["overcut_length", &of, "the depth of the cut is given, or is that of the feature"]);
     }
+    beyond(e, step, feature, depth);
     if let Shape::Hole { diameter, .. } = feature.shape {
         let whole = !matches!(step.operation.keyword.as_str(), "CENTER_DRILLING" | "COUNTER_SINKING");
         if whole && tool.diameter > diameter + 0.05 {
             e.say(code::PLAN_TOOL_WIDER_THAN_FEATURE, step.operation.origin, &[&name, &tool.diameter.to_string(), &feature.keyword, &diameter.to_string()]);
         }
+    }
+}
+
+/// An operation that goes deeper or opens its hole wider than the feature says.
+fn beyond(e: &mut Emit<'_>, step: &Workingstep, feature: &Feature, depth: f64) {
+    let (o, tool) = (&step.operation, &step.operation.tool);
+    let slack = feature.tolerance.unwrap_or(0.0).max(0.05);
+    let point = tip(tool);
+    let deepest = match &feature.shape {
+        Shape::Hole { bottom: HoleBottom::Through, .. } => feature.depth + point + o.overcut.unwrap_or(0.0).max(BREAK_THROUGH),
+        Shape::Hole { diameter, bottom: HoleBottom::Conical(angle, _), .. } => feature.depth + diameter / 2.0 / libm::tan(crate::mill::area::half_angle(*angle)).max(1e-3),
+        Shape::Hole { .. } | Shape::Thread { .. } => feature.depth,
+        _ => return,
+    };
+    let (what, of) = (format!("#{} {}", o.origin.id, o.keyword), format!("#{} {}", feature.origin.id, feature.keyword));
+    if depth > deepest + slack {
+        e.say(code::PLAN_BEYOND_FEATURE, o.origin, &[&what, &of, &format!("{:.4} mm deep, {:.4} mm deeper than it", depth, depth - deepest)]);
+    }
+    let opens = matches!(o.keyword.as_str(), "CENTER_DRILLING" | "COUNTER_SINKING");
+    if let (Shape::Hole { diameter, final_diameter, .. }, Some(angle), true) = (&feature.shape, tool.tip_angle, opens) {
+        let wide = tool.diameter.min(2.0 * depth * libm::tan(angle));
+        let most = final_diameter.map_or(*diameter, |f| f.max(*diameter));
+        if wide.is_finite() && wide > most + 2.0 * slack {
+            e.say(code::PLAN_BEYOND_FEATURE, o.origin, &[&what, &of, &format!("it opens a hole of {most:.4} mm to {wide:.4} mm")]);
+        }
+    }
+}
+
+/// Height of a tool's point.
+fn tip(tool: &Tool) -> f64 {
+    let tip = tool.tip_angle.filter(|_| tool.pointed()).map_or(0.0, |a| tool.diameter / 2.0 / libm::tan(a));
+    if tip.is_finite() && tip > 0.0 { tip } else { 0.0 }
+}
+
+/// What the last of the operations on a hole leaves in it. Holes that are milled too tell that themselves.
+pub(crate) fn leftovers(e: &mut Emit<'_>, steps: &[(&Workingstep, &Feature)]) {
+    let sizes = |o: &Operation| matches!(o.keyword.as_str(), "DRILLING" | "MULTISTEP_DRILLING" | "BORING" | "REAMING");
+    let Some((step, feature)) = steps.iter().rev().find(|(s, _)| sizes(&s.operation)) else { return };
+    let Shape::Hole { diameter, final_diameter, bottom } = &feature.shape else { return };
+    if steps.iter().any(|(s, _)| !matches!(s.operation.kind, OperationKind::Drill(_)) || !s.operation.toolpaths.is_empty()) {
+        return;
+    }
+    let slack = feature.tolerance.unwrap_or(0.0).max(0.05);
+    let widest = steps.iter().filter(|(s, _)| sizes(&s.operation)).map(|(s, _)| s.operation.tool.diameter).fold(0.0, f64::max);
+    let tool = &step.operation.tool;
+    let mut left = Vec::new();
+    if widest < diameter - 2.0 * slack {
+        left.push(format!("{:.4} mm all round its wall", (diameter - widest) / 2.0));
+    }
+    if let Some(f) = final_diameter.filter(|f| (f - diameter).abs() > 2.0 * slack && tool.taper == 0.0) {
+        left.push(format!("its wall goes from {diameter} to {f} mm, the tool is as wide all the way"));
+    }
+    let pointed = steps.iter().filter(|(s, _)| sizes(&s.operation)).map(|(s, _)| tip(&s.operation.tool)).fold(f64::INFINITY, f64::min);
+    match bottom {
+        HoleBottom::Through => {}
+        HoleBottom::Conical(angle, _) => {
+            let cone = diameter / 2.0 / libm::tan(crate::mill::area::half_angle(*angle)).max(1e-3);
+            if (cone - pointed).abs() > 2.0 * slack && pointed < cone {
+                left.push(format!("its cone is {cone:.4} mm deep, the point of the tool {pointed:.4} mm"));
+            }
+        }
+        _ if pointed > slack => left.push(format!("the cone of the tool's point, {pointed:.4} mm high, in its floor")),
+        _ => {}
+    }
+    if !left.is_empty() {
+        let (name, of) = (format!("T{}", tool.number), format!("#{} {}", feature.origin.id, feature.keyword));
+        e.say(code::PLAN_UNREACHABLE_CORNER, step.operation.origin, &[&name, &format!("{:.4}", tool.diameter / 2.0), &of, &left.join("; ")]);
     }
 }
 
@@ -293,5 +361,6 @@ fn tap(e: &mut Emit<'_>, job: &Job<'_>) {
     }
     e.push(Op::SyncStart(Sync { spindle: 0, per_rev: pitch, velocity: false }));
     e.push(Op::RigidTap { bottom: job.at(-job.depth), scale: 1.0 });
+    e.drilled(job.at(-job.depth));
     e.push(Op::SyncStop);
 }

@@ -5,9 +5,16 @@ use gr_text::{Code, Diagnostic, FileId, LineIndex};
 
 use crate::frame::{Frame, norm, sub};
 use crate::process::{Functions, Origin, Piece, Technology, Tool};
+use crate::stock::{Cutter, Stock};
 
 /// Distances below this are none, mm.
 pub const TINY: f64 = 1e-9;
+/// Rapids end this much over material, mm.
+const CLEARANCE: f64 = 1.0;
+/// Sweep of an arc whose end says how far it goes.
+const BY_ITS_END: f64 = 1e-3;
+/// Chords of an arc as it is taken off the block: this far apart at most, rad.
+const CHORD: f64 = 0.2;
 
 pub(crate) struct Emit<'a> {
     pub b: Builder,
@@ -28,6 +35,9 @@ pub(crate) struct Emit<'a> {
     turn: Turn,
     coolant: Functions,
     locks: (bool, bool),
+    /// What is left of the raw part, where it is known.
+    pub stock: Option<Stock>,
+    cutter: Option<Cutter>,
     /// Features that some workingstep has cut.
     pub cut: std::collections::BTreeSet<u64>,
 }
@@ -52,6 +62,8 @@ impl<'a> Emit<'a> {
             coolant: Functions::default(),
             locks: (false, false),
             cut: std::collections::BTreeSet::new(),
+            stock: None,
+            cutter: None,
         }
     }
     pub fn begin(&mut self) {
@@ -88,17 +100,60 @@ impl<'a> Emit<'a> {
     fn same(&self, to: [f64; 3]) -> bool {
         self.at.is_some_and(|at| norm(sub(at, to)) < TINY)
     }
-    pub fn rapid(&mut self, to: [f64; 3]) {
+    /// The tool stands upright: what is left of the block is known under it.
+    fn upright(&self) -> Option<Cutter> {
+        self.cutter.filter(|_| self.axis[2] > 1.0 - 1e-9 && self.stock.is_some())
+    }
+    /// How high the tip has to stay on a straight way for it to pass over what is left of the block.
+    pub fn blocked(&self, a: [f64; 3], b: [f64; 3]) -> Option<f64> {
+        self.stock.as_ref()?.blocks(self.upright()?, a, b)
+    }
+    /// Rapid as it is written, whatever is in its way.
+    pub fn rapid_as_written(&mut self, to: [f64; 3]) {
         if !self.same(to) {
             let pose = self.pose(to);
             self.b.push_to(Op::Rapid, &pose, self.source);
             self.at = Some(to);
         }
     }
+    /// Rapid over what is left of the block; where the end is in it, the last piece is fed.
+    pub fn rapid(&mut self, to: [f64; 3]) {
+        self.rapid_until_material(to);
+        self.line(to);
+    }
+    /// Rapid to a point, or to a little over the material in which it lies.
+    pub fn rapid_until_material(&mut self, to: [f64; 3]) {
+        let Some(from) = self.at else { return self.rapid_as_written(to) };
+        let Some(highest) = self.blocked(from, to) else { return self.rapid_as_written(to) };
+        let sideways = (to[0] - from[0]).abs() + (to[1] - from[1]).abs() > TINY;
+        if sideways {
+            let over = (highest + CLEARANCE).max(from[2]);
+            self.rapid_as_written([from[0], from[1], over]);
+            self.rapid_as_written([to[0], to[1], over]);
+            return self.rapid_until_material(to);
+        }
+        let end = highest + CLEARANCE;
+        if end < from[2] && to[2] < end {
+            self.rapid_as_written([to[0], to[1], end]);
+        } else if to[2] >= from[2] {
+            self.rapid_as_written(to);
+        }
+    }
+    /// Takes a straight way off the block.
+    fn take_off(&mut self, a: [f64; 3], b: [f64; 3]) {
+        if let (Some(tool), Some(stock)) = (self.upright(), &mut self.stock) {
+            stock.cut(tool, a, b);
+        }
+    }
+    /// The tool has been down at a point and is where it was.
+    pub fn drilled(&mut self, bottom: [f64; 3]) {
+        self.take_off(self.at.unwrap_or(bottom), bottom);
+    }
     pub fn line(&mut self, to: [f64; 3]) {
         if !self.same(to) {
             let pose = self.pose(to);
             self.b.push_to(Op::Linear, &pose, self.source);
+            self.take_off(self.at.unwrap_or(to), to);
             self.at = Some(to);
         }
     }
@@ -113,12 +168,37 @@ impl<'a> Emit<'a> {
             Arc { plane: ArcPlane::Free(normal), center, turns }
         };
         self.b.push_to(Op::Arc(arc), &pose, self.source);
+        if let Some(from) = self.at.filter(|_| self.upright().is_some() && normal[2].abs() > 1.0 - 1e-12) {
+            self.take_off_arc(from, center, to, if normal[2] > 0.0 { sweep } else { -sweep });
+        }
         self.at = Some(to);
+    }
+    /// Likewise an arc in XY, by chords.
+    fn take_off_arc(&mut self, from: [f64; 3], center: [f64; 3], to: [f64; 3], sweep: f64) {
+        let radius = libm::hypot(from[0] - center[0], from[1] - center[1]);
+        let angle = |p: [f64; 3]| libm::atan2(p[1] - center[1], p[0] - center[0]);
+        let (start, full) = (angle(from), 2.0 * std::f64::consts::PI);
+        let way = if sweep < 0.0 { start - angle(to) } else { angle(to) - start };
+        let mut part = way.rem_euclid(full);
+        if part < 1e-9 || part > full - 1e-9 {
+            part = if sweep.abs() > 1.0 || sweep.abs() == BY_ITS_END { full } else { 0.0 };
+        }
+        let turns = ((sweep.abs() - part) / full + 1e-9).floor().clamp(0.0, 1e4);
+        let by = (part + turns * full).copysign(sweep);
+        let count = (by.abs() / CHORD).ceil().clamp(1.0, 1e5) as usize;
+        let mut last = from;
+        for k in 1..=count {
+            let share = k as f64 / count as f64;
+            let a = start + by * share;
+            let p = if k == count { to } else { [center[0] + radius * libm::cos(a), center[1] + radius * libm::sin(a), from[2] + (to[2] - from[2]) * share] };
+            self.take_off(last, p);
+            last = p;
+        }
     }
     pub fn piece(&mut self, piece: &Piece, frame: &Frame) {
         match *piece {
             Piece::Line(p) => self.line(frame.point(p)),
-            Piece::Arc { center, normal, end } => self.arc(frame.point(center), frame.vector(normal), frame.point(end), 1e-3),
+            Piece::Arc { center, normal, end } => self.arc(frame.point(center), frame.vector(normal), frame.point(end), BY_ITS_END),
         }
     }
     /// By way of the height `security` to a point, the tool standing along `axis` there. The way up goes along Z;
@@ -126,7 +206,7 @@ impl<'a> Emit<'a> {
     pub fn travel(&mut self, to: [f64; 3], axis: [f64; 3], security: f64) {
         let up = security.max(to[2]);
         match self.at {
-            Some(at) => self.rapid([at[0], at[1], up.max(at[2])]),
+            Some(at) => self.rapid_as_written([at[0], at[1], up.max(at[2])]),
             None => {
                 let pose = *self.b.pose();
                 self.axis = axis;
@@ -141,8 +221,8 @@ impl<'a> Emit<'a> {
             self.axis = axis;
             self.at = None;
         }
-        self.rapid([to[0], to[1], high]);
-        self.rapid(to);
+        self.rapid_as_written([to[0], to[1], high]);
+        self.rapid_until_material(to);
     }
     pub fn set_axis(&mut self, axis: [f64; 3]) {
         self.axis = axis;
@@ -150,7 +230,7 @@ impl<'a> Emit<'a> {
     /// Straight up to a height.
     pub fn lift(&mut self, security: f64) {
         if let Some(at) = self.at.filter(|a| a[2] < security) {
-            self.rapid([at[0], at[1], security]);
+            self.rapid_as_written([at[0], at[1], security]);
         }
     }
 
@@ -240,6 +320,7 @@ impl<'a> Emit<'a> {
         offset[2] = tool.length.unwrap_or(0.0);
         self.push(Op::ToolOffset(offset));
         self.tool = Some(tool.number);
+        self.cutter = Cutter::of(tool);
         // The operator may have moved the machine.
         self.at = None;
     }

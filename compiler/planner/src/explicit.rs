@@ -46,7 +46,7 @@ pub(crate) fn follow(e: &mut Emit<'_>, paths: &[Toolpath], frame: &Frame, techno
                 }
                 conditions(e, p, technology);
                 let rapid = p.rapid || technology.is_none();
-                let go = |e: &mut Emit<'_>, to| if rapid { e.rapid(to) } else { e.line(to) };
+                let go = |e: &mut Emit<'_>, to| if rapid { as_written(e, p, to) } else { e.line(to) };
                 e.set_axis(axes[0]);
                 e.at.get_or_insert(here);
                 go(e, start);
@@ -62,6 +62,15 @@ pub(crate) fn follow(e: &mut Emit<'_>, paths: &[Toolpath], frame: &Frame, techno
             }
         }
     }
+}
+
+/// A rapid of the file itself: kept, and told where it goes through what is left of the raw part.
+fn as_written(e: &mut Emit<'_>, p: &Toolpath, to: [f64; 3]) {
+    if let Some(top) = e.at.and_then(|from| e.blocked(from, to)) {
+        let end = format!("X{:.3} Y{:.3} Z{:.3}", to[0], to[1], to[2]);
+        e.say(code::PLAN_RAPID_THROUGH_STOCK, p.origin, &[&end, &format!("{top:.3}")]);
+    }
+    e.rapid_as_written(to);
 }
 
 /// Technology and functions of a piece, or those of its operation.
@@ -86,7 +95,7 @@ fn by_axes(e: &mut Emit<'_>, p: &Toolpath, rows: &[[Option<f64>; 3]], technology
         let here = e.at.unwrap_or_else(|| e.b.pose().xyz());
         e.at = Some(here);
         let to = std::array::from_fn(|i| row[i].unwrap_or(here[i]));
-        if p.rapid || technology.is_none() { e.rapid(to) } else { e.line(to) }
+        if p.rapid || technology.is_none() { as_written(e, p, to) } else { e.line(to) }
     }
     true
 }

@@ -13,6 +13,7 @@ pub mod process;
 mod read;
 pub mod reference;
 pub mod stepnc;
+mod stock;
 pub mod table;
 
 use gr_text::{Diagnostic, FileId};

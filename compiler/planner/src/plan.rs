@@ -8,6 +8,7 @@ use gr_text::{Diagnostic, FileId, LineIndex, Severity, code};
 
 use crate::emit::Emit;
 use crate::process::*;
+use crate::stock::Stock;
 use crate::{drill, explicit, mill};
 
 /// Above the part, where the security plane is inside it, mm.
@@ -93,6 +94,8 @@ pub fn plan(text: &[u8], file: FileId, options: &Options) -> (Option<Planned>, V
             Units::StepModeler => Overlap::Millimetres,
             Units::Iso => Overlap::Ratio,
         }),
+        smallest: tools.iter().map(|t| t.diameter / 2.0).filter(|r| *r > 0.0).fold(f64::INFINITY, f64::min),
+        block: None,
     };
     p.e.b.file(file, &options.name);
     p.e.begin();
@@ -103,6 +106,13 @@ pub fn plan(text: &[u8], file: FileId, options: &Options) -> (Option<Planned>, V
     p.elements(&process.elements);
     let security = p.security;
     p.e.end(security);
+    let mut holes: BTreeMap<u64, Vec<(&Workingstep, &Feature)>> = BTreeMap::new();
+    for s in process.steps() {
+        for f in targets(s) {
+            holes.entry(f.origin.id).or_default().push((s, f));
+        }
+    }
+    holes.values().for_each(|steps| drill::leftovers(&mut p.e, steps));
     out.append(&mut p.e.out);
     let failed = out.iter().any(|d| d.severity == Severity::Error);
     let program = p.e.b.finish();
@@ -146,6 +156,10 @@ struct Planner<'a> {
     tells: BTreeSet<u64>,
     /// How overlaps are written.
     overlap: Overlap,
+    /// Radius of the smallest tool.
+    smallest: f64,
+    /// Raw part of the step before.
+    block: Option<[[f64; 3]; 2]>,
 }
 
 impl Planner<'_> {
@@ -191,6 +205,7 @@ impl Planner<'_> {
             self.e.push(Op::Stop(Stop::Program));
             self.e.push(Op::WorkOffset(number.min(9) as u8, [0.0; 9]));
             self.e.at = None;
+            self.block = None;
         }
         if let Some(f) = setup.frame.filter(|f| new && f.origin != [0.0; 3]) {
             let at = format!("X{} Y{} Z{}", f.origin[0], f.origin[1], f.origin[2]);
@@ -204,6 +219,10 @@ impl Planner<'_> {
         let name = if s.name.is_empty() { format!("#{}", s.origin.id) } else { format!("#{} {}", s.origin.id, s.name) };
         self.e.mark(Marker::Workingstep, s.origin.id, &s.name);
         self.e.note(&name);
+        if self.block != s.stock {
+            self.block = s.stock;
+            self.e.stock = s.stock.and_then(|block| Stock::new(block, self.smallest));
+        }
         self.height(s);
         let security = self.security;
         self.e.tool(&s.operation.tool, security);

@@ -537,6 +537,13 @@ pub struct Tool {
     pub number: u32,
 }
 
+impl Tool {
+    /// Its tip is a point, if it has an angle: drills, countersinks, reamers, taps.
+    pub fn pointed(&self) -> bool {
+        ["DRILL", "COUNTERS", "SPOT", "REAMER", "TAP"].iter().any(|k| self.kind.contains(k)) && !self.kind.starts_with("TAPERED_END")
+    }
+}
+
 /// What a workingstep does.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Operation {

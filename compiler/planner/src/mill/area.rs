@@ -353,9 +353,19 @@ impl Job<'_> {
 
     /// From the edge to the nearer side of the raw part: how wide a step is does not stand in the feature.
     fn step_outline(&self, start: [f64; 2], length: f64, direction: [f64; 2], lean: f64) -> Done<Path2> {
+        let (u, a) = (P2::new(direction[0], direction[1]), P2::new(start[0], start[1]));
+        let (side, width) = self.open_side(start, direction)?;
+        // The tool's centre goes as far as the side of the raw part.
+        let out = self.radius + self.m.allowance_side + RUN_OUT + lean;
+        let (p, q) = (a - u * out, a + u * (length + out));
+        let far = side * (width + out);
+        Path2::polyline(&[p, q, q + far, p + far], true).map_err(words)
+    }
+
+    /// The side of a step's edge on which it is cut, and how far it is from there to the side of the raw part.
+    fn open_side(&self, start: [f64; 2], direction: [f64; 2]) -> Done<(P2, f64)> {
         let [low, high] = self.step.stock.ok_or("its width follows from a raw block, and the workpiece has none")?;
-        let (u, v) = (P2::new(direction[0], direction[1]), P2::new(-direction[1], direction[0]));
-        let a = P2::new(start[0], start[1]);
+        let (v, a) = (P2::new(-direction[1], direction[0]), P2::new(start[0], start[1]));
         let (mut left, mut right) = (0.0f64, 0.0f64);
         for corner in 0..8 {
             let p = std::array::from_fn(|i| if corner >> i & 1 == 1 { high[i] } else { low[i] });
@@ -363,21 +373,43 @@ impl Job<'_> {
             let s = (P2::new(q[0], q[1]) - a).dot(v);
             (left, right) = (left.max(s), right.max(-s));
         }
-        // The tool's centre goes as far as the side of the raw part.
-        let out = self.radius + self.m.allowance_side + RUN_OUT + lean;
-        let (side, width) = match (left > 1e-6, right > 1e-6) {
+        Ok(match (left > 1e-6, right > 1e-6) {
             (true, true) if left <= right => (v, left),
             (true, false) => (v, left),
             (_, true) => (v * -1.0, right),
             (false, false) => return Err("its edge does not lie on the raw part".into()),
-        };
-        let (p, q) = (a - u * out, a + u * (length + out));
-        let far = side * (width + out);
-        Path2::polyline(&[p, q, q + far, p + far], true).map_err(words)
+        })
+    }
+
+    /// Where an open pocket or a step ends in the open, and which way is out.
+    fn mouths(&self) -> Done<Vec<(P2, P2)>> {
+        Ok(match &self.feature.shape {
+            Shape::OpenPocket { boundary, .. } => {
+                let wall = path(boundary)?;
+                let (a, b) = (wall.start(), wall.end());
+                let middle = (a + b) * 0.5;
+                let across = (b - a).left();
+                let length = across.dot(across).sqrt();
+                if !(length > 1e-9) {
+                    return Ok(Vec::new());
+                }
+                let bounds = wall.bounds();
+                let inside = (bounds.min + bounds.max) * 0.5;
+                let out = across * if across.dot(middle - inside) >= 0.0 { 1.0 / length } else { -1.0 / length };
+                vec![(middle, out)]
+            }
+            Shape::Step { start, length, direction, .. } => {
+                let (a, u) = (P2::new(start[0], start[1]), P2::new(direction[0], direction[1]));
+                let side = self.open_side(*start, *direction)?.0 * (self.radius * 0.5);
+                vec![(a + side, u * -1.0), (a + u * *length + side, u)]
+            }
+            _ => Vec::new(),
+        })
     }
 
     pub(super) fn area(&self, e: &mut Emit<'_>) -> Done<Moves> {
         let area = self.outline()?;
+        self.open_ends(e, &self.mouths()?);
         let moves = self.emptied(e, &area)?;
         if let Shape::Pocket { .. } | Shape::Hole { .. } = self.feature.shape {
             // A floor that is not flat leaves a disk further down: corners are those of the walls.

@@ -156,6 +156,7 @@ fn job<'a>(e: &mut Emit<'_>, step: &'a Workingstep, m: &'a Milling, feature: &'a
     let top = feature.frame.origin[2];
     let usual = if feature.frame.upright() { (given.security - top).max(1.0) } else { 5.0 };
     let retract = o.retract.filter(|r| *r > 0.0).unwrap_or(usual);
+    retract_is_above(e, o, retract);
     o.technology.feed?;
     // What a rounded edge leaves standing between two passes stays within the tolerance.
     let clean = (radius - edge + libm::sqrt(given.tolerance * (2.0 * edge - given.tolerance).max(0.0))).clamp(radius * 5e-3, radius);
@@ -206,6 +207,14 @@ fn stepover(e: &mut Emit<'_>, step: &Workingstep, m: &Milling, written: Overlap)
         return None;
     }
     Some(by)
+}
+
+/// A retract plane in the material is not used, and that is said.
+pub(crate) fn retract_is_above(e: &mut Emit<'_>, o: &Operation, used: f64) {
+    if let Some(r) = o.retract.filter(|r| *r <= 0.0) {
+        let why = "it does not lie above the feature";
+        e.say(code::PLAN_APPROACH_CHANGED, o.origin, &[&format!("the retract plane at {r} mm"), &format!("one at {used} mm"), why]);
+    }
 }
 
 fn words(error: tp::Error) -> String {
@@ -379,6 +388,33 @@ impl Job<'_> {
         let at = self.feature.frame.point([worst.at.x, worst.at.y, 0.0]);
         let text = format!("{} spots, {total:.4} mm² in all, the largest at X{:.4} Y{:.4} with {:.4} mm²", all.len(), at[0], at[1], worst.area);
         self.leaves(e, &text);
+    }
+    /// Open ends of the feature, each with the way out: where the raw part goes on at the height of the floor, the
+    /// run-out cuts into it, and that is said.
+    fn open_ends(&self, e: &mut Emit<'_>, ends: &[(P2, P2)]) {
+        let Ok((low, high)) = self.stock() else { return };
+        let mut beyond = 0.0f64;
+        for (at, out) in ends {
+            // How far the block goes on.
+            let room = |p: f64, d: f64, low: f64, high: f64| if d > 1e-9 { (high - p) / d } else if d < -1e-9 { (low - p) / d } else { f64::INFINITY };
+            let on = room(at.x, out.x, low.x, high.x).min(room(at.y, out.y, low.y, high.y));
+            if !(on > 1e-3) {
+                continue;
+            }
+            let within = on.min(self.radius) / 2.0;
+            let middle = *at + *out * within;
+            let stands = self.feature.copies.iter().any(|f| {
+                let top = |p: [f64; 3]| e.stock.as_ref().filter(|_| f.upright()).and_then(|s| s.top([p[0], p[1]], within.max(1e-3)));
+                let floor = f.point([middle.x, middle.y, -self.bottom]);
+                top(floor).is_none_or(|top| top > floor[2] + self.tolerance)
+            });
+            if stands {
+                beyond = beyond.max(on);
+            }
+        }
+        if beyond > 0.0 {
+            e.say(code::PLAN_OVERRUNS_PART, self.step.origin, &[&self.name(), &format!("{beyond:.4}")]);
+        }
     }
     /// The raw part in the frame of the feature: lower left and upper right corner.
     fn stock(&self) -> Done<(P2, P2)> {

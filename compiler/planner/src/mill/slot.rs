@@ -30,6 +30,12 @@ impl Job<'_> {
         if self.step.operation.tool.taper > 0.0 {
             return Err("a slot by a tool that tapers".into());
         }
+        let open = |i: usize| ends.get(i).or(ends.first()).is_none_or(|e| *e == SlotEnd::Open);
+        let both = [(line.start(), line.start_tangent() * -1.0), (line.end(), line.end_tangent())];
+        if !closed {
+            let ways: Vec<(P2, P2)> = both.into_iter().enumerate().filter(|(i, _)| open(*i)).map(|(_, way)| way).collect();
+            self.open_ends(e, &ways);
+        }
         if let Section::Tee { width, bar_width, bar_depth, dressed } = section {
             if *dressed {
                 return Err("a T-slot with chamfers or radii".into());

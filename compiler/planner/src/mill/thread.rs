@@ -48,6 +48,7 @@ pub(super) fn mill(e: &mut Emit<'_>, step: &Workingstep, m: &Milling, feature: &
     let way = if up { 1.0 } else { -1.0 };
     let sense = if ccw { 1.0 } else { -1.0 };
     let retract = o.retract.filter(|r| *r > 0.0).unwrap_or(RUN_OUT);
+    super::retract_is_above(e, o, retract);
     // Half a circle in: from the axis of a hole, from outside a stud.
     let lead = if *inner { radius / 2.0 } else { r + RUN_OUT };
     let away = if *inner { 0.0 } else { radius + 2.0 * lead };
@@ -102,6 +103,7 @@ pub(crate) fn drill(e: &mut Emit<'_>, step: &Workingstep, d: &Drilling, feature:
     // Upwards counter-clockwise is right-handed.
     let sense = if *right { 1.0 } else { -1.0 };
     let retract = o.retract.filter(|r| *r > 0.0).unwrap_or(RUN_OUT);
+    super::retract_is_above(e, o, retract);
     let (bottom, rise) = (-long - tip, pitch / 4.0);
     for frame in &feature.copies {
         let at = |x: f64, z: f64| frame.point([x, 0.0, z]);

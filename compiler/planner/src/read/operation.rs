@@ -7,6 +7,8 @@ use super::{Reader, origin};
 use crate::frame::{add, cross, dot, scale, sub, unit};
 use crate::process::*;
 
+/// Out of the hole no faster than so many times the feed: above it, percent was meant.
+const MOST_FEED_ON_RETRACT: f64 = 10.0;
 /// Largest cutting speed, m/s, and spindle speed, 1/s, that a mill may mean.
 const FASTEST: [f64; 2] = [50.0, 1000.0];
 
@@ -86,6 +88,9 @@ impl<'m> Reader<'m> {
         let ratio = |a: &str| strategy.and_then(|s| s.real(a));
         let depth = |a: &str| strategy.and_then(|s| s.real(a)).filter(|d| *d > 0.0);
         let stretch = |depth: Option<f64>, feed: Option<f64>| Some((as_ratio(feed?), depth?));
+        if let Some(v) = node.real("feed_on_retract").filter(|v| *v > MOST_FEED_ON_RETRACT) {
+            self.no_effect(node, "feed_on_retract", &format!("{v} is read as {v} percent"));
+        }
         if let Some(s) = strategy {
             for a in ["reduced_cut_at_start", "reduced_feed_at_start", "reduced_cut_at_end", "reduced_feed_at_end"] {
                 if s.real(a).is_some_and(|v| v > 1.0) {
@@ -104,7 +109,7 @@ impl<'m> Reader<'m> {
             depth: node.real("cutting_depth"),
             previous: node.real("previous_diameter").filter(|d| *d > 0.0 && d.is_finite()),
             dwell: node.real("dwell_time_bottom").filter(|d| *d > 0.0 && d.is_finite()).unwrap_or(0.0),
-            feed_on_retract: node.real("feed_on_retract").map(as_ratio),
+            feed_on_retract: node.real("feed_on_retract").map(|v| if v > MOST_FEED_ON_RETRACT { v / 100.0 } else { v }),
             first: stretch(depth("depth_of_start"), ratio("reduced_feed_at_start")),
             last: stretch(depth("depth_of_end"), ratio("reduced_feed_at_end")),
             cut: [ratio("reduced_cut_at_start").map(as_ratio), ratio("reduced_cut_at_end").map(as_ratio)],
@@ -125,6 +130,15 @@ impl<'m> Reader<'m> {
         }
         if matches!(k, "TAPPING" | "BACK_BORING" | "THREAD_DRILLING") {
             self.unused(node, "feed_on_retract", "it goes out as it went in");
+        }
+        if k != "BACK_BORING" {
+            self.unused(node, "previous_diameter", "the whole depth is fed");
+        }
+        if let Some(v) = node.real("dwell_time_bottom").filter(|d| *d < 0.0) {
+            self.no_effect(node, "dwell_time_bottom", &format!("{v} s is no time"));
+        }
+        if k == "TAPPING" && node.attr("compensation_chuck").and_then(|v| v.boolean()) != Some(true) {
+            self.unused(node, "dwell_time_bottom", "a rigid tap turns back at once");
         }
         if node.attr("depth_of_testcut").is_none() {
             self.unused(node, "waiting_position", "there is no test cut");
@@ -244,8 +258,7 @@ impl<'m> Reader<'m> {
             self.unused(node, "overall_assembly_length", "the length of its cutting edge counts");
         }
         let Some(d) = dimension else { return };
-        let pointed = ["DRILL", "COUNTERS", "SPOT", "REAMER", "TAP"].iter().any(|k| tool.kind.contains(k)) && !tool.kind.starts_with("TAPERED_END");
-        if !pointed && tool.tip_angle.is_some() {
+        if !tool.pointed() && tool.tip_angle.is_some() {
             self.unused(d, "tool_tip_half_angle", "its face is taken as flat");
         }
         if !tool.kind.starts_with("TAPERED") && d.real("tool_circumference_angle").is_some_and(|a| a != 0.0) {

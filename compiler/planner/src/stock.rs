@@ -1,0 +1,192 @@
+//! What is left of the raw block while it is cut: heights over a grid, for the planner's own rapids. Feed moves lower
+//! it, rapids ask it. It decides how a place is reached, never what is cut; tools that stand upright only.
+
+use crate::process::Tool;
+
+/// Most cells. Larger parts have coarser ones, and none where a cell would be wider than the smallest tool.
+const MOST_CELLS: f64 = 16e6;
+/// Cells in the radius of the smallest tool.
+const FINENESS: f64 = 3.0;
+/// Cells along the longer side, at least and at most where the tools leave the choice.
+const ALONG: [f64; 2] = [48.0, 4000.0];
+/// Material that no move is lifted for, mm.
+const FILM: f64 = 1e-3;
+
+/// The shape of a tool below its shank.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(crate) struct Cutter {
+    radius: f64,
+    /// Radius of its rounded edge.
+    edge: f64,
+    /// Rise of its point for a step outwards; 0 for a flat face.
+    rise: f64,
+}
+
+impl Cutter {
+    /// None for tools that cut below what they pass: T slot cutters, Woodruff cutters, back boring bars.
+    pub fn of(tool: &Tool) -> Option<Cutter> {
+        let undercuts = ["T_SLOT", "WOODRUFF", "DOVETAIL", "BORING", "SIDE_MILL", "THREAD", "USER"];
+        if undercuts.iter().any(|k| tool.kind.contains(k)) || !(tool.diameter > 0.0 && tool.diameter < 1e6) {
+            return None;
+        }
+        let rise = tool.tip_angle.filter(|_| tool.pointed()).map_or(0.0, |a| 1.0 / libm::tan(a));
+        let radius = tool.diameter / 2.0;
+        let rise = if rise.is_finite() && rise > 0.0 { rise } else { 0.0 };
+        Some(Cutter { radius, edge: tool.edge_radius.clamp(0.0, radius), rise })
+    }
+    /// Height of its surface over its tip, at a distance from its axis.
+    fn over_tip(&self, d: f64) -> f64 {
+        let into = d - (self.radius - self.edge);
+        if self.rise > 0.0 {
+            d * self.rise
+        } else if into > 0.0 && self.edge > 0.0 {
+            self.edge - libm::sqrt((self.edge * self.edge - into * into).max(0.0))
+        } else {
+            0.0
+        }
+    }
+}
+
+pub(crate) struct Stock {
+    low: [f64; 2],
+    /// Edge of a cell, mm.
+    cell: f64,
+    n: [usize; 2],
+    /// Height of the material over each cell, row by row along x.
+    z: Vec<f32>,
+}
+
+impl Stock {
+    /// A whole block. `smallest`: radius of the smallest tool.
+    pub fn new(block: [[f64; 3]; 2], smallest: f64) -> Option<Stock> {
+        let [low, high] = block;
+        let size = [high[0] - low[0], high[1] - low[1]];
+        let long = size[0].max(size[1]);
+        if !(size.iter().all(|s| *s > 0.0) && long < 1e7 && smallest > 0.0) {
+            return None;
+        }
+        let wanted = (smallest / FINENESS).clamp(long / ALONG[1], long / ALONG[0]);
+        let cell = wanted.max(libm::sqrt(size[0] * size[1] / MOST_CELLS));
+        if cell > smallest {
+            return None;
+        }
+        let n = size.map(|s| (s / cell).ceil().max(1.0) as usize);
+        Some(Stock { low: [low[0], low[1]], cell, n, z: vec![high[2] as f32; n[0] * n[1]] })
+    }
+
+    /// Cells whose middle is within `reach` of a straight move, with the distance and the part of the move that is
+    /// within `reach` of it: closest, first, last.
+    fn near(&self, a: [f64; 3], b: [f64; 3], reach: f64, mut each: impl FnMut(usize, f64, [f64; 3])) {
+        let along = [b[0] - a[0], b[1] - a[1]];
+        let length2 = along[0] * along[0] + along[1] * along[1];
+        let index = |v: f64, axis: usize| ((v - self.low[axis]) / self.cell - 0.5).clamp(-1.0, self.n[axis] as f64);
+        let range = |axis: usize| {
+            let first = index(a[axis].min(b[axis]) - reach, axis).ceil().max(0.0) as usize;
+            let last = index(a[axis].max(b[axis]) + reach, axis).floor();
+            first..if last < 0.0 { 0 } else { (last as usize + 1).min(self.n[axis]) }
+        };
+        let (columns, reach2) = (range(0), reach * reach);
+        for row in range(1) {
+            let y = self.low[1] + (row as f64 + 0.5) * self.cell;
+            for column in columns.clone() {
+                let x = self.low[0] + (column as f64 + 0.5) * self.cell;
+                let (dx, dy) = (x - a[0], y - a[1]);
+                let at = if length2 > 0.0 { ((dx * along[0] + dy * along[1]) / length2).clamp(0.0, 1.0) } else { 0.0 };
+                let (ex, ey) = (dx - at * along[0], dy - at * along[1]);
+                let d2 = ex * ex + ey * ey;
+                if d2 <= reach2 {
+                    let half = if length2 > 0.0 { libm::sqrt((reach2 - d2) / length2) } else { 1.0 };
+                    each(row * self.n[0] + column, libm::sqrt(d2), [at, (at - half).max(0.0), (at + half).min(1.0)]);
+                }
+            }
+        }
+    }
+
+    /// A tool goes straight at feed, or stands still.
+    pub fn cut(&mut self, tool: Cutter, a: [f64; 3], b: [f64; 3]) {
+        let mut z = std::mem::take(&mut self.z);
+        let rise = b[2] - a[2];
+        self.near(a, b, tool.radius, |cell, d, [_, first, last]| {
+            // The deepest it is while it is over the cell.
+            let deepest = a[2] + rise * if rise > 0.0 { first } else { last };
+            let height = (deepest + tool.over_tip(d)) as f32;
+            if let Some(z) = z.get_mut(cell)
+                && *z > height
+            {
+                *z = height;
+            }
+        });
+        self.z = z;
+    }
+
+    /// How high the tip has to stay for a straight move to pass over all material; none: it meets none at any height
+    /// of its own.
+    pub fn blocks(&self, tool: Cutter, a: [f64; 3], b: [f64; 3]) -> Option<f64> {
+        let mut highest: Option<f64> = None;
+        let rise = b[2] - a[2];
+        // Cells at the rim are cut only in part: no move is lifted for them.
+        self.near(a, b, (tool.radius - 0.75 * self.cell).max(0.0), |cell, d, [at, _, _]| {
+            let Some(z) = self.z.get(cell) else { return };
+            let top = f64::from(*z) - tool.over_tip(d);
+            if top > a[2] + rise * at + FILM + 1e-6 * top.abs() {
+                highest = Some(highest.map_or(top, |h: f64| h.max(top)));
+            }
+        });
+        highest
+    }
+
+    /// Greatest height of the material within a disc.
+    pub fn top(&self, at: [f64; 2], radius: f64) -> Option<f64> {
+        let p = [at[0], at[1], 0.0];
+        let mut highest: Option<f64> = None;
+        self.near(p, p, radius, |cell, _, _| {
+            let z = self.z.get(cell).map_or(f64::NEG_INFINITY, |z| f64::from(*z));
+            highest = Some(highest.map_or(z, |h: f64| h.max(z)));
+        });
+        highest
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FLAT: Cutter = Cutter { radius: 5.0, edge: 0.0, rise: 0.0 };
+
+    fn block() -> Stock {
+        Stock::new([[0.0; 3], [100.0, 60.0, 20.0]], 3.0).expect("cells")
+    }
+
+    #[test]
+    fn a_rapid_is_free_where_a_tool_has_cut() {
+        let mut s = block();
+        let (a, b) = ([10.0, 30.0, 15.0], [90.0, 30.0, 15.0]);
+        assert_eq!(s.blocks(FLAT, a, b), Some(20.0));
+        s.cut(FLAT, a, b);
+        assert_eq!(s.blocks(FLAT, a, b), None);
+        assert_eq!(s.blocks(FLAT, [10.0, 30.0, 14.0], [90.0, 30.0, 14.0]), Some(15.0));
+        assert_eq!(s.blocks(FLAT, [50.0, 30.0, 15.0], [50.0, 37.0, 15.0]), Some(20.0));
+        assert_eq!(s.blocks(FLAT, [50.0, 30.0, 25.0], [50.0, 37.0, 25.0]), None);
+        // Beside the block there is nothing.
+        assert_eq!(s.blocks(FLAT, [-6.0, 0.0, 0.0], [-6.0, 60.0, 0.0]), None);
+    }
+
+    #[test]
+    fn a_ramp_cuts_to_its_deepest() {
+        let mut s = block();
+        s.cut(FLAT, [10.0, 30.0, 20.0], [90.0, 30.0, 12.0]);
+        assert_eq!(s.top([90.0, 30.0], 2.0).map(|z| (z * 10.0).round()), Some(120.0));
+        assert!(s.blocks(FLAT, [90.0, 30.0, 30.0], [90.0, 30.0, 12.4]).is_none());
+    }
+
+    #[test]
+    fn points_and_balls() {
+        let mut s = block();
+        let drill = Cutter { rise: 1.0, ..FLAT };
+        s.cut(drill, [50.0, 30.0, 10.0], [50.0, 30.0, 10.0]);
+        assert!(s.top([54.0, 30.0], 0.8).is_some_and(|z| (z - 14.0).abs() < 1.5));
+        let ball = Cutter { edge: 5.0, ..FLAT };
+        s.cut(ball, [20.0, 30.0, 10.0], [20.0, 30.0, 10.0]);
+        assert!(s.top([20.0, 30.0], 1.0).is_some_and(|z| z < 10.3));
+    }
+}
