@@ -105,8 +105,10 @@ fn add(found: &mut Vec<Diagnostic>, more: Vec<Diagnostic>, levels: &Levels) {
     // Where statements are damaged, what they refer to only seems to be left over.
     let damaged = found.iter().any(|d| d.severity == Severity::Error && d.code.def().slug.starts_with("p21/"));
     found.retain(|d| !(damaged && d.code == code::STEP_UNREFERENCED));
-    found.sort_by_key(|d| (d.primary().1.start, d.primary().1.end));
-    found.dedup();
+    // The more severe of two of a kind at one place comes first, and stays.
+    let place = |d: &Diagnostic| (d.primary().1.start, d.primary().1.end);
+    found.sort_by(|a, b| place(a).cmp(&place(b)).then_with(|| a.message.cmp(&b.message)).then(a.severity.cmp(&b.severity)));
+    found.dedup_by(|b, a| a.code == b.code && a.message == b.message && a.primary() == b.primary());
 }
 
 /// Syntax, schema, rules and lints; the plan follows only where there are no errors.

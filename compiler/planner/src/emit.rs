@@ -1,7 +1,7 @@
 //! Writes motion: keeps tool, spindle, feed and coolant, and goes from place to place by the security plane.
 
 use gr_ir::{Arc, ArcPlane, Builder, Marker, Note, Op, Plane, Pose, Source, Turn, Units};
-use gr_text::{Code, Diagnostic, FileId, LineIndex};
+use gr_text::{Code, Diagnostic, FileId, LineIndex, Severity, Span, code};
 
 use crate::frame::{Frame, norm, sub};
 use crate::process::{Functions, Origin, Piece, Technology, Tool};
@@ -35,6 +35,7 @@ pub(crate) struct Emit<'a> {
     turn: Turn,
     coolant: Functions,
     locks: (bool, bool),
+    plane: Plane,
     /// What is left of the raw part, where it is known.
     pub stock: Option<Stock>,
     cutter: Option<Cutter>,
@@ -61,6 +62,7 @@ impl<'a> Emit<'a> {
             turn: Turn::Stop,
             coolant: Functions::default(),
             locks: (false, false),
+            plane: Plane::Xy,
             cut: std::collections::BTreeSet::new(),
             stock: None,
             cutter: None,
@@ -74,6 +76,16 @@ impl<'a> Emit<'a> {
         let args: Vec<String> = args.iter().map(|a| (*a).to_string()).collect();
         let d = Diagnostic::new(code, self.file, origin.span, &args);
         if self.said.insert((origin.span.start, d.message.clone())) {
+            self.out.push(d);
+        }
+    }
+    /// An overlap of more than the whole tool: what only the file's writer knows is no path.
+    pub fn overlap(&mut self, span: Span, overlap: f64, diameter: f64) {
+        let show = gr_step::short;
+        let args = [show(overlap), show(overlap / diameter), show(overlap / 100.0)];
+        let mut d = Diagnostic::new(code::STEP_OVERLAP, self.file, span, &args);
+        d.severity = Severity::Error;
+        if self.said.insert((span.start, d.message.clone())) {
             self.out.push(d);
         }
     }
@@ -162,10 +174,14 @@ impl<'a> Emit<'a> {
         let pose = self.pose(to);
         let begun = (sweep.abs() / (2.0 * std::f64::consts::PI) - 1e-9).floor().max(0.0) as i32 + 1;
         let turns = if sweep < 0.0 { -begun } else { begun };
-        let arc = if normal[2].abs() > 1.0 - 1e-12 {
-            Arc { plane: ArcPlane::Work(Plane::Xy), center, turns: if normal[2] > 0.0 { turns } else { -turns } }
-        } else {
-            Arc { plane: ArcPlane::Free(normal), center, turns }
+        // Normals of the planes as controls have them: Z, Y, X.
+        let planes = [(2, Plane::Xy), (1, Plane::Xz), (0, Plane::Yz)];
+        let arc = match planes.into_iter().find(|(i, _)| normal[*i].abs() > 1.0 - 1e-12) {
+            Some((i, plane)) => {
+                self.plane(plane);
+                Arc { plane: ArcPlane::Work(plane), center, turns: if normal[i] > 0.0 { turns } else { -turns } }
+            }
+            None => Arc { plane: ArcPlane::Free(normal), center, turns },
         };
         self.b.push_to(Op::Arc(arc), &pose, self.source);
         if let Some(from) = self.at.filter(|_| self.upright().is_some() && normal[2].abs() > 1.0 - 1e-12) {
@@ -195,6 +211,12 @@ impl<'a> Emit<'a> {
             last = p;
         }
     }
+    fn plane(&mut self, plane: Plane) {
+        if self.plane != plane {
+            self.plane = plane;
+            self.push(Op::Plane(plane));
+        }
+    }
     pub fn piece(&mut self, piece: &Piece, frame: &Frame) {
         match *piece {
             Piece::Line(p) => self.line(frame.point(p)),
@@ -205,6 +227,7 @@ impl<'a> Emit<'a> {
     /// features on the side of a part are left along their own axis before.
     pub fn travel(&mut self, to: [f64; 3], axis: [f64; 3], security: f64) {
         let up = security.max(to[2]);
+        let known = self.at.is_some();
         match self.at {
             Some(at) => self.rapid_as_written([at[0], at[1], up.max(at[2])]),
             None => {
@@ -219,6 +242,10 @@ impl<'a> Emit<'a> {
         let high = self.at.map_or(up, |a| a[2]);
         if axis != self.axis {
             self.axis = axis;
+            self.at = None;
+        }
+        if !known {
+            // Nobody knows where the machine stands: the way there is written even if it goes nowhere here.
             self.at = None;
         }
         self.rapid_as_written([to[0], to[1], high]);
@@ -339,6 +366,7 @@ impl<'a> Emit<'a> {
         self.lift(security);
         self.stop_spindle();
         self.locks(false, false);
+        self.plane(Plane::Xy);
         if self.tool.take().is_some() {
             self.push(Op::Close(Marker::Tool));
         }

@@ -37,7 +37,7 @@ pub(crate) fn follow(e: &mut Emit<'_>, paths: &[Toolpath], frame: &Frame, techno
                 };
                 let start = frame.point(curve.start);
                 let here = e.at.unwrap_or_else(|| e.b.pose().xyz());
-                let gap = norm(sub(here, start)) > TINY;
+                let gap = e.at.is_none() || norm(sub(here, start)) > TINY;
                 if gap && (!joined || by_plane) {
                     // What says it approaches begins above the material; anything else is reached at feed.
                     let above = p.rapid || matches!(p.role.as_str(), "APPROACH" | "NON_CONTACT" | "NONCONTACT" | "CONNECT" | "LIFT");

@@ -113,6 +113,15 @@ pub fn plan(text: &[u8], file: FileId, options: &Options) -> (Option<Planned>, V
         }
     }
     holes.values().for_each(|steps| drill::leftovers(&mut p.e, steps));
+    for s in process.steps() {
+        let Shape::Compound(all) = &s.feature.shape else { continue };
+        for f in all.iter().filter(|f| !holes.contains_key(&f.origin.id)) {
+            let tool = &s.operation.tool;
+            let (name, of) = (format!("T{}", tool.number), format!("#{} {}", f.origin.id, f.keyword));
+            let why = format!("no workingstep makes this element of #{} {}", s.feature.origin.id, s.feature.keyword);
+            p.e.say(code::PLAN_UNREACHABLE_CORNER, s.feature.origin, &[&name, &format!("{:.4}", tool.diameter / 2.0), &of, &why]);
+        }
+    }
     out.append(&mut p.e.out);
     let failed = out.iter().any(|d| d.severity == Severity::Error);
     let program = p.e.b.finish();
@@ -359,6 +368,14 @@ impl Planner<'_> {
 fn targets(s: &Workingstep) -> Vec<&Feature> {
     let Shape::Compound(all) = &s.feature.shape else { return vec![&s.feature] };
     let OperationKind::Drill(_) = s.operation.kind else { return all.iter().collect() };
+    if s.operation.keyword == "COUNTER_SINKING" {
+        // It makes the cone, or what is widest.
+        let opens = |f: &&Feature| match f.shape {
+            Shape::Hole { diameter, final_diameter, .. } => (final_diameter.is_some(), diameter),
+            _ => (false, 0.0),
+        };
+        return all.iter().max_by(|a, b| opens(a).0.cmp(&opens(b).0).then(opens(a).1.total_cmp(&opens(b).1))).into_iter().collect();
+    }
     // A drill belongs to the hole it fits best.
     let width = |f: &&Feature| match f.shape {
         Shape::Hole { diameter, .. } if diameter >= s.operation.tool.diameter - 0.05 => diameter,

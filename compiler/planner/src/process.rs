@@ -647,6 +647,8 @@ pub struct Strategy {
     pub keyword: String,
     /// Overlap as written.
     pub overlap: Option<f64>,
+    /// Where it is written.
+    pub overlap_span: gr_text::Span,
     /// Multiple passes allowed.
     pub multiple: Option<bool>,
     /// Feed direction in the feature frame.

@@ -106,6 +106,8 @@ struct Writer<'a> {
     feature: usize,
     highest: f64,
     steps: usize,
+    /// Axes that some move has brought to a place: where the machine stands before, nobody knows.
+    known: [bool; 3],
 }
 
 impl<'a> Writer<'a> {
@@ -137,6 +139,7 @@ impl<'a> Writer<'a> {
             feature: 0,
             highest,
             steps: 0,
+            known: [false; 3],
         };
         // Instance 1 is the project; it is written last.
         w.data.push(String::new());
@@ -237,9 +240,20 @@ impl<'a> Writer<'a> {
         if v.start.axes[3..] != v.end.axes[3..] {
             return self.cannot("motion of the axes A B C U V W", v);
         }
+        let (mut start, end) = (v.start.xyz(), v.end.xyz());
+        let all = if rapid && self.known != [true; 3] {
+            // The way there begins anywhere: only where it ends can be written.
+            self.known = std::array::from_fn(|i| self.known[i] || start == end || start[i] != end[i]);
+            if self.known != [true; 3] {
+                return;
+            }
+            start = end;
+            vec![Piece::Line(end)]
+        } else {
+            self.known = [true; 3];
+            pieces(start, end)
+        };
         let t = self.adopt(v.state, v);
-        let (start, end) = (v.start.xyz(), v.end.xyz());
-        let all = pieces(start, end);
         let axes = v.end.tool_axis;
         let joins = match self.elements.last() {
             Some(Element::Path(run, before)) => {
@@ -305,7 +319,7 @@ impl<'a> Writer<'a> {
             Turn::Ccw => real(t.speed / 60.0),
             Turn::Stop => "0.".into(),
         };
-        let feed = real(t.feed.max(0.0) / 1000.0);
+        let feed = if t.feed > 0.0 { real(t.feed / 1000.0) } else { "$".into() };
         let flag = |b: bool| if b { ".T." } else { ".F." };
         let id = self.add(format!(
             "MILLING_TECHNOLOGY({feed},.TCP.,$,{speed},$,.F.,{},{},$)",

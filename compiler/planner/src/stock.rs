@@ -75,7 +75,7 @@ impl Stock {
     }
 
     /// Cells whose middle is within `reach` of a straight move, with the distance and the part of the move that is
-    /// within `reach` of it: closest, first, last.
+    /// within `reach` of it: closest, first, last. A move straight up or down is near them all the way.
     fn near(&self, a: [f64; 3], b: [f64; 3], reach: f64, mut each: impl FnMut(usize, f64, [f64; 3])) {
         let along = [b[0] - a[0], b[1] - a[1]];
         let length2 = along[0] * along[0] + along[1] * along[1];
@@ -125,10 +125,11 @@ impl Stock {
         let mut highest: Option<f64> = None;
         let rise = b[2] - a[2];
         // Cells at the rim are cut only in part: no move is lifted for them.
-        self.near(a, b, (tool.radius - 0.75 * self.cell).max(0.0), |cell, d, [at, _, _]| {
+        self.near(a, b, (tool.radius - 0.75 * self.cell).max(0.0), |cell, d, [_, first, last]| {
             let Some(z) = self.z.get(cell) else { return };
             let top = f64::from(*z) - tool.over_tip(d);
-            if top > a[2] + rise * at + FILM + 1e-6 * top.abs() {
+            let deepest = a[2] + rise * if rise > 0.0 { first } else { last };
+            if top > deepest + FILM + 1e-6 * top.abs() {
                 highest = Some(highest.map_or(top, |h: f64| h.max(top)));
             }
         });
@@ -167,6 +168,8 @@ mod tests {
         assert_eq!(s.blocks(FLAT, [10.0, 30.0, 14.0], [90.0, 30.0, 14.0]), Some(15.0));
         assert_eq!(s.blocks(FLAT, [50.0, 30.0, 15.0], [50.0, 37.0, 15.0]), Some(20.0));
         assert_eq!(s.blocks(FLAT, [50.0, 30.0, 25.0], [50.0, 37.0, 25.0]), None);
+        assert_eq!(s.blocks(FLAT, [50.0, 50.0, 25.0], [50.0, 50.0, 18.0]), Some(20.0));
+        assert_eq!(s.blocks(FLAT, [50.0, 30.0, 25.0], [50.0, 30.0, 15.0]), None);
         // Beside the block there is nothing.
         assert_eq!(s.blocks(FLAT, [-6.0, 0.0, 0.0], [-6.0, 60.0, 0.0]), None);
     }

@@ -124,7 +124,7 @@ fn three_faces_go_round_by_the_security_plane() {
 
 #[test]
 fn example_1() {
-    let (p, out) = planned(PART1);
+    let (p, _) = planned(PART1);
     safe(&p.program, 0.0);
     // Drilling honours the slower first 2 and last 8 mm, and goes through.
     let drill: Vec<_> = p.program.steps().filter(|s| matches!(s.op, Op::Linear) && s.end.axes[0] == 20.0 && s.end.axes[1] == 60.0).collect();

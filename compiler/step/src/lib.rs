@@ -16,7 +16,7 @@ mod schema;
 pub use check::check;
 pub use diagnose::{diagnostics, diagnostics_of};
 pub use dialect::{Dialect, dialect};
-pub use lint::lint;
+pub use lint::{lint, short};
 pub use model::{Model, Node, Val};
 pub use rules::{Decided, Origin, RULES, Rule, broken};
 pub use schema::{Attribute, Edition, Entity, EntityId, Name, Schema, Type, schema};

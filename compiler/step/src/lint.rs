@@ -98,7 +98,7 @@ impl Graph {
 }
 
 /// A number without needless digits.
-fn show(v: f64) -> String {
+pub fn short(v: f64) -> String {
     let s = format!("{v:.4}");
     s.trim_end_matches('0').trim_end_matches('.').to_string()
 }
@@ -292,7 +292,7 @@ impl<'m> Lints<'m, '_> {
                 if *angle {
                     self.angle(node, name, v, number);
                 } else if *name != "overlap" && number > if *name == "feed_on_retract" { 10.0 } else { 1.0 } {
-                    let args = vec![(*name).into(), show(number), show(number / 100.0)];
+                    let args = vec![(*name).into(), short(number), short(number / 100.0)];
                     self.once(code::STEP_RATIO, node, v.span(), args);
                 }
             }
@@ -304,7 +304,7 @@ impl<'m> Lints<'m, '_> {
         let text: String = v.text().chars().filter(|c| *c > ' ').collect();
         let decimals = text.split_once('.').map_or(0, |(_, d)| d.bytes().filter(u8::is_ascii_digit).count());
         if number.abs() > 0.001 && number.abs() <= 2.0 * PI && decimals >= 5 {
-            let args = vec![name.into(), text, show(number.to_degrees())];
+            let args = vec![name.into(), text, short(number.to_degrees())];
             self.once(code::STEP_RADIANS, node, v.span(), args);
         }
     }
@@ -315,7 +315,7 @@ impl<'m> Lints<'m, '_> {
                 && let Some(t) = v.real()
                 && t >= 1.0
             {
-                self.add(code::STEP_TOLERANCE, w, v.span(), vec![show(t), show(t / 1000.0)]);
+                self.add(code::STEP_TOLERANCE, w, v.span(), vec![short(t), short(t / 1000.0)]);
             }
         }
     }
@@ -329,7 +329,7 @@ impl<'m> Lints<'m, '_> {
                 && let Some(h) = holder
                 && let Some(v) = h.attr("diameter").or_else(|| h.attr("effective_cutting_diameter"))
             {
-                self.add(code::STEP_ZERO_TOOL, h, v.span(), vec![show(d)]);
+                self.add(code::STEP_ZERO_TOOL, h, v.span(), vec![short(d)]);
             }
             let name = tool.string("its_id").trim().to_string();
             let numbered = !name.is_empty() && name.bytes().any(|b| b.is_ascii_digit());
@@ -337,7 +337,7 @@ impl<'m> Lints<'m, '_> {
                 Some((first, other)) if numbered && *other != d => {
                     let (first, other, span) = (first.id(), *other, first.keyword_span());
                     let at = tool.attr("its_id").map_or(tool.keyword_span(), Val::span);
-                    let args = vec![name, show(d), show(other), first.to_string()];
+                    let args = vec![name, short(d), short(other), first.to_string()];
                     if let Some(f) = self.once(code::STEP_TOOL_NAME, tool, at, args) {
                         f.labels.push((span, "first used here".into()));
                     }
@@ -363,15 +363,15 @@ impl<'m> Lints<'m, '_> {
                 && let Some(overlap) = v.real()
                 && overlap > 1.0
             {
-                let of_tool = d.map_or("a ratio of the tool's diameter".into(), |d| show(overlap / d));
-                self.once(code::STEP_OVERLAP, s, v.span(), vec![show(overlap), of_tool, show(overlap / 100.0)]);
+                let of_tool = d.map_or("a ratio of the tool's diameter".into(), |d| short(overlap / d));
+                self.once(code::STEP_OVERLAP, s, v.span(), vec![short(overlap), of_tool, short(overlap / 100.0)]);
             }
             if let (Some(v), Some(edge)) = (op.attr("axial_cutting_depth"), tool.and_then(edge_length))
                 && let Some(depth) = v.real()
                 && edge > 0.0
                 && depth > edge / 3.0
             {
-                self.add(code::STEP_AXIAL_DEPTH, op, v.span(), vec![show(depth), show(edge)]);
+                self.add(code::STEP_AXIAL_DEPTH, op, v.span(), vec![short(depth), short(edge)]);
             }
             let body = tool.and_then(|t| t.node("its_tool_body")).filter(|b| b.is_a("facemill"));
             if let Some(body) = body
@@ -388,32 +388,32 @@ impl<'m> Lints<'m, '_> {
         let (spindle, cutspeed, feed) = (t.attr("spindle"), t.attr("cutspeed"), t.attr("feedrate"));
         let (n, vc, f) = (spindle.and_then(Val::real), cutspeed.and_then(Val::real), feed.and_then(Val::real));
         if let (Some(n), Some(vc), Some(v)) = (n, vc, spindle) {
-            let fresh = self.once(code::STEP_BOTH_SPEEDS, t, v.span(), vec![show(vc), show(n)]);
+            let fresh = self.once(code::STEP_BOTH_SPEEDS, t, v.span(), vec![short(vc), short(n)]);
             if let Some(finding) = fresh {
                 finding.notes.extend(readings(n, vc, f, d));
             }
         } else if let (Some(n), Some(v)) = (n, spindle)
             && n.abs() > 500.0
         {
-            let args = vec![show(n), show(n.abs() * 60.0), show(n / 60.0)];
+            let args = vec![short(n), short(n.abs() * 60.0), short(n / 60.0)];
             self.once(code::STEP_SPINDLE_UNIT, t, v.span(), args);
         } else if let (Some(vc), Some(v)) = (vc, cutspeed)
             && vc.abs() > 50.0
         {
-            self.once(code::STEP_CUTSPEED_UNIT, t, v.span(), vec![show(vc), show(vc * 60.0), show(vc / 60.0)]);
+            self.once(code::STEP_CUTSPEED_UNIT, t, v.span(), vec![short(vc), short(vc * 60.0), short(vc / 60.0)]);
         }
         if let (Some(f), Some(v)) = (f, feed)
             && f > 1.0
         {
-            let args = vec![show(f), show(f * 60_000.0), fine(f / 60.0), fine(f / 60_000.0)];
+            let args = vec![short(f), short(f * 60_000.0), fine(f / 60.0), fine(f / 60_000.0)];
             self.once(code::STEP_FEED_UNIT, t, v.span(), args);
         }
         if let (Some(n), Some(v)) = (n, spindle) {
-            let rpm = show(n.abs() * 60.0);
+            let rpm = short(n.abs() * 60.0);
             if n > 0.0 && !left {
-                self.once(code::STEP_SPINDLE_SIGN, t, v.span(), vec![show(n), show(-n)]);
+                self.once(code::STEP_SPINDLE_SIGN, t, v.span(), vec![short(n), short(-n)]);
             } else if n < 0.0 {
-                self.once(code::STEP_NEGATIVE_SPINDLE, t, v.span(), vec![show(n), rpm]);
+                self.once(code::STEP_NEGATIVE_SPINDLE, t, v.span(), vec![short(n), rpm]);
             }
         }
     }
@@ -450,7 +450,10 @@ impl<'m> Lints<'m, '_> {
                 if run {
                     direction.get_or_insert((f.z, step));
                 }
-                self.security_plane(step, feature, &f);
+                // Where the frame of a tool path lies says nothing of the material.
+                if !feature.is_a("toolpath_feature") {
+                    self.security_plane(step, feature, &f);
+                }
             }
             if seen.insert(feature.index()) {
                 self.below_workpiece(feature);
@@ -463,7 +466,7 @@ impl<'m> Lints<'m, '_> {
             let Some(radius) = feature.length("orthogonal_radius") else { continue };
             if radius < d / 2.0 {
                 let v = op.attr("its_tool").map_or(op.keyword_span(), Val::span);
-                let args = vec![show(d), show(radius), feature.id().to_string()];
+                let args = vec![short(d), short(radius), feature.id().to_string()];
                 self.add(code::STEP_CORNER_TOO_TIGHT, op, v, args);
             }
         }
@@ -492,7 +495,7 @@ impl<'m> Lints<'m, '_> {
             && d > room + slack.unwrap_or(0.0) + 1e-9
         {
             let v = op.attr("its_tool").map_or(op.keyword_span(), Val::span);
-            let args = vec![show(d), feature.keyword().into(), show(room), feature.id().to_string()];
+            let args = vec![short(d), feature.keyword().into(), short(room), feature.id().to_string()];
             if let Some(f) = self.add(code::STEP_TOOL_TOO_LARGE, op, v, args) {
                 f.labels.push((feature.keyword_span(), "the feature".into()));
             }
@@ -507,7 +510,7 @@ impl<'m> Lints<'m, '_> {
         let highest = if upright { top.unwrap_or(placement.origin[2]).max(placement.origin[2]) } else { return };
         if height < highest - 1e-9 {
             let v = step.attr("its_secplane").map_or(step.keyword_span(), Val::span);
-            self.add(code::STEP_SECURITY_PLANE, step, v, vec![show(height), show(highest)]);
+            self.add(code::STEP_SECURITY_PLANE, step, v, vec![short(height), short(highest)]);
         }
     }
 
@@ -527,7 +530,7 @@ impl<'m> Lints<'m, '_> {
             let beyond = (low - at).max(at - high);
             if f.z[axis].abs() > 0.5 && beyond > 0.01 {
                 let v = feature.attr("depth").map_or(feature.keyword_span(), Val::span);
-                let args = vec![feature.id().to_string(), show(-depth), show(beyond)];
+                let args = vec![feature.id().to_string(), short(-depth), short(beyond)];
                 self.add(code::STEP_BELOW_WORKPIECE, feature, v, args);
                 return;
             }
@@ -542,7 +545,7 @@ impl<'m> Lints<'m, '_> {
             let Some(v) = profile.attr("placement") else { continue };
             let Some(p) = v.node().and_then(frame) else { continue };
             if p.origin == f.origin && f.origin != [0.0; 3] {
-                let args = vec![profile.keyword().into(), feature.id().to_string(), f.origin.map(show).join(", ")];
+                let args = vec![profile.keyword().into(), feature.id().to_string(), f.origin.map(short).join(", ")];
                 self.add(code::STEP_PROFILE_TWICE, profile, v.span(), args);
             }
         }
@@ -556,7 +559,7 @@ impl<'m> Lints<'m, '_> {
             && let Some(r) = feature.length("planar_radius")
             && r > 0.0
         {
-            self.add(code::STEP_RADIUS_SWAPPED, feature, v.span(), vec![show(r)]);
+            self.add(code::STEP_RADIUS_SWAPPED, feature, v.span(), vec![short(r)]);
         }
     }
 }
@@ -572,19 +575,19 @@ fn block_top(workpiece: Node<'_>) -> Option<f64> {
 fn readings(n: f64, vc: f64, feed: Option<f64>, d: Option<f64>) -> Vec<String> {
     let mut notes = vec![format!(
         "spindle {}: {} rpm in 1/s, the standard's unit; {} rpm in rev/min",
-        show(n),
-        show(n.abs() * 60.0),
-        show(n.abs())
+        short(n),
+        short(n.abs() * 60.0),
+        short(n.abs())
     )];
     if let Some(d) = d {
         let rpm = |meters_per_minute: f64| meters_per_minute * 1000.0 / (PI * d);
         let slow = rpm(vc);
         notes.push(format!(
             "cutspeed {} on a tool of {} mm: {} rpm in m/s, the standard's unit; {} rpm in m/min",
-            show(vc),
-            show(d),
-            show(rpm(vc * 60.0)),
-            show(slow)
+            short(vc),
+            short(d),
+            short(rpm(vc * 60.0)),
+            short(slow)
         ));
         let same = |a: f64, b: f64| (a - b).abs() <= 1e-3 * b.abs();
         let agree = if same(n.abs(), slow) {
@@ -600,11 +603,11 @@ fn readings(n: f64, vc: f64, feed: Option<f64>, d: Option<f64>) -> Vec<String> {
         if let Some(f) = feed {
             notes.push(format!(
                 "feedrate {}: {} mm/min in m/s, the standard's unit; {} mm/min in m/min; {} mm/min in mm per revolution at {} rpm",
-                show(f),
-                show(f * 60_000.0),
-                show(f * 1000.0),
-                show(f * slow),
-                show(slow)
+                short(f),
+                short(f * 60_000.0),
+                short(f * 1000.0),
+                short(f * slow),
+                short(slow)
             ));
         }
     }

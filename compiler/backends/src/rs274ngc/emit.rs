@@ -296,7 +296,12 @@ impl<'a> Emitter<'a> {
     }
 
     fn active_comment(&mut self, head: &str, text: &str) {
-        let clean: String = text.chars().filter(|c| !c.is_control() && *c != ')').take(200).collect();
+        let one = |c| match c {
+            '(' => '[',
+            ')' => ']',
+            c => c,
+        };
+        let clean: String = text.chars().filter(|c| !c.is_control()).map(one).take(200).collect();
         self.w.bare(&format!("({head}{clean})"));
     }
 

@@ -126,7 +126,9 @@ impl Emitter<'_> {
         let (a, b) = (&view.start.axes, &view.end.axes);
         let alone = (0..9).all(|i| i == 2 || a[i] == b[i]);
         let unknown = !self.anchored[0] && !self.anchored[1];
-        if !alone || !unknown || self.words(view.source).is_some() || view.source.line == crate::from_line::INSERTED {
+        // A move that goes nowhere names the axes that nobody has named yet.
+        let stays = a[2] == b[2] && self.anchored[2];
+        if !alone || stays || !unknown || self.words(view.source).is_some() || view.source.line == crate::from_line::INSERTED {
             return false;
         }
         let (text, said) = self.w.axis(2, b[2]);

@@ -189,13 +189,26 @@ fn job<'a>(e: &mut Emit<'_>, step: &'a Workingstep, m: &'a Milling, feature: &'a
 /// From the radial depth and the overlap: the smaller of the two.
 fn stepover(e: &mut Emit<'_>, step: &Workingstep, m: &Milling, written: Overlap) -> Option<f64> {
     let d = step.operation.tool.diameter;
-    let mut by = m.radial.filter(|r| *r > 0.0).unwrap_or(d).min(d * 0.9);
+    let o = &step.operation;
+    if let Some(r) = m.radial.filter(|r| !(*r > 0.0)) {
+        e.say(code::PLAN_BAD_SIZE, o.origin, &[&o.keyword, "radial_cutting_depth", &r.to_string(), "above zero"]);
+        return None;
+    }
+    if let Some(r) = m.radial.filter(|r| *r > d + 1e-9) {
+        let (a, b) = (format!("the radial depth of {r} mm"), format!("one of {:.4} mm", d * 0.9));
+        e.say(code::PLAN_APPROACH_CHANGED, o.origin, &[&a, &b, &format!("the tool is {d} mm wide")]);
+    }
+    let mut by = m.radial.unwrap_or(d).min(d * 0.9);
     if let Some((s, o)) = m.strategy.as_ref().and_then(|s| Some((s, s.overlap?))) {
         let (ratio, must) = match written {
             Overlap::Ratio => (o, "a ratio of 0 to below 1"),
             Overlap::Percent => (o / 100.0, "a percentage of 0 to below 100"),
             Overlap::Millimetres => (o / d, "a length of 0 to below the diameter of the tool"),
         };
+        if written == Overlap::Ratio && o > 1.0 {
+            e.overlap(s.overlap_span, o, d);
+            return None;
+        }
         if !(0.0..1.0).contains(&ratio) {
             e.say(code::PLAN_BAD_SIZE, s.origin, &[&s.keyword, "overlap", &o.to_string(), must]);
             return None;

@@ -66,6 +66,12 @@ impl<'m> Reader<'m> {
         let copies: Vec<Frame> = if replaced { copies } else { copies.iter().map(|c| c.place(&placement)).collect() };
         let depth = self.depth(node)?;
         let frame = copies.first().copied().unwrap_or(placement);
+        if let ([first, second, ..], Some(circle)) = (&copies[..], patterns.iter().find(|p| p.keyword() == "CIRCULAR_PATTERN").copied())
+            && first.origin.iter().zip(second.origin).all(|(a, b)| (a - b).abs() < 1e-9)
+        {
+            self.missing(circle, "base_feature_diameter", "all features of the pattern lie on one spot");
+            return None;
+        }
         let shape = self.shape(node, operation, &placement, setup)?;
         let (keyword, name) = (node.keyword().to_string(), node.string("its_id").into_owned());
         let tolerance = tolerance(node);
@@ -267,8 +273,10 @@ impl<'m> Reader<'m> {
                 let major = self.positive(node, "major_diameter", "the size of the thread")?;
                 let hand = node.node("thread_hand").map_or(String::new(), |h| h.string("descriptive_string").to_lowercase());
                 let length = node.node("partial_profile").and_then(|p| p.real("effective_length")).unwrap_or(0.0);
-                let per_inch = node.node("number_of_threads").and_then(|n| n.real("its_parameter_value"));
-                let pitch = per_inch.filter(|n| *n > 0.0).map(|n| 25.4 / n);
+                let pitch = match node.node("number_of_threads") {
+                    Some(n) => self.pitch(n)?,
+                    None => None,
+                };
                 let inner = node.attr("inner_or_outer_thread").and_then(|v| v.boolean()).unwrap_or(true);
                 Shape::Thread { major, pitch, right: !hand.contains("left"), inner, length }
             }
@@ -405,6 +413,23 @@ impl<'m> Reader<'m> {
         if !["", "mm", "millimetre", "millimeter"].contains(&unit.as_str()) {
             self.no_effect(number, "its_parameter_unit", "lengths are millimeters");
         }
+    }
+
+    /// Pitch of a thread from its number of threads, mm: per inch, unless its unit says otherwise.
+    fn pitch(&mut self, node: Node<'m>) -> Option<Option<f64>> {
+        let Some(v) = node.real("its_parameter_value").filter(|v| *v > 0.0 && v.is_finite()) else { return Some(None) };
+        let unit: String = node.string("its_parameter_unit").to_lowercase().split_whitespace().collect();
+        Some(Some(match unit.as_str() {
+            "" | "1/in" | "1/inch" | "/in" | "/inch" | "in-1" | "in^-1" | "tpi" | "perinch" | "threadsperinch" => 25.4 / v,
+            "1/mm" | "/mm" | "mm-1" | "mm^-1" | "permm" => 1.0 / v,
+            "mm" => v,
+            "in" | "inch" => 25.4 * v,
+            other => {
+                let given = format!("{v} '{other}'");
+                self.say_at(code::PLAN_BAD_SIZE, node, "its_parameter_unit", &[&super::title(node), "its_parameter_unit", &given, "'1/in', '1/mm', or 'mm' for a pitch"]);
+                return None;
+            }
+        }))
     }
 
     fn hole(&mut self, node: Node<'m>) -> Option<Shape> {

@@ -177,6 +177,7 @@ impl<'m> Reader<'m> {
             origin: origin(node),
             keyword: node.keyword().to_string(),
             overlap: node.real("overlap"),
+            overlap_span: node.written("overlap").map_or(node.keyword_span(), |v| v.span()),
             multiple: node.attr("allow_multiple_passes").and_then(|v| v.boolean()),
             feed,
             step_left: choice("stepover_direction").map(|c| c == "LEFT"),
@@ -219,6 +220,11 @@ impl<'m> Reader<'m> {
             return None;
         }
         let diameter = self.positive(of, attribute, "a tool has a diameter")?;
+        if let Some(r) = of.real("edge_radius").filter(|r| *r > diameter / 2.0 + 1e-9) {
+            let most = format!("at most the radius of the tool, {}", diameter / 2.0);
+            self.say_at(code::PLAN_BAD_SIZE, of, "edge_radius", &[&super::title(node), "edge_radius", &r.to_string(), &most]);
+            return None;
+        }
         let body = body.unwrap_or(node);
         let edges = [node.nodes("its_cutting_edge"), node.nodes("its_cutting_edges")].concat();
         let length = edges.first().and_then(|e| e.real("tool_offset_length").or_else(|| e.real("tool_functional_length")));

@@ -169,6 +169,12 @@ impl Part {
         }
         f
     }
+    /// The same part with another retract plane of its operations, which is 5 mm otherwise.
+    #[allow(dead_code)]
+    pub fn retract(mut self, plane: &str) -> Part {
+        self.data.iter_mut().for_each(|d| *d = d.replace("'op',5.,", &format!("'op',{plane},")));
+        self
+    }
     #[allow(dead_code)]
     pub fn top(&self) -> f64 {
         self.block[2]

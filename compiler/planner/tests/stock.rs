@@ -1,0 +1,225 @@
+//! What the planner does about material that is still there: rapids go over it, and cuts beyond a feature are told.
+
+#[path = "judge/part.rs"]
+#[allow(dead_code)]
+mod part;
+
+use gr_ir::geometry::ArcShape;
+use gr_ir::{Op, Program};
+use gr_planner::{Options, Planned, plan};
+use gr_text::{Code, Diagnostic, FileId, Severity, code};
+use part::{Mill, Part};
+
+const BLOCK: [f64; 3] = [60.0, 40.0, 12.0];
+
+fn planned(p: &Part) -> (Planned, Vec<Diagnostic>) {
+    let (planned, out) = plan(p.text().as_bytes(), FileId(0), &Options::default());
+    let errors: Vec<_> = out.iter().filter(|d| d.severity == Severity::Error).collect();
+    assert!(errors.is_empty(), "{errors:#?}\n{}", p.text());
+    (planned.expect("a program"), out)
+}
+
+fn says(p: &Part, code: Code, words: &str) {
+    let (_, out) = planned(p);
+    assert!(out.iter().any(|d| d.code == code && d.message.contains(words)), "{words}: {out:#?}");
+}
+
+fn silent(p: &Part, code: Code) {
+    let (_, out) = planned(p);
+    assert!(out.iter().all(|d| d.code != code), "{out:#?}");
+}
+
+/// Points of the block, a millimetre apart, with the height that is left over each; a plain check of its own.
+struct Left {
+    tops: Vec<f64>,
+    tool: f64,
+}
+
+impl Left {
+    fn cells() -> impl Iterator<Item = (usize, [f64; 2])> {
+        (0..60 * 40).map(|i| (i, [(i % 60) as f64 + 0.5, (i / 60) as f64 + 0.5]))
+    }
+    /// Deepest place of a rapid in the material, mm.
+    fn run(program: &Program, diameter: f64) -> f64 {
+        let mut left = Left { tops: vec![BLOCK[2]; 60 * 40], tool: diameter / 2.0 };
+        let mut worst = 0.0f64;
+        // The first move begins anywhere.
+        for s in program.steps().filter(|s| s.op.moves()).skip(1) {
+            let (a, b) = (s.start.xyz(), s.end.xyz());
+            let points: Vec<[f64; 3]> = match s.op {
+                Op::Arc(arc) => {
+                    let shape = ArcShape::new(&arc, &s.start, &s.end);
+                    (0..=200).map(|k| shape.point(f64::from(k) / 200.0)).collect()
+                }
+                _ => (0..=200).map(|k| std::array::from_fn(|i| a[i] + (b[i] - a[i]) * f64::from(k) / 200.0)).collect(),
+            };
+            for p in points {
+                worst = worst.max(left.at(p, matches!(s.op, Op::Rapid)));
+            }
+        }
+        worst
+    }
+    fn at(&mut self, p: [f64; 3], rapid: bool) -> f64 {
+        let mut into = 0.0f64;
+        for (i, c) in Left::cells() {
+            let d = (c[0] - p[0]).hypot(c[1] - p[1]);
+            if rapid && d < self.tool - 0.6 {
+                into = into.max(self.tops[i] - p[2]);
+            } else if !rapid && d <= self.tool {
+                self.tops[i] = self.tops[i].min(p[2]);
+            }
+        }
+        into
+    }
+}
+
+fn pocket(at: [f64; 3], retract: &str, bosses: impl Fn(&mut Part) -> String) -> Part {
+    let mut p = Part::new(BLOCK);
+    let tool = p.tool("ENDMILL", 6.0, 0.0, None);
+    let op = p.mill(&Mill::new("BOTTOM_AND_SIDE_ROUGH_MILLING", tool, 2.0, 3.0));
+    let (w, l) = (p.length(36.0), p.length(20.0));
+    let profile = p.add(format!("RECTANGULAR_CLOSED_PROFILE($,#{l},#{w})"));
+    let bottom = p.add("PLANAR_POCKET_BOTTOM_CONDITION()".into());
+    let bosses = bosses(&mut p);
+    p.machine("CLOSED_POCKET", &[op], at, Some(5.0), &format!(",({bosses}),$,#{bottom},$,$,#{profile}"));
+    p.retract(retract)
+}
+
+#[test]
+fn a_feature_under_uncut_material_is_entered_at_feed() {
+    for z in [12.0, 8.0, 5.5] {
+        for retract in ["5.", "1.", "2."] {
+            let p = pocket([30.0, 20.0, z], retract, |_| String::new());
+            let (p, _) = planned(&p);
+            let worst = Left::run(&p.program, 6.0);
+            assert!(worst < 1e-6, "Z{z} {retract}: a rapid {worst} mm in the block");
+        }
+    }
+    let mut p = Part::new(BLOCK);
+    let drill = p.tool("TWIST_DRILL", 6.0, 0.0, Some(59.0));
+    let op = p.drill("DRILLING", drill, None, "");
+    let size = p.length(6.0);
+    let bottom = p.add("THROUGH_BOTTOM_CONDITION()".into());
+    p.machine("ROUND_HOLE", &[op], [30.0, 20.0, 8.0], Some(8.0), &format!(",#{size},$,#{bottom}"));
+    let (p, _) = planned(&p.retract("2."));
+    assert!(Left::run(&p.program, 6.0) < 1e-6);
+}
+
+#[test]
+fn rapids_pass_over_a_boss_that_stands_above_its_pocket() {
+    let boss = |p: &mut Part| {
+        let place = p.place([0.0, 0.0, 4.0]);
+        let d = p.length(8.0);
+        let circle = p.add(format!("CIRCULAR_CLOSED_PROFILE(#{place},#{d})"));
+        let deep = p.place([0.0, 0.0, -9.0]);
+        let plane = p.add(format!("PLANE('depth',#{deep})"));
+        format!("#{}", p.add(format!("BOSS('boss',$,(),#{place},#{plane},#{circle},$)")))
+    };
+    let p = pocket([30.0, 20.0, 8.0], "2.", boss);
+    let (p, _) = planned(&p);
+    let worst = Left::run(&p.program, 6.0);
+    assert!(worst < 1e-6, "a rapid {worst} mm in the block");
+}
+
+fn slot(x: [f64; 2], ends: [&str; 2], first: bool) -> Part {
+    let mut p = Part::new(BLOCK);
+    let tool = p.tool("ENDMILL", 10.0, 0.0, None);
+    let op = p.mill(&Mill::new("BOTTOM_AND_SIDE_ROUGH_MILLING", tool, 4.0, 8.0));
+    if first {
+        // A pocket that the slot opens into at both ends.
+        let wide = p.mill(&Mill::new("BOTTOM_AND_SIDE_ROUGH_MILLING", tool, 4.0, 8.0));
+        for at in [x[0] - 8.0, x[1] + 8.0] {
+            let (w, l) = (p.length(16.0), p.length(20.0));
+            let profile = p.add(format!("RECTANGULAR_CLOSED_PROFILE($,#{l},#{w})"));
+            let bottom = p.add("PLANAR_POCKET_BOTTOM_CONDITION()".into());
+            let f = p.feature("CLOSED_POCKET", &[wide], [at, 20.0, 12.0], Some(4.0), &format!(",(),$,#{bottom},$,$,#{profile}"));
+            p.step(f, wide);
+        }
+    }
+    let along = p.direction([1.0, 0.0, 0.0]);
+    let length = p.length(x[1] - x[0]);
+    let path = p.add(format!("LINEAR_PATH($,#{length},#{along})"));
+    let w = p.length(10.0);
+    let section = p.add(format!("SQUARE_U_PROFILE($,#{w},$,0.,$,0.)"));
+    let ends = ends.map(|e| p.add(e.into()));
+    p.machine("SLOT", &[op], [x[0], 20.0, 12.0], Some(4.0), &format!(",#{path},#{section},(#{},#{})", ends[0], ends[1]));
+    p
+}
+
+const OPEN: &str = "OPEN_SLOT_END_TYPE()";
+const ROUND: &str = "RADIUSED_SLOT_END_TYPE()";
+
+#[test]
+fn open_ends_inside_the_part_are_told() {
+    says(&slot([10.0, 50.0], [OPEN, OPEN], false), code::PLAN_OVERRUNS_PART, "ends 10.0000 mm inside");
+    says(&slot([0.0, 50.0], [OPEN, OPEN], false), code::PLAN_OVERRUNS_PART, "ends 10.0000 mm inside");
+    silent(&slot([0.0, 60.0], [OPEN, OPEN], false), code::PLAN_OVERRUNS_PART);
+    silent(&slot([10.0, 50.0], [ROUND, ROUND], false), code::PLAN_OVERRUNS_PART);
+    // Open into what an earlier workingstep has cut.
+    silent(&slot([20.0, 40.0], [OPEN, OPEN], true), code::PLAN_OVERRUNS_PART);
+}
+
+fn hole(keyword: &str, tool: (&str, f64, Option<f64>), depth: Option<f64>, shape: (f64, &str)) -> Part {
+    let mut p = Part::new(BLOCK);
+    let t = p.tool(tool.0, tool.1, 0.0, tool.2);
+    let more = match keyword {
+        "BORING" => ",$,.F.,$,$,$",
+        "REAMING" => ",$,.F.,$,$,$",
+        _ => "",
+    };
+    let op = p.drill(keyword, t, depth, more);
+    let size = p.length(8.0);
+    let bottom = p.add(shape.1.into());
+    p.machine("ROUND_HOLE", &[op], [30.0, 20.0, 12.0], Some(shape.0), &format!(",#{size},$,#{bottom}"));
+    p
+}
+
+#[test]
+fn cuts_beyond_a_hole_are_told() {
+    let (twist, flat, through) = (("TWIST_DRILL", 8.0, Some(59.0)), "FLAT_HOLE_BOTTOM()", "THROUGH_BOTTOM_CONDITION()");
+    let cone = "CONICAL_HOLE_BOTTOM(59.,$)";
+    says(&hole("DRILLING", twist, Some(14.0), (10.0, flat)), code::PLAN_BEYOND_FEATURE, "4.0000 mm deeper");
+    says(&hole("DRILLING", twist, Some(30.0), (12.0, through)), code::PLAN_BEYOND_FEATURE, "deeper than it");
+    silent(&hole("DRILLING", twist, None, (12.0, through)), code::PLAN_BEYOND_FEATURE);
+    says(&hole("DRILLING", ("TWIST_DRILL", 8.0, Some(30.0)), None, (9.0, cone)), code::PLAN_BEYOND_FEATURE, "deeper than it");
+    silent(&hole("DRILLING", twist, None, (9.0, cone)), code::PLAN_BEYOND_FEATURE);
+    let sink = ("COUNTERSINK", 12.0, Some(45.0));
+    says(&hole("COUNTER_SINKING", sink, Some(6.0), (10.0, flat)), code::PLAN_BEYOND_FEATURE, "8.0000 mm to 12.0000 mm");
+    silent(&hole("COUNTER_SINKING", sink, None, (10.0, flat)), code::PLAN_BEYOND_FEATURE);
+}
+
+#[test]
+fn what_drills_leave_is_told() {
+    let (flat, through, cone) = ("FLAT_HOLE_BOTTOM()", "THROUGH_BOTTOM_CONDITION()", "CONICAL_HOLE_BOTTOM(59.,$)");
+    let drill = |d: f64, half: f64| ("TWIST_DRILL", d, Some(half));
+    says(&hole("DRILLING", drill(7.0, 59.0), None, (12.0, through)), code::PLAN_UNREACHABLE_CORNER, "0.5000 mm all round");
+    says(&hole("DRILLING", drill(8.0, 59.0), None, (9.0, flat)), code::PLAN_UNREACHABLE_CORNER, "in its floor");
+    says(&hole("DRILLING", drill(8.0, 75.0), None, (8.0, cone)), code::PLAN_UNREACHABLE_CORNER, "its cone is");
+    silent(&hole("DRILLING", drill(8.0, 59.0), None, (9.0, cone)), code::PLAN_UNREACHABLE_CORNER);
+    silent(&hole("DRILLING", drill(8.0, 59.0), None, (12.0, through)), code::PLAN_UNREACHABLE_CORNER);
+}
+
+#[test]
+fn a_retract_plane_in_the_material_is_told() {
+    for r in ["0.", "-3."] {
+        says(&pocket([30.0, 20.0, 12.0], r, |_| String::new()), code::PLAN_APPROACH_CHANGED, "the retract plane at");
+    }
+    silent(&pocket([30.0, 20.0, 12.0], "5.", |_| String::new()), code::PLAN_APPROACH_CHANGED);
+}
+
+/// Where the machine stands at the beginning nobody knows: the first way names X and Y, whatever they are.
+#[test]
+fn the_first_place_is_named() {
+    let mut p = Part::new(BLOCK);
+    let drill = p.tool("TWIST_DRILL", 5.0, 0.0, Some(59.0));
+    let op = p.drill("DRILLING", drill, None, "");
+    let size = p.length(5.0);
+    let bottom = p.add("THROUGH_BOTTOM_CONDITION()".into());
+    p.machine("ROUND_HOLE", &[op], [0.0, 0.0, 12.0], Some(12.0), &format!(",#{size},$,#{bottom}"));
+    let (p, _) = planned(&p);
+    let options = gr_backends::rs274ngc::Options::default();
+    let text = gr_backends::rs274ngc::emit(&p.program, &options, &gr_backends::NoSources).expect("written").text;
+    let first_cut = text.lines().position(|l| l.starts_with("G1")).expect("a cut");
+    let before: Vec<&str> = text.lines().take(first_cut).collect();
+    assert!(before.iter().any(|l| l.contains("X0") && l.contains("Y0")), "{text}");
+}
