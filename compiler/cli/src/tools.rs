@@ -76,7 +76,7 @@ pub fn title(tool: &Tool) -> String {
 
 /// Tools that were numbered `T7` by whoever wrote the file keep their numbers, if all of them are.
 pub fn own_numbers(tools: &[Tool]) -> Vec<Loaded> {
-    let number = |t: &Tool| t.name.strip_prefix('T').and_then(|n| n.parse::<u32>().ok()).filter(|n| *n < 100_000);
+    let number = |t: &Tool| t.name.strip_prefix('T').and_then(|n| n.parse::<u32>().ok()).filter(|n| (1..100_000).contains(n));
     let all: Option<Vec<u32>> = tools.iter().map(number).collect();
     let Some(numbers) = all else { return Vec::new() };
     let mut seen = numbers.clone();

@@ -35,6 +35,8 @@ struct Aim<'m> {
     /// mm of one unit of length in the file.
     scale: f64,
     seen: BTreeSet<u64>,
+    /// Operation → what its sequence of tool paths names.
+    sequence: Vec<(u64, Node<'m>)>,
     highest: f64,
 }
 
@@ -52,6 +54,7 @@ impl<'m> Aim<'m> {
         let mut tools = BTreeMap::new();
         let mut reps: BTreeMap<u64, Vec<Node<'m>>> = BTreeMap::new();
         let mut owners: Vec<(u64, u64, String)> = Vec::new();
+        let mut sequence = Vec::new();
         for n in model.instances() {
             match n.keyword() {
                 "MACHINING_PROCESS_SEQUENCE_RELATIONSHIP" | "MACHINING_OPERATION_RELATIONSHIP" | "MACHINING_TOOLPATH_SEQUENCE_RELATIONSHIP"
@@ -59,6 +62,9 @@ impl<'m> Aim<'m> {
                     if let (Some(a), Some(b)) = (at(n, 2).and_then(|v| v.node()), at(n, 3).and_then(|v| v.node())) {
                         let place = at(n, 4).and_then(|v| v.real()).unwrap_or(0.0);
                         parts.entry(a.id()).or_default().push((place, b));
+                        if n.keyword() == "MACHINING_TOOLPATH_SEQUENCE_RELATIONSHIP" {
+                            sequence.push((a.id(), b));
+                        }
                     }
                 }
                 "MACHINING_TOOL" => {
@@ -90,7 +96,7 @@ impl<'m> Aim<'m> {
                 }
             }
         }
-        let mut a = Aim { r: Reader::bare(model, file), parts, properties, tools, scale: 1.0, seen: BTreeSet::new(), highest: f64::NEG_INFINITY };
+        let mut a = Aim { r: Reader::bare(model, file), parts, properties, tools, scale: 1.0, seen: BTreeSet::new(), sequence, highest: f64::NEG_INFINITY };
         a.scale = a.length_unit();
         a
     }
@@ -153,6 +159,11 @@ impl<'m> Aim<'m> {
     }
 
     fn project(&mut self) -> Option<Process> {
+        let joined: BTreeSet<u64> = self.sequence.iter().map(|s| s.1.id()).collect();
+        let loose: Vec<Node<'m>> = self.r.model.instances().filter(|n| n.keyword() == "MACHINING_TOOLPATH" && !joined.contains(&n.id())).collect();
+        for n in loose {
+            self.refuse(n, ": no sequence joins it to an operation");
+        }
         let plans: Vec<Node<'m>> = self.r.model.instances().filter(|n| n.keyword() == "MACHINING_WORKPLAN").collect();
         let inner: BTreeSet<u64> = self.parts.values().flatten().map(|p| p.1.id()).collect();
         let Some(main) = plans.iter().find(|p| !inner.contains(&p.id())).copied() else {
@@ -209,6 +220,10 @@ impl<'m> Aim<'m> {
         let mut toolpaths = Vec::new();
         for p in paths {
             toolpaths.extend(self.path(p, technology));
+        }
+        let strange: Vec<Node<'m>> = self.sequence.iter().filter(|(of, n)| *of == operation.id() && n.keyword() != "MACHINING_TOOLPATH").map(|s| s.1).collect();
+        for n in strange {
+            self.refuse(n, ": in the sequence of tool paths of an operation");
         }
         let feature = Feature {
             origin: origin(node),

@@ -7,6 +7,9 @@ use crate::emit::{Emit, TINY};
 use crate::frame::{Frame, norm, sub, unit};
 use crate::process::*;
 
+/// Paths further apart than this do not just meet badly, mm.
+const JUMP: f64 = 0.01;
+
 /// Follows the tool paths of an operation, in the frame of its feature. `first`: they begin a workingstep and the
 /// tool is elsewhere.
 pub(crate) fn follow(e: &mut Emit<'_>, paths: &[Toolpath], frame: &Frame, technology: Option<(&Technology, Functions)>, security: f64, first: bool) {
@@ -43,6 +46,11 @@ pub(crate) fn follow(e: &mut Emit<'_>, paths: &[Toolpath], frame: &Frame, techno
                     let above = p.rapid || matches!(p.role.as_str(), "APPROACH" | "NON_CONTACT" | "NONCONTACT" | "CONNECT" | "LIFT");
                     let over = if above { start } else { [start[0], start[1], security.max(start[2])] };
                     e.travel(over, axes[0], security);
+                }
+                let far = norm(sub(here, start));
+                if joined && !by_plane && far > JUMP && !p.rapid && !matches!(p.role.as_str(), "APPROACH" | "LIFT" | "CONNECT" | "NON_CONTACT") {
+                    let rule = format!("it begins {far:.3} mm from where the path before it ends: joined by a straight cut");
+                    e.say(code::PLAN_TAKES_TURNS, p.origin, &["the tool path", &rule]);
                 }
                 conditions(e, p, technology);
                 let rapid = p.rapid || technology.is_none();

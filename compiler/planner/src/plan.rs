@@ -216,8 +216,11 @@ impl Planner<'_> {
             self.e.at = None;
             self.block = None;
         }
-        if let Some(f) = setup.frame.filter(|f| new && f.origin != [0.0; 3]) {
-            let at = format!("X{} Y{} Z{}", f.origin[0], f.origin[1], f.origin[2]);
+        if let Some(f) = setup.frame.filter(|f| new && (f.origin != [0.0; 3] || f.x[0] < 1.0 - 1e-9 || f.z[2] < 1.0 - 1e-9)) {
+            let [x, z] = [f.x, f.z].map(|a| a.map(|c| format!("{:.4}", c + 0.0)).join(","));
+            let turned = f.x[0] < 1.0 - 1e-9 || f.z[2] < 1.0 - 1e-9;
+            let turned = if turned { format!(", turned: its X along {x} and its Z along {z}") } else { String::new() };
+            let at = format!("X{} Y{} Z{}{turned}", f.origin[0], f.origin[1], f.origin[2]);
             self.e.say(code::PLAN_SETUP_ORIGIN, setup.origin, &[&format!("'{}'", setup.name), &at]);
         }
         self.setup = Some(setup.clone());
@@ -319,6 +322,8 @@ impl Planner<'_> {
         if r.toolpaths.is_empty() {
             // Home is the machine's; the program ends its way at the security plane.
             self.e.note("return home");
+            let why = "where home is only the machine knows";
+            self.e.say(code::PLAN_APPROACH_CHANGED, r.origin, &["the way home", "one up to the security plane", why]);
         }
         explicit::follow(&mut self.e, &r.toolpaths, &frame, None, security, true);
         self.security = security;
@@ -346,6 +351,11 @@ impl Planner<'_> {
         self.e.from(p.origin);
         let security = self.security.max(p.security.point[2]);
         let axis = [0.0, 0.0, 1.0];
+        match &p.tool {
+            Some(t) => self.e.tool(t, security),
+            None => self.e.say(code::PLAN_MISSING_VALUE, p.origin, &["WORKPIECE_PROBING", "its_probe", "the program would probe with whatever is in the spindle"]),
+        }
+        self.e.say(code::PLAN_TAKES_TURNS, p.origin, &["WORKPIECE_PROBING", "it gives no feed: the probe goes at 60 mm/min"]);
         self.e.stop_spindle();
         self.e.travel(p.start, axis, security);
         let far = p.distance.abs() * 2.0;

@@ -174,6 +174,8 @@ pub struct Probe {
     pub distance: f64,
     /// Variable that takes the result.
     pub variable: String,
+    /// The probe.
+    pub tool: Option<Tool>,
 }
 
 /// A function of the control.

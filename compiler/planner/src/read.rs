@@ -389,6 +389,21 @@ impl<'m> Reader<'m> {
         Some(Rapid { origin: origin(node), name: node.string("its_id").into_owned(), security, toolpaths, home })
     }
 
+    /// A touch probe: of its attributes the program needs a number in the tool table.
+    fn probe_tool(&mut self, node: Node<'m>) -> Tool {
+        let dimension = node.node("dimension");
+        let number = |a: &str| dimension.and_then(|d| d.real(a)).or_else(|| node.real(a)).filter(|v| *v > 0.0 && v.is_finite());
+        let tool = Tool {
+            origin: origin(node),
+            name: node.string("its_id").into_owned(),
+            kind: node.keyword().to_string(),
+            diameter: number("diameter").unwrap_or(0.0),
+            length: number("overall_assembly_length"),
+            ..Tool::default()
+        };
+        self.numbered(tool)
+    }
+
     fn probe(&mut self, node: Node<'m>, setup: Option<&Setup>) -> Option<Probe> {
         let security = node.node("its_secplane").and_then(|p| self.plane(p));
         let start = node.node("start_position").and_then(|p| self.placement(p)).map(|f| f.origin);
@@ -404,7 +419,8 @@ impl<'m> Reader<'m> {
         self.variables.insert(variable.clone(), None);
         let name = node.string("its_id").into_owned();
         let (start, direction) = (place.point(start), place.vector(direction));
-        Some(Probe { origin: origin(node), name, security, start, direction, distance, variable })
+        let tool = node.node("its_probe").map(|t| self.probe_tool(t));
+        Some(Probe { origin: origin(node), name, security, start, direction, distance, variable, tool })
     }
 
     fn function(&mut self, node: Node<'m>) -> Option<FunctionKind> {

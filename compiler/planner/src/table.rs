@@ -88,7 +88,7 @@ fn step(s: &Workingstep, number: usize, pad: &str, out: &mut String) {
     let _ = writeln!(out, "{pad}  feature    #{} {} {}", f.origin.id, f.keyword, quoted(&f.name));
     let _ = writeln!(out, "{pad}  placement  {}{}", list(&f.frame.origin), axes(f));
     let _ = writeln!(out, "{pad}  depth      {}", depth(s));
-    let shape = shape(&f.shape);
+    let shape = shape(&f.shape, f.depth);
     if !shape.is_empty() {
         let _ = writeln!(out, "{pad}  profile    {shape}");
     }
@@ -123,7 +123,7 @@ fn depth(s: &Workingstep) -> String {
     }
 }
 
-fn shape(shape: &Shape) -> String {
+fn shape(shape: &Shape, depth: f64) -> String {
     match shape {
         Shape::Face { length, direction, width, .. } => format!("face length {} along {} width {}", number(*length), list(direction), number(*width)),
         Shape::Pocket { boundary, bosses, slope, bottom, planar_radius, orthogonal_radius } => {
@@ -137,7 +137,7 @@ fn shape(shape: &Shape) -> String {
             out
         }
         Shape::Slot { path, section, ends } => {
-            let mut out = section_text(section);
+            let mut out = section_text(section, depth);
             match path {
                 Travel::Line { direction, length, .. } => {
                     let _ = write!(out, ", length {} along {}", number(*length), list(direction));
@@ -164,7 +164,7 @@ fn shape(shape: &Shape) -> String {
         Shape::Outside { boundary, .. } => format!("outside of {} points", boundary.points.len()),
         Shape::Thread { major, pitch, .. } => format!("thread {}{}", number(*major), pitch.map_or(String::new(), |p| format!(" pitch {}", number(p)))),
         Shape::Compound(all) => {
-            let inner: Vec<String> = all.iter().map(|f| format!("#{} {}", f.origin.id, self::shape(&f.shape))).collect();
+            let inner: Vec<String> = all.iter().map(|f| format!("#{} {}", f.origin.id, self::shape(&f.shape, f.depth))).collect();
             inner.join("; ")
         }
         Shape::Boss(_) | Shape::Toolpath | Shape::Other => String::new(),
@@ -207,9 +207,17 @@ fn closed(c: &Closed) -> String {
     }
 }
 
-fn section_text(s: &Section) -> String {
+fn section_text(s: &Section, depth: f64) -> String {
     match s {
-        Section::SquareU { width, radius, .. } => format!("square U width {} radius {}", number(*width), number(radius[0])),
+        Section::SquareU { width, radius, angle } => {
+            let top = width + depth * angle.iter().map(|a| libm::tan(*a)).sum::<f64>();
+            let both = |v: &[f64; 2]| if v[0] == v[1] { number(v[0]) } else { format!("{} and {}", number(v[0]), number(v[1])) };
+            let mut text = format!("square U width {} radius {}", number(*width), both(radius));
+            if angle.iter().any(|a| *a != 0.0) {
+                text = format!("square U width {} at the top, {} at the bottom, radius {}", number(top), number(*width), both(radius));
+            }
+            text
+        }
         Section::RoundedU { width } => format!("rounded U width {}", number(*width)),
         Section::Vee { radius, angle, .. } => format!("V {} degrees radius {}", number(angle.to_degrees()), number(*radius)),
         Section::Tee { width, bar_width, bar_depth, .. } => format!("T width {} bar {} x {}", number(*width), number(*bar_width), number(*bar_depth)),
@@ -331,7 +339,7 @@ fn step_json(s: &Workingstep) -> String {
         format!("\"placement\": {}, \"axis\": {}", array(&f.frame.origin), array(&f.frame.z)),
         format!("\"depth\": {}", real(f.depth)),
         format!("\"cut\": {}", option(match &o.kind { OperationKind::Drill(d) => d.depth, _ => None })),
-        format!("\"profile\": {}", string(&shape(&f.shape))),
+        format!("\"profile\": {}", string(&shape(&f.shape, f.depth))),
         format!("\"operation\": {{\"id\": {}, \"entity\": {}}}", o.origin.id, string(&o.keyword)),
         format!("\"tool\": {}", o.tool.number),
         format!("\"feed\": {}, \"speed\": {}, \"clockwise\": {}", option(o.technology.feed.map(|f| f * 60.0)), option(o.technology.speed), o.technology.clockwise),

@@ -410,6 +410,9 @@ impl Job<'_> {
     pub(super) fn area(&self, e: &mut Emit<'_>) -> Done<Moves> {
         let area = self.outline()?;
         self.open_ends(e, &self.mouths()?);
+        if !self.m.bottom && matches!(self.feature.shape, Shape::Pocket { .. } | Shape::OpenPocket { .. }) && !self.before_cut(e) {
+            self.leaves(e, "its middle, which no workingstep before has cleared: it only goes round the wall");
+        }
         let moves = self.emptied(e, &area)?;
         if let Shape::Pocket { .. } | Shape::Hole { .. } = self.feature.shape {
             // A floor that is not flat leaves a disk further down: corners are those of the walls.

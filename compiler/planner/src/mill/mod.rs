@@ -73,6 +73,9 @@ pub(crate) fn mill(e: &mut Emit<'_>, step: &Workingstep, m: &Milling, feature: &
         }
         return thread::mill(e, step, m, feature, given.security);
     }
+    if let Some(why) = unsuited(&step.operation.tool, &feature.shape) {
+        return e.say(code::PLAN_CANNOT_CUT, step.origin, &[&format!("#{} {}", feature.origin.id, feature.keyword), &why]);
+    }
     let Some(job) = job(e, step, m, feature, given) else { return };
     let planned = match &feature.shape {
         Shape::Face { .. } => job.face(e),
@@ -98,6 +101,14 @@ pub(crate) fn mill(e: &mut Emit<'_>, step: &Workingstep, m: &Milling, feature: &
     for frame in &feature.copies {
         write(e, step, frame, &moves, given.security);
     }
+}
+
+/// Tools that are no cylinders with a face that cuts: they would make another shape than the feature's.
+fn unsuited(tool: &Tool, shape: &Shape) -> Option<String> {
+    let slot = matches!(shape, Shape::Slot { .. });
+    let alien = ["DRILL", "TAP", "REAMER", "COUNTERS", "BORING", "DOVETAIL", "THREAD_MILL", "T_SLOT_MILL", "WOODRUFF"];
+    let kind = alien.into_iter().find(|k| tool.kind.contains(k) && !tool.kind.starts_with("TAPERED_END"))?;
+    (!(slot && matches!(kind, "T_SLOT_MILL" | "WOODRUFF"))).then(|| format!("a {} does not mill it", tool.kind))
 }
 
 fn job<'a>(e: &mut Emit<'_>, step: &'a Workingstep, m: &'a Milling, feature: &'a Feature, given: &Given) -> Option<Job<'a>> {
@@ -390,11 +401,18 @@ impl Job<'_> {
     }
     /// Spots of an outline the tool does not reach; `of` says which belong to the feature.
     fn rest(&self, e: &mut Emit<'_>, region: &tp::Region, of: impl Fn(P2) -> bool) {
-        if !self.tells || self.m.allowance_side > 0.0 {
+        if !self.tells {
             return;
         }
-        // A tool of exactly the size of a corner or a hole reaches all of it.
-        let Ok(mut all) = tp::residuals(region, self.radius - 1e-6) else { return };
+        // A tool of exactly the size of a corner or a hole reaches all of it. What is left on purpose is not missed.
+        let inner = if self.m.allowance_side > 0.0 { tp::erode(region, self.m.allowance_side) } else { Ok(vec![region.clone()]) };
+        let Ok(inner) = inner else { return };
+        let mut all: Vec<tp::Residual> = Vec::new();
+        for region in &inner {
+            let Ok(some) = tp::residuals(region, self.radius - 1e-6) else { return };
+            all.extend(some);
+        }
+        all.sort_by(|a, b| b.area.total_cmp(&a.area));
         all.retain(|r| of(r.at));
         let total: f64 = all.iter().map(|r| r.area).sum();
         let Some(worst) = all.first() else { return };

@@ -172,7 +172,7 @@ impl Job<'_> {
     }
 
     /// An earlier workingstep has emptied the feature: a ball only follows the section.
-    fn before_cut(&self, e: &Emit<'_>) -> bool {
+    pub(super) fn before_cut(&self, e: &Emit<'_>) -> bool {
         e.cut.contains(&self.feature.origin.id)
     }
 

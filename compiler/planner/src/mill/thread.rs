@@ -49,6 +49,14 @@ pub(super) fn mill(e: &mut Emit<'_>, step: &Workingstep, m: &Milling, feature: &
     let sense = if ccw { 1.0 } else { -1.0 };
     let retract = o.retract.filter(|r| *r > 0.0).unwrap_or(RUN_OUT);
     super::retract_is_above(e, o, retract);
+    let without_effect = |e: &mut Emit<'_>, given: bool, what: &str| {
+        if given {
+            e.say(code::PLAN_NO_EFFECT, o.origin, &[what, &format!("#{} {}", o.origin.id, o.keyword), "a thread is cut in one go along its helix"]);
+        }
+    };
+    without_effect(e, o.start.is_some(), "start_point");
+    without_effect(e, o.overcut.is_some(), "overcut_length");
+    without_effect(e, m.radial.is_some(), "radial_cutting_depth");
     // Half a circle in: from the axis of a hole, from outside a stud.
     let lead = if *inner { radius / 2.0 } else { r + RUN_OUT };
     let away = if *inner { 0.0 } else { radius + 2.0 * lead };

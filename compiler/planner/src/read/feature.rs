@@ -492,6 +492,12 @@ impl<'m> Reader<'m> {
                     self.not_lowered(node, ": it leaves the plane of the feature");
                     return None;
                 }
+                let d = frame.vector(d);
+                let flat = libm::hypot(d[0], d[1]);
+                if flat < 0.999 {
+                    self.not_lowered(node, ": it leaves the plane of the feature");
+                    return None;
+                }
                 Some(Travel::Line { start: [frame.origin[0], frame.origin[1]], direction: [d[0] / flat, d[1] / flat], length })
             }
             "CIRCULAR_PATH" | "COMPLETE_CIRCULAR_PATH" => {

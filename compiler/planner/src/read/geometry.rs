@@ -6,6 +6,8 @@ use super::Reader;
 use crate::frame::{Frame, norm, sub, unit};
 use crate::process::*;
 
+/// Points that trim a circle lie on it to so many mm.
+const OFF_CIRCLE: f64 = 2e-3;
 /// Curves inside curves.
 const DEEPEST: usize = 32;
 
@@ -77,7 +79,12 @@ impl<'m> Reader<'m> {
                     match &mut out {
                         None => out = Some(piece),
                         Some(curve) => {
-                            if norm(sub(curve.end(), piece.start)) > 1e-6 {
+                            let gap = norm(sub(curve.end(), piece.start));
+                            if gap > OFF_CIRCLE {
+                                let rule = format!("its segments are {gap:.4} mm apart: joined by a straight cut");
+                                self.say(gr_text::code::PLAN_TAKES_TURNS, node, &[&super::title(node), &rule]);
+                            }
+                            if gap > 1e-6 {
                                 curve.pieces.push(Piece::Line(piece.start));
                             }
                             curve.pieces.extend(piece.pieces);
@@ -114,6 +121,13 @@ impl<'m> Reader<'m> {
                     self.missing(node, "trim_1", "a trimmed circle needs points or parameters");
                     return None;
                 };
+                for p in [start, end] {
+                    let off = norm(sub(p, frame.origin)) - r;
+                    if off.abs() > OFF_CIRCLE {
+                        self.not_lowered(node, &format!(": a point that trims its circle lies {off:.4} mm off it"));
+                        return None;
+                    }
+                }
                 Some(Curve { start, pieces: vec![Piece::Arc { center: frame.origin, normal, end }] })
             }
             "LINE" => {

@@ -12,6 +12,9 @@ const MOST_FEED_ON_RETRACT: f64 = 10.0;
 /// Largest cutting speed, m/s, and spindle speed, 1/s, that a mill may mean.
 const FASTEST: [f64; 2] = [50.0, 1000.0];
 
+/// Largest feed, m/s.
+const FASTEST_FEED: f64 = 1.0;
+
 /// Whether a spindle speed and a cutting speed on the round of a tool say the same in 1/s and m/s. The numbers agree in
 /// rpm and m/min as well, but are then too large for the standard's units.
 fn agree(spindle: f64, cut: f64, round: f64) -> bool {
@@ -42,6 +45,11 @@ impl<'m> Reader<'m> {
             self.not_lowered(node, &why);
         }
         let direction = direction.map(|d| d.keyword().to_string());
+        if !toolpaths.is_empty() {
+            for a in ["retract_plane", "start_point", "overcut_length"] {
+                self.unused(node, a, "the tool path is followed as it is written");
+            }
+        }
         let kind = if node.is_a("drilling_type_operation") {
             self.unused_in_drilling(node);
             OperationKind::Drill(self.drilling(node))
@@ -238,7 +246,11 @@ impl<'m> Reader<'m> {
             tip_angle: tip.filter(|a| *a != 0.0).map(|a| self.angle(a)),
             cutting_length: dimension.and_then(|d| d.real("cutting_edge_length")).or_else(|| node.real("maximum_depth_of_cut")).filter(|l| *l > 0.0),
             edge_radius: of.real("edge_radius").filter(|r| r.is_finite() && *r > 0.0).unwrap_or(0.0),
-            taper: dimension.and_then(|d| d.real("tool_circumference_angle")).filter(|_| body.keyword().starts_with("TAPERED")).map_or(0.0, |a| self.angle(a)),
+            taper: body
+                .real("taper_angle")
+                .or_else(|| dimension.and_then(|d| d.real("tool_circumference_angle")))
+                .filter(|_| body.keyword().starts_with("TAPERED"))
+                .map_or(0.0, |a| self.angle(a)),
             length: length.or_else(|| node.real("overall_assembly_length")).filter(|l| l.is_finite()),
             teeth: body.attr("number_of_teeth").or_else(|| body.attr("number_of_effective_teeth")).and_then(|v| v.integer()).and_then(|n| u32::try_from(n).ok()),
             right_handed: hand.as_deref().and_then(|h| match h {
@@ -311,11 +323,14 @@ impl<'m> Reader<'m> {
             (None, Some(f), Some(n)) => Some(f * n / 60.0),
             _ => None,
         };
-        if let (Some(n), Some(vc)) = (spindle, cut)
-            && !agree(n, vc, round)
-        {
-            let iso = format!("{:.1} rpm, feed {:.1} mm/min", n.abs() * 60.0, feed.unwrap_or(0.0) * 60_000.0);
-            let rpm = vc * 1000.0 / round;
+        let too_much = [(cut, FASTEST[0]), (spindle, FASTEST[1]), (feed, FASTEST_FEED)];
+        let open = too_much.into_iter().any(|(v, most)| v.is_some_and(|v| v.abs() > most));
+        if open || spindle.zip(cut).is_some_and(|(n, vc)| !agree(n, vc, round)) {
+            let (n, vc) = (spindle.unwrap_or(0.0), cut.unwrap_or(0.0));
+            let by_cut = |v: f64| if round > 0.0 { v * 1000.0 / round } else { 0.0 };
+            let rps = if spindle.is_some() { n.abs() } else { by_cut(vc) };
+            let rpm = if cut.is_some() { by_cut(vc) } else { n.abs() };
+            let iso = format!("{:.1} rpm, feed {:.1} mm/min", rps * 60.0, feed.unwrap_or(0.0) * 60_000.0);
             let other = format!("{rpm:.1} rpm, feed {:.1} mm/min", feed.or(per_rev).unwrap_or(0.0) * rpm);
             self.units_are_open(node, &iso, &other);
         }
