@@ -207,6 +207,39 @@ fn a_retract_plane_in_the_material_is_told() {
     silent(&pocket([30.0, 20.0, 12.0], "5.", |_| String::new()), code::PLAN_APPROACH_CHANGED);
 }
 
+/// Another setup has another origin: its first way names Z, then X and Y, even where the numbers are the same.
+#[test]
+fn another_setup_names_its_first_place() {
+    let mut p = Part::new(BLOCK);
+    let drill = p.tool("TWIST_DRILL", 5.0, 0.0, Some(59.0));
+    let op = p.drill("DRILLING", drill, None, "");
+    let size = p.length(5.0);
+    let bottom = p.add("THROUGH_BOTTOM_CONDITION()".into());
+    for x in [30.0, 10.0] {
+        p.machine("ROUND_HOLE", &[op], [x, 20.0, 12.0], Some(12.0), &format!(",#{size},$,#{bottom}"));
+    }
+    let [a, b] = [p.steps[0], p.steps[1]];
+    let place = p.place([0.0; 3]);
+    let plane = p.add(format!("PLANE('security',#{place})"));
+    let text = p.text();
+    let main = text.lines().find(|l| l.contains("=WORKPLAN('main'")).expect("a plan").to_string();
+    let id = main.split('=').next().expect("an id").to_string();
+    let plans = format!(
+        "#9001=SETUP('one',#{place},#{plane},());
+#9002=SETUP('two',#{place},#{plane},());
+#9003=WORKPLAN('a',(#{a}),$,#9001,$);
+#9004=WORKPLAN('b',(#{b}),$,#9002,$);
+{id}=WORKPLAN('main',(#9003,#9004),$,$,$);"
+    );
+    let (planned, out) = plan(text.replace(&main, &plans).as_bytes(), FileId(0), &Options::default());
+    let planned = planned.unwrap_or_else(|| panic!("{out:#?}"));
+    let options = gr_backends::rs274ngc::Options::default();
+    let text = gr_backends::rs274ngc::emit(&planned.program, &options, &gr_backends::NoSources).expect("written").text;
+    let second = text.split("G55").nth(1).expect("a second setup");
+    let before: Vec<&str> = second.lines().take_while(|l| !l.starts_with("G1")).filter(|l| l.contains(['X', 'Y', 'Z'])).collect();
+    assert!(before[0].starts_with("G0 Z") && before[1].contains("X10") && before[1].contains("Y20"), "{second}");
+}
+
 /// Where the machine stands at the beginning nobody knows: the first way names X and Y, whatever they are.
 #[test]
 fn the_first_place_is_named() {

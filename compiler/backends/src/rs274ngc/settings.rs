@@ -101,6 +101,10 @@ impl Emitter<'_> {
         self.offsets[index] = *offset;
         self.motion_unsure();
         self.move_frame(view.state);
+        if !selected {
+            // Where its origin is the machine knows: the same numbers are another place.
+            self.anchored = [false; 9];
+        }
     }
 
     fn rotation(&mut self, angle: f64, view: &View<'_, '_>) {
