@@ -100,6 +100,14 @@ fn bad(found: &[Diagnostic]) -> bool {
 /// Adds what a later stage found, unless an earlier one said it already.
 fn add(found: &mut Vec<Diagnostic>, more: Vec<Diagnostic>, levels: &Levels) {
     let orphans = found.iter().any(|d| d.code == code::STEP_ORPHAN_WORKINGSTEP);
+    // The planner's words on a spindle's sign say what is done about it; those of the lint hold where it is an error.
+    let sign = |d: &Diagnostic, of: gr_text::Code, all: &[Diagnostic]| all.iter().any(|o| o.code == of && o.primary() == d.primary());
+    let (errors, rest) = std::mem::take(found).into_iter().partition::<Vec<_>, _>(|d| d.severity == Severity::Error);
+    let more: Vec<Diagnostic> =
+        more.into_iter().filter(|d| !(d.code == code::PLAN_SPINDLE_SIGN && sign(d, code::STEP_SPINDLE_SIGN, &errors))).collect();
+    let kept_back = |d: &Diagnostic| d.code == code::STEP_SPINDLE_SIGN && sign(d, code::PLAN_SPINDLE_SIGN, &more);
+    found.extend(rest.into_iter().filter(|d| !kept_back(d)));
+    found.extend(errors);
     found.extend(more.into_iter().filter(|d| !(orphans && d.code == code::PLAN_ORPHAN_STEP)));
     found.retain_mut(|d| kept(d, levels));
     // Where statements are damaged, what they refer to only seems to be left over.

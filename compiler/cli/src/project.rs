@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use gr_text::{Diagnostic, FileId, Span, code};
+use gr_text::{Code, Diagnostic, FileId, Span, code};
 use serde::Deserialize;
 
 /// Name of the file.
@@ -109,6 +109,42 @@ impl Project {
         }
     }
 
+    /// Names in the file that stand for nothing: dialects, lints, targets and their options, each at its place.
+    pub fn faults(&self, file: FileId, text: &str) -> Vec<Diagnostic> {
+        let mut found = Vec::new();
+        let mut say = |code, path: &[Step<'_>], args: &[String]| found.push(Diagnostic::new(code, file, place(text, path), args));
+        let mut dialect = |name: Option<&String>, path: &[Step<'_>]| {
+            if let Some(name) = name.filter(|n| gr_spec::Dialect::find(n).is_none()) {
+                say(code::PROJECT_UNKNOWN_DIALECT, path, &[name.clone(), crate::commands::explain::dialects()]);
+            }
+        };
+        dialect(self.file.project.dialect.as_ref(), &[Step::Key("project"), Step::Key("dialect")]);
+        for (i, rule) in self.file.dialects.iter().enumerate() {
+            dialect(Some(&rule.dialect), &[Step::Key("dialects"), Step::Index(i), Step::Key("dialect")]);
+        }
+        let lints = &self.file.lints;
+        for (key, names, milder) in [("allow", &lints.allow, true), ("warn", &lints.warn, true), ("deny", &lints.deny, false)] {
+            for (i, name) in names.iter().enumerate() {
+                if let Err(code) = lint(name, milder) {
+                    say(code, &[Step::Key("lints"), Step::Key(key), Step::Index(i)], std::slice::from_ref(name));
+                }
+            }
+        }
+        for (i, row) in self.file.targets.iter().enumerate() {
+            let at = |key| [Step::Key("targets"), Step::Index(i), Step::Key(key)];
+            if gr_spec::TargetDef::find(&row.target).is_none() {
+                say(code::PROJECT_UNKNOWN_TARGET, &at("target"), std::slice::from_ref(&row.target));
+            }
+            for (key, value) in &row.options {
+                let alone = toml::Table::from_iter([(key.clone(), value.clone())]);
+                if let Err(why) = crate::commands::build::options_of(&alone) {
+                    say(code::PROJECT_TARGET_OPTION, &at(key), &[key.clone(), why]);
+                }
+            }
+        }
+        found
+    }
+
     /// A name in the file as a path from here.
     pub fn path_of(&self, name: &Path) -> PathBuf {
         self.folder.join(name)
@@ -143,6 +179,46 @@ impl Project {
         let mut told = std::collections::BTreeSet::new();
         closed.retain(|(p, _)| told.insert(p.clone()));
         (found, closed)
+    }
+}
+
+/// A step from a table to what is in it.
+#[derive(Clone, Copy)]
+pub enum Step<'a> {
+    /// Value of a key.
+    Key(&'a str),
+    /// Element of a list.
+    Index(usize),
+}
+
+/// Where a value stands in the text of a TOML file; as far as the way leads.
+pub fn place(text: &str, path: &[Step<'_>]) -> Span {
+    use toml::de::{DeTable, DeValue};
+    fn child<'v, 't>(at: &'v DeValue<'t>, step: &Step<'_>) -> Option<&'v toml::Spanned<DeValue<'t>>> {
+        match (at, step) {
+            (DeValue::Table(table), Step::Key(key)) => table.get(*key),
+            (DeValue::Array(list), Step::Index(i)) => list.get(*i),
+            _ => None,
+        }
+    }
+    let Ok(root) = DeTable::parse(text) else { return Span::default() };
+    let (Some(Step::Key(first)), mut range) = (path.first(), root.span()) else { return Span::default() };
+    let mut at = root.get_ref().get(*first);
+    for step in path.get(1..).unwrap_or_default() {
+        let Some(here) = at else { break };
+        range = here.span();
+        at = child(here.get_ref(), step);
+    }
+    let range = at.map_or(range, toml::Spanned::span);
+    Span::new(range.start as u32, range.end as u32)
+}
+
+/// The diagnostic of a name in `[lints]`, or on the command line; only lints can be made milder.
+pub fn lint(name: &str, milder: bool) -> Result<Code, Code> {
+    match Code::find(name) {
+        Some(c) if milder && c.def().severity == gr_text::Severity::Error => Err(code::PROJECT_LINT_LEVEL),
+        Some(c) => Ok(c),
+        None => Err(code::PROJECT_UNKNOWN_LINT),
     }
 }
 
@@ -200,6 +276,29 @@ mod tests {
         assert_eq!(project.file.dialects[0].dialect, "fanuc-mill");
         assert_eq!(project.file.targets[0].options["decimals"].as_integer(), Some(4));
         assert!(project.file.lints.strict && !project.file.project.block_delete);
+    }
+
+    #[test]
+    fn names_that_stand_for_nothing() {
+        let text = "schema = 1\n[project]\n# dialect = \"elvish\"\ndialect = \"elvish\"\n[[dialects]]\nfiles = \"*\"\ndialect = \"grbl\"\n\
+                    [[dialects]]\nfiles = \"*\"\ndialect = \"dwarvish\"\n[lints]\nallow = [\"spindle/stopped\", \"E0203\"]\ndeny = [\"no/such\"]\n\
+                    [[targets]]\ntarget = \"rs274\"\n[[targets]]\ntarget = \"rs274ngc\"\ndecimals = 3\ndecimal = 4\narcs = \"q\"\n";
+        let project = Project::parse(Path::new("x"), FileId(0), text).unwrap();
+        let found = project.faults(FileId(0), text);
+        let told: Vec<_> = found.iter().map(|d| (d.code.def().code, &text[d.primary().1.range()])).collect();
+        assert_eq!(
+            told,
+            [
+                ("E0834", "\"elvish\""),
+                ("E0834", "\"dwarvish\""),
+                ("E0805", "\"E0203\""),
+                ("E0804", "\"no/such\""),
+                ("E0846", "\"rs274\""),
+                ("E0847", "\"q\""),
+                ("E0847", "4"),
+            ]
+        );
+        assert_eq!(found[0].primary().1.start as usize, text.rfind("\"elvish\"").unwrap(), "not the remark");
     }
 
     #[test]

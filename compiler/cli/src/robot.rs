@@ -89,7 +89,8 @@ struct Clamping {
 /// The setups of a job file: each places the part on the table.
 fn job(path: &std::path::Path, machine: &Machine) -> Result<Vec<gr_robot::Setup>, String> {
     let at = |what: String| format!("{}: {what}", path.display());
-    let text = crate::sources::read(path).map_err(|(c, args)| at(args.last().cloned().unwrap_or_else(|| c.def().message.into())))?.text;
+    let said = |(c, args): (gr_text::Code, Vec<String>)| crate::sources::about_file(c, gr_text::FileId(0), &args).message;
+    let text = crate::sources::read(path).map_err(said)?.text;
     let job: Job = toml::from_str(&text).map_err(|e| at(e.to_string()))?;
     let setup = |c: Clamping| {
         if c.from_line.is_none() && c.workingsteps.is_empty() {

@@ -6,11 +6,11 @@ use gr_canon::{Units, Version};
 use gr_driver::{Level, Rules};
 use gr_interp::Setup;
 use gr_spec::Dialect;
-use gr_text::{Code, Diagnostic, Severity, code};
+use gr_text::{Code, Diagnostic, FileId, Severity, Span, code};
 
 use crate::commands::complain;
 use crate::options::{LintArgs, SetupArgs, UnitArg};
-use crate::project::Project;
+use crate::project::{Project, Step, lint, place};
 use crate::render::Renderer;
 use crate::sources::{Sources, read};
 
@@ -79,37 +79,41 @@ pub fn station(
 
 /// The same, as far as it goes: what could not be read is left out.
 pub fn assembled(args: &SetupArgs, lints: &LintArgs, from: &Path, sources: &mut Sources, renderer: &mut Renderer) -> Station {
-    let mut reader = Reader { sources, renderer, files: Vec::new() };
+    let mut reader = Reader { sources, renderer, files: Vec::new(), project: None, blamed: None, ini: None };
     let project = reader.project(from);
     let section = project.as_ref().map(|p| &p.file.project);
     let named = |option: &Option<PathBuf>, key: Option<&PathBuf>| {
         option.clone().or_else(|| key.map(|k| project.as_ref().map_or(k.clone(), |p| p.path_of(k))))
     };
     let mut setup = Setup::default();
+    reader.named_as(args.ini.is_none(), "ini");
     if let Some(path) = named(&args.ini, section.and_then(|s| s.ini.as_ref())) {
         reader.ini(&path, &mut setup);
     }
     setup.machine_units = units(args, section).or(setup.ini.machine_units()).unwrap_or(Units::Mm);
+    reader.named_as(args.tools.is_none(), "tools");
     let tools = named(&args.tools, section.and_then(|s| s.tools.as_ref())).or_else(|| ini_path(&setup, "EMCIO", "TOOL_TABLE"));
     if let Some(path) = &tools {
         reader.tools(path, &mut setup);
     } else {
         setup.tools = gr_interp::assumed_tools();
     }
+    reader.named_as(args.vars.is_none(), "vars");
     if let Some(path) = named(&args.vars, section.and_then(|s| s.vars.as_ref())).or_else(|| ini_path(&setup, "RS274NGC", "PARAMETER_FILE")) {
         reader.vars(&path, &mut setup);
     }
     setup.block_delete = args.block_delete || section.is_some_and(|s| s.block_delete);
     subs(args, project.as_ref(), &mut setup);
+    reader.blamed = None;
     let dialect = args.dialect.as_deref().and_then(|name| reader.dialect(name));
-    for rule in project.iter().flat_map(|p| &p.file.dialects) {
-        reader.dialect(&rule.dialect);
-    }
+    reader.named_as(args.machine.is_none(), "machine");
     let machine = args.machine.clone().or_else(|| section.and_then(|s| s.machine.clone()));
     let machine = machine.and_then(|name| reader.machine(&name));
+    reader.blamed = None;
     if let Some(machine) = &machine {
         limits(machine, &mut setup);
     }
+    reader.remaps(&setup);
     let lints = reader.levels(lints, project.as_ref());
     let step_units = args.step_units.or(section.and_then(|s| s.step_units)).map(gr_planner::Units::from);
     let step_overlap = args.step_overlap.or(section.and_then(|s| s.step_overlap)).map(gr_planner::Overlap::from);
@@ -281,6 +285,12 @@ struct Reader<'a> {
     sources: &'a mut Sources,
     renderer: &'a mut Renderer,
     files: Vec<PathBuf>,
+    /// The project file's text.
+    project: Option<(FileId, String)>,
+    /// The INI file's text.
+    ini: Option<(FileId, String)>,
+    /// Where the project names the file that is read now.
+    blamed: Option<(FileId, Span)>,
 }
 
 impl Reader<'_> {
@@ -293,10 +303,19 @@ impl Reader<'_> {
                 Some((self.sources.add(name, d.text.clone()), d.text))
             }
             Err((code, args)) => {
-                complain(self.renderer, self.sources, &name, code, &args);
+                match self.blamed {
+                    Some((file, span)) => self.show(&[Diagnostic::new(code, file, span, &args)]),
+                    None => complain(self.renderer, self.sources, &name, code, &args),
+                }
                 None
             }
         }
+    }
+    /// What is read next is named by a key of `[project]`, if that is so and the key is there.
+    fn named_as(&mut self, by_project: bool, key: &str) {
+        let project = self.project.as_ref().filter(|_| by_project);
+        let value = |(file, text): &(FileId, String)| (*file, place(text, &[Step::Key("project"), Step::Key(key)]));
+        self.blamed = project.map(value);
     }
     fn show(&mut self, found: &[Diagnostic]) {
         found.iter().for_each(|d| self.renderer.show(self.sources, d));
@@ -304,7 +323,10 @@ impl Reader<'_> {
     fn project(&mut self, from: &Path) -> Option<Project> {
         let path = Project::find(from)?;
         let (file, text) = self.text(&path)?;
-        Project::parse(&path, file, &text).map_err(|d| self.show(&[*d])).ok()
+        let project = Project::parse(&path, file, &text).map_err(|d| self.show(&[*d])).ok()?;
+        self.show(&project.faults(file, &text));
+        self.project = Some((file, text));
+        Some(project)
     }
     fn ini(&mut self, path: &Path, setup: &mut Setup) {
         let Some((file, text)) = self.text(path) else { return };
@@ -319,6 +341,16 @@ impl Reader<'_> {
         self.files.extend(included);
         self.show(&found);
         setup.ini = ini;
+        self.ini = Some((file, text));
+    }
+    /// Remapped codes whose subroutine is nowhere.
+    fn remaps(&mut self, setup: &Setup) {
+        let Some((file, text)) = self.ini.take() else { return };
+        for (line, name) in gr_interp::remaps_without_file(setup, &|p| p.is_file()) {
+            // A line of an included file stands nowhere here.
+            let place = text.find(line).map_or(Span::default(), |at| Span::new(at as u32, (at + line.len()) as u32));
+            self.show(&[Diagnostic::new(code::INI_REMAP, file, place, &[format!("the subroutine {name} is not there")])]);
+        }
     }
     fn tools(&mut self, path: &Path, setup: &mut Setup) {
         let Some((file, text)) = self.text(path) else { return };
@@ -341,7 +373,11 @@ impl Reader<'_> {
                 }
                 Some(machine)
             }
-            Err(found) => {
+            Err(mut found) => {
+                if let Some((file, span)) = self.blamed {
+                    let nowhere = |d: &Diagnostic| self.sources.get(d.primary().0).is_none_or(|f| f.text.is_empty());
+                    found.iter_mut().filter(|d| nowhere(d)).flat_map(|d| &mut d.labels).for_each(|l| (l.file, l.span) = (file, span));
+                }
                 self.show(&found);
                 None
             }
@@ -357,23 +393,22 @@ impl Reader<'_> {
     }
     fn levels(&mut self, args: &LintArgs, project: Option<&Project>) -> Levels {
         let lints = project.map(|p| &p.file.lints);
-        let both = |option: &[String], key: Option<&Vec<String>>| [option, key.map_or(&[], Vec::as_slice)].concat();
-        Levels {
-            strict: args.strict || lints.is_some_and(|l| l.strict),
-            allow: self.codes(&both(&args.allow, lints.map(|l| &l.allow)), true),
-            warn: self.codes(&both(&args.warn, lints.map(|l| &l.warn)), true),
-            deny: self.codes(&both(&args.deny, lints.map(|l| &l.deny)), false),
+        // What the project names is told by its own check.
+        let known = |names: &[String], milder| -> Vec<Code> { names.iter().filter_map(|n| lint(n, milder).ok()).collect() };
+        let (mut allow, mut warn, mut deny) = (self.codes(&args.allow, true), self.codes(&args.warn, true), self.codes(&args.deny, false));
+        if let Some(l) = lints {
+            allow.extend(known(&l.allow, true));
+            warn.extend(known(&l.warn, true));
+            deny.extend(known(&l.deny, false));
         }
+        Levels { strict: args.strict || lints.is_some_and(|l| l.strict), allow, warn, deny }
     }
-    fn codes(&mut self, names: &[String], only_lints: bool) -> Vec<Code> {
+    fn codes(&mut self, names: &[String], milder: bool) -> Vec<Code> {
         let mut codes = Vec::new();
         for name in names {
-            match Code::find(name) {
-                Some(c) if only_lints && c.def().severity == Severity::Error => {
-                    complain(self.renderer, self.sources, "", code::PROJECT_LINT_LEVEL, &[name.clone()]);
-                }
-                Some(c) => codes.push(c),
-                None => complain(self.renderer, self.sources, "", code::PROJECT_UNKNOWN_LINT, &[name.clone()]),
+            match lint(name, milder) {
+                Ok(c) => codes.push(c),
+                Err(code) => complain(self.renderer, self.sources, "", code, std::slice::from_ref(name)),
             }
         }
         codes

@@ -23,5 +23,5 @@ mod tests;
 pub use chunks::split_chunks;
 pub use format::{Case, FormatOptions, LeadingZeros, Renumber, format};
 pub use model::*;
-pub use symbols::{Label, Parameter, Statement, Symbol, Symbols, symbols};
+pub use symbols::{Label, Parameter, Statement, Symbol, Symbols, fanuc_call, symbols};
 pub use scan::{scan, scan_by_grammar};

@@ -263,6 +263,13 @@ fn members(set: &[u64]) -> Vec<u16> {
     (0..set.len() * 64).filter(|n| set[n / 64] >> (n % 64) & 1 == 1).map(|n| n as u16).collect()
 }
 
+/// What P of Fanuc's M98 says: the program, and how often where P itself says that. Up to four digits are the program's
+/// number; the digits in front of them (three on older controls, four on newer ones) are the number of calls. Beside L the
+/// whole of P is the number. (Fanuc Series 0i/30i, B-64484, subprogram call.)
+pub fn fanuc_call(p: i64, beside_l: bool) -> (i64, Option<i64>) {
+    if beside_l || p < 10_000 { (p, None) } else { (p % 10_000, Some(p / 10_000)) }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

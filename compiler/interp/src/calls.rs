@@ -129,6 +129,10 @@ impl<S: Sink> Interp<'_, S> {
             return Err(Fault::new(code::WORD_MISSING, rs274::RT_M98_P).arg("M98").arg("P").at(b'm'));
         };
         let number = whole(p).ok_or_else(|| not_whole(p).at(b'p'))?;
+        let (number, in_p) = match self.is_fanuc() {
+            true => gr_gcode::fanuc_call(number.into(), self.block.has(b'l')),
+            false => (number.into(), None),
+        };
         let name = self.symbols.of(&number.to_string());
         let label = Label { scope: GLOBAL, name };
         if self.skip.is_none() {
@@ -140,7 +144,7 @@ impl<S: Sink> Interp<'_, S> {
         if self.skipping_past(label) || self.skip.as_ref().is_some_and(|s| s.to_sub) || self.defining_sub {
             return Ok(());
         }
-        let repeats = self.block.get(b'l').map(to_int);
+        let repeats = self.block.get(b'l').map(to_int).or(in_p.map(|n| n as i32));
         self.call(label, CallKind::M98, [0.0; ARGS], 0, repeats)
     }
 

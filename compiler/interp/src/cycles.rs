@@ -190,7 +190,7 @@ impl<S: Sink> Interp<'_, S> {
         Ok(())
     }
 
-    fn restore_path_mode(&mut self, path: u8, [tolerance, naivecam]: [f64; 2]) {
+    pub(crate) fn restore_path_mode(&mut self, path: u8, [tolerance, naivecam]: [f64; 2]) {
         let mode = match path {
             1 => PathMode::ExactStop,
             2 => PathMode::Continuous(tolerance),

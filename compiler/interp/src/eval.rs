@@ -312,7 +312,7 @@ impl<S: Sink> Interp<'_, S> {
         if (1..crate::params::MAX).contains(&index) {
             Ok(index)
         } else {
-            Err(Fault::new(code::PARAMETER_NUMBER_RANGE, rs274::RT_PARAMETER_RANGE).arg(index))
+            Err(Fault::new(code::PARAMETER_NUMBER_RANGE, rs274::RT_PARAMETER_RANGE).arg(index).named(value.to_string()))
         }
     }
 

@@ -306,6 +306,9 @@ impl<S: Sink> Interp<'_, S> {
     /// Motion of the block.
     #[inline]
     pub(crate) fn convert_motion(&mut self, motion: i16) -> Res {
+        if self.config.any_indexer && self.index_motion(motion)? {
+            return Ok(());
+        }
         if matches!(motion, 0 | 10) {
             self.m.cycle_il_set = 0;
             return self.convert_straight(motion);

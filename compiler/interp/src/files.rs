@@ -298,6 +298,13 @@ impl IniReader<'_> {
         {
             if let Some(section) = self.section.clone().filter(|_| in_capitals(key)) {
                 let key = (section, key.to_ascii_lowercase());
+                if key.0 == "rs274ngc" && key.1 == "remap" {
+                    let earlier = self.ini.values.get(&key).map_or(&[][..], Vec::as_slice);
+                    for (wrong, what) in crate::remap::check_remap(value, earlier) {
+                        let code = if wrong { code::INI_REMAP } else { code::INI_REMAP_DOUBT };
+                        self.found.push(Diagnostic::new(code, self.file, blame.unwrap_or(span), &[what]));
+                    }
+                }
                 self.ini.values.entry(key).or_default().push(value.trim().to_string());
             }
         } else {

@@ -5,6 +5,7 @@ use gr_gcode::Scan;
 use gr_spec::{Rs274, code, rs274};
 use gr_text::Span;
 
+use crate::block::Group;
 use crate::{End, Fault, Interp};
 
 /// A fault or doubt, with its place.
@@ -55,8 +56,29 @@ impl<S: Sink> Interp<'_, S> {
         self.found(fault);
         // What the block was about to set is not set.
         self.settings.clear();
+        if self.setup.keep_going && !self.stands_in() {
+            self.recover();
+        }
         self.unwind();
         own || !self.setup.keep_going || self.findings.len() >= 100
+    }
+
+    /// One mistake, one message: blocks behind a move that failed count on its code, and on its end point.
+    fn recover(&mut self) {
+        let written = self.block.g(Group::Motion);
+        let motion = if written != -1 { i32::from(written) } else { self.m.motion };
+        let moves = matches!(motion, 0 | 10 | 20 | 30 | 50 | 51);
+        if !(moves || matches!(motion, 52 | 330 | 382..=385)) || !matches!(self.block.g(Group::NonModal), -1 | 40 | 530) {
+            return;
+        }
+        self.m.motion = motion;
+        if moves
+            && self.m.comp_side == 0
+            && let Ok(end) = self.find_ends()
+            && end.iter().all(|v| v.is_finite())
+        {
+            self.m.current = end;
+        }
     }
 
     /// Takes down a finding of the present block.

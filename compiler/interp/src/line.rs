@@ -106,6 +106,7 @@ impl<S: Sink> Interp<'_, S> {
     /// Lines with structure, faults, `%`, or while skipping.
     fn special_line(&mut self, scan: &Scan, text: &str, line: u32, words: &[Word]) -> Res {
         let at = scan.lines[line as usize];
+        self.block.clear();
         if at.faulty {
             let fault = self.text_fault(scan, line);
             let deleted = at.deleted && self.setup.block_delete;
@@ -128,7 +129,6 @@ impl<S: Sink> Interp<'_, S> {
         if at.deleted && self.setup.block_delete {
             return Ok(());
         }
-        self.block.clear();
         self.comment = None;
         self.settings.clear();
         let first = if words.first().is_some_and(|w| w.letter == b'n') { words.get(1) } else { words.first() };

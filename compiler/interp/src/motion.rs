@@ -1,6 +1,6 @@
 //! Straight moves, probing, and where the axis words lead.
 
-use gr_canon::{Axes, Call, Sink};
+use gr_canon::{Axes, Call, Plane, Sink};
 use gr_spec::{code, rs274};
 
 use crate::block::{AXES, AXIS_LETTERS, Group, letters};
@@ -185,6 +185,10 @@ impl<S: Sink> Interp<'_, S> {
             if self.block.g(Group::NonModal) == 530 {
                 let what = "is not possible while cutter compensation is on";
                 return Err(Fault::new(code::MOTION_G53, rs274::RT_G53_COMP).arg(what));
+            }
+            if !matches!(self.m.plane(), Plane::Xy | Plane::Xz) {
+                // G17.1, G18.1 and G19.1 are let through while compensation is on.
+                return Err(Fault::new(code::COMP_NOT_HERE, rs274::COMP_BUG_STRAIGHT).arg("the working plane is neither G17 nor G18"));
             }
             return if self.m.comp_first != 0 {
                 self.convert_straight_comp1(motion, end)

@@ -322,6 +322,7 @@ impl<S: Sink> Interp<'_, S> {
     pub(crate) fn convert_home(&mut self, g: i16) -> Res {
         let mut end = self.find_ends()?;
         not_with_comp(self.m.comp_side, rs274::RT_COMP_G28, "G28 or G30")?;
+        self.index_before(&end);
         self.emit(Call::StraightTraverse(end));
         self.m.current = end;
         let stored = self.stored_offset(if g == 280 { 5160 } else { 5180 });
@@ -335,6 +336,7 @@ impl<S: Sink> Interp<'_, S> {
         } else {
             end = home;
         }
+        self.index_before(&end);
         self.emit(Call::StraightTraverse(end));
         self.m.current = end;
         Ok(())

@@ -129,12 +129,22 @@ impl<S: Sink> Interp<'_, S> {
                 }
                 return Ok(());
             }
+            Form::Expr if !self.is_letter(w.letter) => return self.take_word(w.letter, 0.0),
             _ => match self.read_structured(scan, w)? {
                 Some(value) => value,
                 None => return Ok(()),
             },
         };
         self.take_word(w.letter, value)
+    }
+
+    /// Whether words of this letter exist here; the controller looks at the letter before the value.
+    fn is_letter(&self, letter: u8) -> bool {
+        !matches!(letter, b'u' | b'v' | b'w') || self.has_uvw()
+    }
+
+    fn has_uvw(&self) -> bool {
+        self.setup.uvw || self.in_contour || is_lathe(self.setup.dialect)
     }
 
     fn read_structured(&mut self, scan: &Scan, w: &Word) -> Res<Option<f64>> {
@@ -246,6 +256,14 @@ impl<S: Sink> Interp<'_, S> {
                 }
                 let n = whole(value).ok_or_else(|| not_whole(value).at(letter))?;
                 match letter {
+                    // Beyond what a number of a tool can be, the controller's own number runs over.
+                    b't' | b'h' if n < 0 && value > 0.0 => {
+                        let rs = if letter == b't' { rs274::RT_NEGATIVE_T } else { rs274::RT_NEGATIVE_H };
+                        return Err(Fault::new(code::TOOL_NOT_FOUND, rs).arg(value).at(letter));
+                    }
+                    b'l' if n < 0 && value > 0.0 => {
+                        return Err(Fault::new(code::WORD_BAD_VALUE, rs274::RT_NEGATIVE_L).arg("L").arg(value).at(letter));
+                    }
                     b't' if n < 0 => return negative(rs274::RT_NEGATIVE_T),
                     b'h' if n < -1 => return negative(rs274::RT_NEGATIVE_H),
                     b'l' if n < 0 => return negative(rs274::RT_NEGATIVE_L),
@@ -268,7 +286,7 @@ impl<S: Sink> Interp<'_, S> {
                 self.block.set(letter, f64::from(to_int(value)));
             }
             b'a' | b'b' | b'c' | b'd' | b'e' | b'i' | b'j' | b'k' | b'r' => self.put(letter, value)?,
-            b'u' | b'v' | b'w' if self.setup.uvw || self.in_contour || is_lathe(self.setup.dialect) => self.put(letter, value)?,
+            b'u' | b'v' | b'w' if self.has_uvw() => self.put(letter, value)?,
             _ => {
                 let shown = upper(letter).to_string();
                 return Err(Fault::new(code::SYNTAX_BAD_CHARACTER, rs274::BAD_CHARACTER)
@@ -292,6 +310,9 @@ impl<S: Sink> Interp<'_, S> {
         }
         if n > 999 {
             return Err(self.unknown_g(rs274::RT_G_OUT_OF_RANGE, value));
+        }
+        if n < 0 && value > 0.0 {
+            return Err(self.unknown_g(rs274::RT_NEGATIVE_G, value));
         }
         if n < 0 {
             return Err(Fault::new(code::WORD_NEGATIVE, rs274::RT_NEGATIVE_G).arg("G").at(b'g'));
@@ -336,6 +357,9 @@ impl<S: Sink> Interp<'_, S> {
 
     fn take_m(&mut self, value: f64) -> Res {
         let n = whole(value).ok_or_else(|| not_whole(value).at(b'm'))?;
+        if n < 0 && value > 0.0 {
+            return Err(Fault::new(code::CODE_UNKNOWN, rs274::RT_NEGATIVE_M).arg(format!("M{value}")).at(b'm'));
+        }
         if n < 0 {
             return Err(Fault::new(code::WORD_NEGATIVE, rs274::RT_NEGATIVE_M).arg("M").at(b'm'));
         }

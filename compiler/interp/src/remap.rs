@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use gr_canon::{Sink, Units};
+use gr_canon::{Sink, Units, Version};
 use gr_spec::{code, rs274};
 use rustc_hash::FxHashMap;
 
@@ -44,9 +44,10 @@ pub(crate) mod step {
 }
 
 /// A code that an INI file gives a subroutine of its own.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Remap {
     pub name: String,
+    code: Taken,
     pub group: i32,
     pub words: String,
     /// Empty: Python alone.
@@ -55,7 +56,95 @@ pub(crate) struct Remap {
     pub python: Vec<String>,
 }
 
+/// The code that a remap takes over.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) enum Taken {
+    /// Times ten.
+    G(i32),
+    M(i32),
+    /// T, S or F.
+    Word(char),
+    /// Something that can't be.
+    #[default]
+    None,
+}
+
 impl Remap {
+    /// `M400 modalgroup=10 argspec=Pq ngc=foo`, and what the controller only shakes its head at. `Err`: why it refuses to
+    /// start.
+    fn of(line: &str) -> Result<(Remap, Vec<String>), String> {
+        let line = line.split('#').next().unwrap_or("");
+        let mut parts = line.split_whitespace();
+        let name = parts.next().ok_or("it names no code")?;
+        let mut r = Remap { name: name.to_string(), group: -1, ..Remap::default() };
+        let mut doubts = Vec::new();
+        for part in parts {
+            let (key, value) = part.split_once('=').filter(|(_, v)| !v.is_empty()).ok_or_else(|| format!("`{part}` has no value"))?;
+            r.option(key, value, &mut doubts)?;
+        }
+        if r.sub.is_empty() && !r.has("python") {
+            return Err(format!("{name} gets no subroutine: add ngc=name"));
+        }
+        r.take(&mut doubts)?;
+        Ok((r, doubts))
+    }
+
+    fn has(&self, key: &str) -> bool {
+        self.part(key).is_some()
+    }
+
+    /// One `key=value`; keys may be shortened.
+    fn option(&mut self, key: &str, value: &str, doubts: &mut Vec<String>) -> Result<(), String> {
+        const KEYS: [&str; 6] = ["modalgroup", "argspec", "prolog", "epilog", "ngc", "python"];
+        let short = key.to_ascii_lowercase();
+        match KEYS.into_iter().find(|k| k.starts_with(&short)) {
+            Some("modalgroup") => self.group = leading_integer(value),
+            Some("argspec") => {
+                let known = |c: &char| c.is_ascii_alphabetic() && !matches!(c, 'o' | 'O') || matches!(c, '>' | '^' | '@');
+                if let Some(other) = value.chars().find(|c| !known(c)) {
+                    return Err(format!("argspec has the letter `{other}`, which is no word"));
+                }
+                self.words = value.to_string();
+            }
+            Some("ngc") if self.has("python") => return Err("a code gets a subroutine or Python, not both".into()),
+            Some("python") if !self.sub.is_empty() => return Err("a code gets a subroutine or Python, not both".into()),
+            Some("ngc") => self.sub = value.to_string(),
+            Some(key) => self.python.push(format!("{key}={value}")),
+            None => doubts.push(format!("there is no option `{key}`")),
+        }
+        Ok(())
+    }
+
+    /// Finds out which code is meant, and whether the group fits.
+    fn take(&mut self, doubts: &mut Vec<String>) -> Result<(), String> {
+        let name = self.name.clone();
+        let letter = name.chars().next().unwrap_or(' ').to_ascii_lowercase();
+        let number = &name[letter.len_utf8().min(name.len())..];
+        let given = self.group;
+        if given == -1 && matches!(letter, 'm' | 'g') {
+            self.group = if letter == 'm' { 10 } else { 1 };
+            doubts.push(format!("{name} has no modalgroup; {} is taken", self.group));
+        }
+        self.code = match letter {
+            't' | 's' | 'f' if !number.is_empty() => return Err(format!("{name}: only the letter alone can be remapped")),
+            't' | 's' | 'f' if given != -1 => return Err(format!("{name} takes no modalgroup")),
+            't' | 's' | 'f' => Taken::Word(letter),
+            'm' | 'g' if !number.starts_with(|c: char| c.is_ascii_digit()) => return Err(format!("`{name}` is no code")),
+            'm' if !(4..=10).contains(&self.group) => return Err(format!("modal group {} is not possible for an M-code: 4 to 10 are", self.group)),
+            'm' => Taken::M(leading_integer(number)),
+            'g' if self.group != 1 => return Err(format!("modal group {} is not possible for a G-code: 1 is", self.group)),
+            'g' => {
+                let tenth = number.split_once('.').filter(|(_, t)| t.starts_with(|c: char| c.is_ascii_digit())).map_or(0, |(_, t)| leading_integer(t));
+                Taken::G(leading_integer(number).saturating_mul(10).saturating_add(tenth))
+            }
+            _ => {
+                doubts.push(format!("`{name}` can't be remapped"));
+                Taken::None
+            }
+        };
+        Ok(())
+    }
+
     /// The function of a part of this kind.
     fn part(&self, key: &str) -> Option<&str> {
         self.python.iter().find_map(|p| p.strip_prefix(key)?.strip_prefix('='))
@@ -69,6 +158,9 @@ pub(crate) struct Config {
     pub random: bool,
     pub wrapped: [bool; 3],
     any_wrapped: bool,
+    /// Joint number of rotary axes that lock (`LOCKING_INDEXER_JOINT`).
+    pub indexers: [Option<i32>; 3],
+    pub any_indexer: bool,
     pub change_at_g30: bool,
     pub change_quill_up: bool,
     pub change_with_spindle_on: bool,
@@ -91,7 +183,8 @@ impl Config {
         let mut c = Config {
             spindles: ini.number("traj", "spindles").map_or(1, |n| (n as i32).clamp(0, crate::state::SPINDLES as i32)),
             random: flag("emcio", "random_toolchanger"),
-            wrapped: ["axis_a", "axis_b", "axis_c"].map(|s| flag(s, "wrapped_rotary")),
+            wrapped: ["axis_a", "axis_b", "axis_c"].map(|s| truth(ini.get(s, "wrapped_rotary"), setup.version)),
+            indexers: ["axis_a", "axis_b", "axis_c"].map(|s| ini.get(s, "locking_indexer_joint").map(leading_integer).filter(|n| *n != -1)),
             change_at_g30: flag("emcio", "tool_change_at_g30"),
             change_quill_up: flag("emcio", "tool_change_quill_up"),
             change_with_spindle_on: flag("emcio", "tool_change_with_spindle_on"),
@@ -102,6 +195,7 @@ impl Config {
             orient_offset: ini.number("rs274ngc", "orient_offset").unwrap_or(0.0),
             ..Config::default()
         };
+        c.any_indexer = c.indexers.iter().any(Option::is_some);
         c.any_wrapped = c.wrapped.iter().any(|w| *w);
         for line in ini.all("rs274ngc", "remap") {
             c.add_remap(line, setup.without_python);
@@ -109,49 +203,16 @@ impl Config {
         c
     }
 
-    /// `M400 modalgroup=10 argspec=Pq ngc=foo`
     fn add_remap(&mut self, line: &str, without_python: bool) {
-        let line = line.split('#').next().unwrap_or("");
-        let mut parts = line.split_whitespace();
-        let Some(name) = parts.next() else { return };
-        let mut r = Remap { name: name.to_string(), group: -1, words: String::new(), sub: String::new(), python: Vec::new() };
-        for part in parts {
-            let Some((key, value)) = part.split_once('=') else { return };
-            match key.to_ascii_lowercase().as_str() {
-                "modalgroup" => r.group = value.parse().unwrap_or(-1),
-                "argspec" => r.words = value.to_string(),
-                "ngc" => r.sub = value.to_string(),
-                key @ ("python" | "py" | "prolog" | "epilog") if without_python => r.python.push(format!("{key}={value}")),
-                _ => return,
-            }
-        }
-        if r.sub.is_empty() && r.python.is_empty() {
+        let Ok((r, _)) = Remap::of(line) else { return };
+        if !without_python && !r.python.is_empty() {
             return;
         }
-        let letter = name.chars().next().unwrap_or(' ').to_ascii_lowercase();
-        let number = &name[letter.len_utf8().min(name.len())..];
-        match letter {
-            't' | 's' | 'f' if number.is_empty() => {
-                self.words.insert(letter, r);
-            }
-            'm' => {
-                if r.group == -1 {
-                    r.group = 10;
-                }
-                if let (Ok(n), 4..=10) = (number.parse(), r.group) {
-                    self.m.insert(n, r);
-                }
-            }
-            'g' => {
-                if r.group == -1 {
-                    r.group = 1;
-                }
-                let (whole, tenth) = number.split_once('.').unwrap_or((number, "0"));
-                if let (Ok(a), Ok(b), 1) = (whole.parse::<i32>(), tenth.parse::<i32>(), r.group) {
-                    self.g.insert(a * 10 + b, r);
-                }
-            }
-            _ => {}
+        match r.code {
+            Taken::G(n) => drop(self.g.insert(n, r)),
+            Taken::M(n) => drop(self.m.insert(n, r)),
+            Taken::Word(letter) => drop(self.words.insert(letter, r)),
+            Taken::None => {}
         }
     }
 
@@ -170,6 +231,45 @@ impl Config {
     pub fn wrapped(&self) -> bool {
         self.any_wrapped
     }
+}
+
+/// The whole number that a text begins with, 0 where it begins with something else.
+fn leading_integer(text: &str) -> i32 {
+    let text = text.trim_start();
+    let (sign, digits) = text.strip_prefix('-').map_or((1, text), |rest| (-1, rest));
+    let end = digits.find(|c: char| !c.is_ascii_digit()).unwrap_or(digits.len());
+    digits[..end].parse::<i32>().map_or(0, |n| sign * n)
+}
+
+/// A switch that 2.9 reads as a number alone.
+fn truth(value: Option<&str>, version: Version) -> bool {
+    let Some(value) = value.map(|v| v.trim().to_ascii_lowercase()) else { return false };
+    let word = version == Version::V2_10 && matches!(value.as_str(), "yes" | "true" | "on");
+    word || value.parse::<i32>().is_ok_and(|n| n != 0)
+}
+
+/// REMAP lines of an INI file: for each of those that go before `line` have been seen. What is wrong (true) or doubtful
+/// (false) with one.
+pub(crate) fn check_remap(line: &str, earlier: &[String]) -> Vec<(bool, String)> {
+    match Remap::of(line) {
+        Err(why) => vec![(true, why)],
+        Ok((r, doubts)) => {
+            let name = |l: &String| l.split_whitespace().next().is_some_and(|n| n.eq_ignore_ascii_case(&r.name));
+            let twice = earlier.iter().any(name).then(|| (true, format!("{} is remapped already", r.name)));
+            twice.into_iter().chain(doubts.into_iter().map(|d| (false, d))).collect()
+        }
+    }
+}
+
+/// REMAP lines whose subroutine is nowhere, with the name of its file.
+pub fn remaps_without_file<'s>(setup: &'s Setup, there: &dyn Fn(&std::path::Path) -> bool) -> Vec<(&'s str, String)> {
+    let lines = setup.ini.all("rs274ngc", "remap");
+    let missing = |line: &'s String| {
+        let (r, _) = Remap::of(line).ok().filter(|(r, _)| !r.sub.is_empty())?;
+        let found = subroutine_paths(setup, &r.sub).iter().any(|p| there(p));
+        (!found).then(|| (line.as_str(), format!("{}.ngc", r.sub)))
+    };
+    lines.iter().filter_map(missing).collect()
 }
 
 fn m_remappable(m: i32) -> bool {

@@ -482,7 +482,7 @@ impl<'a, S: Sink> Interp<'a, S> {
     }
 
     /// Stands in for `rs274`: told to go on after an error, it does so with whatever the controller is left with.
-    fn stands_in(&self) -> bool {
+    pub(crate) fn stands_in(&self) -> bool {
         self.setup.keep_going && !self.setup.startup_code
     }
 

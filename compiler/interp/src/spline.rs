@@ -83,7 +83,10 @@ impl<S: Sink> Interp<'_, S> {
     }
 
     fn send_spline(&mut self, order: u32, points: &[[f64; 2]]) {
-        let points = points.iter().map(|p| [p[0], p[1], 1.0]).collect();
+        // Points of a G5.2 that no G5.3 has ended are still in the controller's list.
+        let mut all = std::mem::take(&mut self.queue.spline.points);
+        all.extend(points.iter().map(|p| [p[0], p[1], 1.0]));
+        let points = all;
         self.emit(Call::NurbsFeed(Box::new(Nurbs { order, points, plane: self.spline_plane(), knots: Vec::new() })));
     }
 

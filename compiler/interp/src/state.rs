@@ -222,7 +222,7 @@ impl State {
         modal.pocket = 1;
         modal.origin_index = 1;
         modal.n_number = -1;
-        State { modal, queue: Queue::default(), world: World::new(), saved: None, tools: None, world_tools: None }
+        State { modal, queue: Queue::default(), world: World::new(!setup.startup_code), saved: None, tools: None, world_tools: None }
     }
     /// The bytes that make two states the same state (`-0.0` counts as `0.0`).
     pub fn key_bytes(&self) -> Vec<u8> {

@@ -55,7 +55,7 @@ pub fn is_stop(scan: &Scan, line: u32) -> bool {
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Statement {
     keyword: Keyword,
-    /// As written, in lower case.
+    /// As the controller compares it.
     label: Box<str>,
     /// Line.
     pub line: u32,
@@ -70,13 +70,21 @@ impl Statement {
     }
 }
 
+/// In lower case, without blanks and without zeros in front of a number.
+fn plain_label(text: &str) -> Box<str> {
+    let label: String = text.chars().filter(|c| !matches!(c, ' ' | '\t')).map(|c| c.to_ascii_lowercase()).collect();
+    let number = !label.is_empty() && label.bytes().all(|b| b.is_ascii_digit());
+    let rest = label.trim_start_matches('0');
+    if number && !rest.is_empty() { rest.into() } else { label.into() }
+}
+
 /// The statement on a line of a chunk.
 pub fn statement(scan: &Scan, text: &str, line: u32) -> Option<Statement> {
     let word = first_real(scan.words(line)).filter(|w| w.form == Form::Control && w.letter == b'o')?;
     let control = scan.controls.get(word.index())?;
     let start = scan.lines.get(line as usize)?.start;
     let span = Span::new(control.span.start.saturating_sub(start), control.span.end.saturating_sub(start));
-    let label = text.get(control.label_span.range()).unwrap_or("").to_ascii_lowercase().into();
+    let label = plain_label(text.get(control.label_span.range()).unwrap_or(""));
     Some(Statement { keyword: control.keyword, label, line, span })
 }
 

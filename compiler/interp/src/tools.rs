@@ -103,6 +103,7 @@ impl<S: Sink> Interp<'_, S> {
 
     fn hidden_move(&mut self, to: Axes) {
         self.emit(Call::Comment("AXIS,hide".into()));
+        self.index_before(&to);
         self.emit(Call::StraightTraverse(to));
         self.emit(Call::Comment("AXIS,show".into()));
     }

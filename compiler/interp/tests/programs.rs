@@ -725,3 +725,119 @@ fn a_cycle_of_too_many_moves_is_endless() {
         assert!(told, "{text}: {:?}", outcome.findings);
     }
 }
+
+/// Fanuc B-64484: digits in front of the last four of P are the number of calls, unless L gives it.
+#[test]
+fn fanuc_repeats_in_p() {
+    let subs = "O1000\nG91 G0 X1.\nM99\nO51000\nG91 G0 X100.\nM99\n";
+    for (call, x) in [
+        ("M98 P1000", "1"),
+        ("M98 P00051000", "5"),
+        ("M98 P0051000", "5"),
+        ("M98 P51000", "5"),
+        ("M98 P1000 L3", "3"),
+        ("M98 P51000 L2", "200"),
+        ("M98 P01000", "1"),
+    ] {
+        let (calls, outcome) = run_fanuc("fanuc-mill", &format!("G21 G90\n{call}\nM30\n{subs}"));
+        assert!(outcome.ok(), "{call}: {:?}", outcome.findings);
+        assert_eq!(moves_of(&calls).last().map(String::as_str), Some(format!("rapid {x} 0 0").as_str()), "{call}");
+    }
+    let (_, outcome) = run_fanuc("fanuc-turn", "M98 P20003\nM30\nO1\nM99\n");
+    assert_eq!((outcome.findings[0].fault.code, outcome.findings[0].fault.message_args()[0].as_str()), (code::SUB_NOT_FOUND, "3"));
+}
+
+/// Blocks behind a faulty move are read as they are meant: one mistake, one message.
+#[test]
+fn one_mistake_one_finding() {
+    let setup = Setup { keep_going: true, startup_code: true, ..setup() };
+    for text in [
+        "G5.2 P1 L3 X1\nX2 Y3 P1\nX4 Y5 P1\nX7 Y8 P1\nG5.3\nG1 X3\n",
+        "G5.2 P1 L3 X1 Y2 Q%\nX2 Y3 P1\nX4 Y5 P1\nX7 Y8 P1\nG5.3\nG1 X3\n",
+        "G2 X10 Y0 I4 J0\nG2 X20 Y0 I5 J0\nG2 X30 Y0 I5 J0\n",
+        "G3 X1\nX3 I1\n",
+        "G91 G2 X10 Y0 I4 J0\nX10 I5\nG90 G2 X30 Y0 I5\n",
+        "G5 X3 Y4 I1 P0 Q1\nX4 Y5 P1 Q1\n",
+    ] {
+        let (_, outcome) = run_with(&setup, &format!("G21 G90 G17 F100\nG0 X0 Y0\n{text}M2\n"), 100);
+        let errors: Vec<_> = outcome.findings.iter().filter(|f| f.fault.rs.is_some()).collect();
+        assert_eq!(errors.len(), 1, "{text}: {errors:?}");
+    }
+}
+
+/// `rs274 -i` beside it: axes that lock turn alone, by G0, at an exact stop.
+#[test]
+fn locking_rotary_axes() {
+    let (ini, found) = gr_interp::read_ini("[AXIS_A]\nLOCKING_INDEXER_JOINT = 3\n", gr_canon::FileId(0), None, None);
+    assert!(found.is_empty());
+    let setup = Setup { ini, ..setup() };
+    let text = "g0 a10\ng61\ng91 g0 a5\ng28.1\ng90 g0 a1\nf10 g1 x1\ng28 x1 a4\nm2\n";
+    let (out, outcome) = run_with(&setup, text, 100);
+    assert!(outcome.ok(), "{:?}", outcome.findings);
+    let calls: Vec<&str> = out.lines().skip(6).filter_map(|l| l.split_once("N..... ")).map(|(_, c)| c).filter(|c| !c.starts_with("COMMENT")).collect();
+    let turn = |a: &str| format!("STRAIGHT_TRAVERSE(0.0000, 0.0000, 0.0000, {a}, 0.0000, 0.0000)");
+    assert_eq!(calls[0], "SET_MOTION_CONTROL_MODE(CANON_EXACT_PATH)");
+    assert_eq!(calls[1], turn("10.0000"));
+    assert_eq!(calls[2..5], ["SET_MOTION_CONTROL_MODE(CANON_CONTINUOUS, 0.000000)", "SET_NAIVECAM_TOLERANCE(0.0000)", "SET_MOTION_CONTROL_MODE(CANON_EXACT_PATH)"]);
+    assert_eq!(calls[5..7], [turn("15.0000"), turn("1.0000")]);
+    for (text, wanted) in [
+        ("g0 a10\ng1 f1 a20\nm2\n", "Indexing axis A can only be moved with G0"),
+        ("g0 a10 x1\nm2\n", "Indexing axis A can only be moved alone"),
+        ("g0 a10 b1\nm2\n", "Indexing axis A can only be moved alone"),
+    ] {
+        let (_, outcome) = run_with(&setup, text, 100);
+        let fault = &outcome.findings[0].fault;
+        assert_eq!((fault.code, fault.rs_text().as_deref()), (code::AXIS_INDEXER, Some(wanted)), "{text}");
+    }
+}
+
+/// Why the controller refuses to start with a REMAP, or what it only remarks (`rs274 -i`).
+#[test]
+fn remaps_are_checked() {
+    for (line, wanted) in [
+        ("M400 modalgroup=10 ngc=a", ""),
+        ("M400 m=10 n=a", ""),
+        ("M400 modalgroup=10 prolog=a ngc=a", ""),
+        ("M400 modalgroup=99 ngc=a", "error"),
+        ("M400 modalgroup=10 argspec=- ngc=a", "error"),
+        ("M400 modalgroup=10", "error"),
+        ("M400 modalgroup=10 ngc=a py=b", "error"),
+        ("M400 modalgroup=10 ngc=", "error"),
+        ("G81 modalgroup=2 ngc=a", "error"),
+        ("T modalgroup=10 ngc=a", "error"),
+        ("Mx modalgroup=10 ngc=a", "error"),
+        ("M400 ngc=a", "warning"),
+        ("M400 modalgroup=10 ngc=a foo=bar", "warning"),
+        ("X5 ngc=a", "warning"),
+        ("M400 modalgroup=10 ngc=a\nREMAP = m400 modalgroup=10 ngc=a", "error"),
+    ] {
+        let text = format!("[RS274NGC]\nREMAP = {line}\n");
+        let (_, found) = gr_interp::read_ini(&text, gr_canon::FileId(0), None, None);
+        let told: Vec<_> = found.iter().map(|d| d.code).collect();
+        let code = match wanted {
+            "error" => vec![code::INI_REMAP],
+            "warning" => vec![code::INI_REMAP_DOUBT],
+            _ => vec![],
+        };
+        assert_eq!(told, code, "{line}: {found:?}");
+    }
+}
+
+/// 2.9 takes `WRAPPED_ROTARY` for a number; 2.10 knows words too.
+#[test]
+fn wrapped_is_a_number_in_2_9() {
+    for (value, version, wraps) in [("1", Version::V2_9, true), ("TRUE", Version::V2_9, false), ("yes", Version::V2_10, true), ("0", Version::V2_10, false)] {
+        let (ini, _) = gr_interp::read_ini(&format!("[AXIS_A]\nWRAPPED_ROTARY = {value}\n"), gr_canon::FileId(0), None, None);
+        let (_, outcome) = run_with(&Setup { ini, version, ..setup() }, "g0 a350\na370\nm2\n", 100);
+        assert_eq!(!outcome.ok(), wraps, "{value}");
+    }
+}
+
+/// Blanks in labels, and zeros in front of numbers, don't count.
+#[test]
+fn labels_with_blanks_are_closed() {
+    for text in ["o 1 0 if [1]\no10 endif\nm2\n", "o< ab>sub\no<ab>endsub\no<a b>call\nm2\n", "o01 repeat [2]\no1 endrepeat\nm2\n"] {
+        let (_, outcome) = run_with(&setup(), text, 100);
+        assert!(outcome.findings.is_empty(), "{text}: {:?}", outcome.findings);
+    }
+}

@@ -352,7 +352,8 @@ fn file_name(source: &Path, target: &TargetDef) -> String {
 }
 
 /// Options of a target in the project file, read like those of the command line.
-fn options_of(table: &toml::Table) -> Result<TargetOptions, String> {
+/// Options of a target as a project file has them.
+pub fn options_of(table: &toml::Table) -> Result<TargetOptions, String> {
     #[derive(clap::Parser)]
     #[command(no_binary_name = true, disable_help_flag = true)]
     struct Line {

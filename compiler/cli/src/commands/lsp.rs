@@ -126,16 +126,20 @@ impl Host for Editor {
     }
 
     fn check_project(&self, path: &Path, text: &str) -> Vec<Diagnostic> {
-        let mut found: Vec<Diagnostic> = Project::parse(path, FileId(0), text).err().map(|d| *d).into_iter().collect();
-        if found.is_empty() {
-            // What its names lead to: dialects, machines, lints and files that are not there. As it is on disk.
-            let (_, sources, more) = own_station(path, &Settings::default());
-            let here = |d: &Diagnostic| sources.get(d.primary().0).is_none_or(|f| Path::new(&f.name) == path || f.text.is_empty());
-            found.extend(more.into_iter().filter(here).map(|d| match named_in(text, &d) {
-                Some(place) => placed(d, place),
-                None => d,
-            }));
-        }
+        let project = match Project::parse(path, FileId(0), text) {
+            Ok(project) => project,
+            Err(d) => return vec![*d],
+        };
+        let mut found = project.faults(FileId(0), text);
+        // What its names lead to: machines and files that are not there. As it is on disk.
+        let (on_disk, sources, more) = own_station(path, &Settings::default());
+        let told = on_disk.project.and_then(|p| Some(p.faults(FileId(0), &crate::sources::read(path).ok()?.text))).unwrap_or_default();
+        let own = |d: &Diagnostic| told.iter().any(|t| (t.code, &t.message) == (d.code, &d.message));
+        let here = |d: &Diagnostic| sources.get(d.primary().0).is_none_or(|f| Path::new(&f.name) == path || f.text.is_empty());
+        found.extend(more.into_iter().filter(|d| here(d) && !own(d)).map(|d| match named_in(text, &d) {
+            Some(place) => placed(d, place),
+            None => d,
+        }));
         found
     }
 

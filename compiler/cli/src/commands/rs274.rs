@@ -12,7 +12,7 @@ use gr_driver::Loaded;
 use gr_gcode::Chunk;
 use gr_interp::{End, Finding, Interp, Setup, ToolTable};
 use gr_spec::{Dialect, Rs274, fill, rs274};
-use gr_text::{FileId, decode, decode_as_linuxcnc};
+use gr_text::{FileId, code, decode, decode_as_linuxcnc};
 
 use crate::sources::is_latin1;
 
@@ -285,7 +285,13 @@ fn execute(choice: &Choice) -> Result<u8, Quit> {
     };
     let program = program(choice);
     let mut printer = printer(choice, program.latin1)?;
-    let mut setup = setup(choice, tools);
+    let (mut setup, refused) = setup(choice, tools);
+    if !refused.is_empty() {
+        printer.flush();
+        refused.iter().for_each(|text| eprintln!("{text}"));
+        eprintln!("{}\n", rs274::CLI_UNKNOWN_ERROR.text());
+        return Err(Quit(1));
+    }
     let stored = match parameters(choice) {
         Ok(stored) => stored,
         Err(text) => {
@@ -395,7 +401,8 @@ fn printer(choice: &Choice, latin1: bool) -> Result<Out, Quit> {
     Ok(if to_file { printer.prints_to(Box::new(std::io::stdout())) } else { printer })
 }
 
-fn setup(choice: &Choice, tools: ToolTable) -> Setup {
+/// Settings, and why the INI file does not let the interpreter start.
+fn setup(choice: &Choice, tools: ToolTable) -> (Setup, Vec<String>) {
     let mut setup = Setup {
         without_python: false,
         dialect: dialect(choice.version),
@@ -409,9 +416,16 @@ fn setup(choice: &Choice, tools: ToolTable) -> Setup {
         keep_going: choice.on_error != OnError::Stop,
         ..Setup::default()
     };
+    let mut refused = Vec::new();
     if let Some(path) = &choice.ini {
         match std::fs::read(path) {
-            Ok(bytes) => setup.ini = gr_interp::read_ini(&decode(bytes).text, FileId(0), path.parent(), None).0,
+            Ok(bytes) => {
+                let (ini, found) = gr_interp::read_ini(&decode(bytes).text, FileId(0), path.parent(), None);
+                setup.ini = ini;
+                refused.extend(found.into_iter().filter(|d| d.code == code::INI_REMAP).map(|d| d.message));
+                let missing = gr_interp::remaps_without_file(&setup, &|p| p.is_file());
+                refused.extend(missing.into_iter().map(|(line, _)| fill(rs274::CLI_REMAP_FILE.text(), &[line.to_string()])));
+            }
             Err(_) => say(rs274::CLI_INI_FAILED, &[path.display().to_string()]),
         }
     }
@@ -420,7 +434,7 @@ fn setup(choice: &Choice, tools: ToolTable) -> Setup {
     {
         setup.machine_units = units;
     }
-    setup
+    (setup, refused)
 }
 
 /// Stored parameters; a file that is not there holds none.

@@ -3,7 +3,7 @@
 
 use std::ops::Range;
 
-use gr_gcode::{Form, Keyword, Label, Parameter, Symbols};
+use gr_gcode::{Form, Keyword, Label, Parameter, Symbols, Word};
 use gr_text::Span;
 
 use super::doc::{Doc, LineOf};
@@ -211,7 +211,11 @@ fn plain_words(doc: Doc<'_>, lines: Range<u32>, found: &mut Vec<(Name, Occurrenc
             let name = match w.letter {
                 b'n' => (Name::Line(w.value as i64), Role::Definition),
                 b't' => (Name::Tool(w.value as i64), Role::Read),
-                b'p' if calls => (Name::Sub(Label::Number(w.value as i64)), Role::Read),
+                b'p' if calls => {
+                    let (number, span) = called(doc, &line, w);
+                    found.push((Name::Sub(Label::Number(number)), Occurrence { span, role: Role::Read }, line.line));
+                    continue;
+                }
                 b'p' if jumps => (Name::Line(w.value as i64), Role::Read),
                 _ => continue,
             };
@@ -221,6 +225,21 @@ fn plain_words(doc: Doc<'_>, lines: Range<u32>, found: &mut Vec<(Name, Occurrenc
             found.push((name.0, Occurrence { span: Span::new(span.start + lead, span.end), role: name.1 }, line.line));
         }
     }
+}
+
+/// The program that P of an M98 names, and its digits.
+fn called(doc: Doc<'_>, line: &LineOf<'_>, p: &Word) -> (i64, Span) {
+    let span = line.tight(p);
+    let text = line.slice(span);
+    let lead = 1 + text[1..].len() as u32 - text[1..].trim_start().len() as u32;
+    let whole = Span::new(span.start + lead, span.end);
+    if doc.dialect.family != gr_spec::Family::Fanuc {
+        return (p.value as i64, whole);
+    }
+    let (number, repeats) = gr_gcode::fanuc_call(p.value as i64, line.literal(b'l').is_some());
+    let digits = text.bytes().rev().take_while(u8::is_ascii_digit).count() as u32;
+    let number_only = repeats.is_some() && digits > 4;
+    (number, if number_only { Span::new(span.end - 4, span.end) } else { whole })
 }
 
 /// What the name at a byte is, and its bytes.
@@ -405,8 +424,8 @@ pub fn calls(doc: Doc<'_>) -> Vec<CallSite> {
         let first = doc.file.first_lines[chunk.0];
         for line in doc.lines(first..first + chunk.1.scan.lines.len() as u32).filter(|l| l.has_code(b'm', 980)) {
             if let Some(p) = line.literal(b'p') {
-                let span = line.tight(p);
-                take(Label::Number(p.value as i64), Span::new(span.start + 1, span.end), line.line);
+                let (number, span) = called(doc, &line, p);
+                take(Label::Number(number), span, line.line);
             }
         }
     }
