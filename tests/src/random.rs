@@ -47,6 +47,7 @@ pub enum Step {
     Deleted(i8),
     Stop(bool),
     Thread { kind: u8, depth: u8, pitch: u8 },
+    Data { kind: u8, tool: u8, offsets: Vec<(u8, i8)>, radius: Option<u8>, angles: Option<(i8, i8)>, orientation: Option<u8>, apply: u8 },
 }
 
 /// An expression.
@@ -107,6 +108,16 @@ fn plain() -> impl Strategy<Value = Step> {
         2 => (0..5_u8, small(), small(), small()).prop_map(|(kind, x, y, z)| Step::Shift { kind, x, y, z }),
         1 => (0..6_u8).prop_map(Step::Length),
         1 => (0..5_u8).prop_map(Step::Tool),
+        2 => (
+            0..3_u8,
+            0..6_u8,
+            prop::collection::vec((0..6_u8, small()), 0..4),
+            prop::option::of(0..30_u8),
+            prop::option::of((small(), small())),
+            prop::option::of(0..10_u8),
+            0..4_u8,
+        )
+            .prop_map(|(kind, tool, offsets, radius, angles, orientation, apply)| Step::Data { kind, tool, offsets, radius, angles, orientation, apply }),
         3 => (any::<bool>(), any::<bool>(), 1..4_u8, prop::collection::vec((0..5_u8, -150..150_i16, 8..40_u8), 1..8))
             .prop_map(|(left, dynamic, tool, moves)| Step::Contour { left, dynamic, tool, moves }),
         1 => (0..6_u8).prop_map(Step::Spindle),
@@ -577,6 +588,37 @@ impl Writer {
                 self.modes();
                 self.settle();
             }
+            Step::Data { kind, tool, offsets, radius, angles, orientation, apply } => {
+                let tool = [1, 2, 3, 5, 7, 20][usize::from(*tool)];
+                let mut words = String::new();
+                let mut seen = 0;
+                for (axis, v) in offsets {
+                    if seen & (1 << axis) != 0 {
+                        continue;
+                    }
+                    seen |= 1 << axis;
+                    let v = if *axis < 3 { show(self.len(f64::from(*v))) } else { v.to_string() };
+                    let _ = write!(words, " {}{v}", char::from(b"XYZABC"[usize::from(*axis)]));
+                }
+                if let Some(r) = radius {
+                    let _ = write!(words, " R{}", show(self.len(f64::from(*r) / 4.0)));
+                }
+                if let Some((i, j)) = angles {
+                    let _ = write!(words, " I{i} J{j}");
+                }
+                if let Some(q) = orientation {
+                    let _ = write!(words, " Q{q}");
+                }
+                self.line(&format!("G10 L{} P{tool}{words}", [1, 10, 11][usize::from(*kind)]));
+                match apply {
+                    0 => {}
+                    1 => self.line(&format!("G43 H{tool}")),
+                    2 => self.line(&format!("T{tool} M6 G43")),
+                    _ => self.line(&format!("G43.2 H{tool}")),
+                }
+                self.line("(debug,#5400 #5401 #5402 #5403 #5404 #5410 #5411 #5412 #5413)");
+                self.settle();
+            }
             Step::Rotary { a, b, c } => {
                 let words = self.by([Some(self.len(10.0)), None, None]);
                 self.line(&format!("G1{words} A{a} B{b} C{c}"));
@@ -735,6 +777,30 @@ impl Writer {
             Expr::Atan(a, b) => format!("ATAN[{}]/[{}]", self.expression(a), self.expression(b)),
         }
     }
+}
+
+/// A tool table with offsets in several axes, diameters, angles and orientations, inches; the same for the same number.
+pub fn tools(seed: u32) -> String {
+    let mut state = seed | 1;
+    let mut next = |n: u32| {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (state >> 8) % n
+    };
+    let mut out = String::new();
+    for (pocket, tool) in [1, 2, 3, 5, 7, 20].into_iter().enumerate() {
+        let _ = write!(out, "T{tool} P{}", pocket + 1);
+        for axis in "XYZABCUVW".chars() {
+            if axis == 'Z' || next(4) == 0 {
+                let _ = write!(out, " {axis}{:+.4}", (f64::from(next(40_000)) - 20_000.0) / 10_000.0);
+            }
+        }
+        let _ = write!(out, " D{:.4}", f64::from(next(4000)) / 10_000.0);
+        if next(3) == 0 {
+            let _ = write!(out, " I{} J{} Q{}", next(180), next(180), next(10));
+        }
+        out.push('\n');
+    }
+    out
 }
 
 /// The program of these steps.

@@ -80,3 +80,55 @@ fn many_files_and_workers() {
     assert_eq!(check("1"), check("2"));
     assert_eq!(check("2"), check("4"));
 }
+
+/// Robot programs and what is made of STEP-NC files: twice, into two folders.
+#[test]
+fn robots_and_process_plans_twice() {
+    let dir = tempfile::tempdir().expect("a temporary folder");
+    let examples = root().join("docs/examples");
+    for name in ["bracket.ngc", "irb2400-cell.toml", "tools.tbl", "stepnc/case-study.p21"] {
+        let from = examples.join(name);
+        std::fs::copy(&from, dir.path().join(from.file_name().expect("a name"))).expect("writable");
+    }
+    let twice = |args: &[&str]| {
+        let made: Vec<_> = ["one", "two"]
+            .into_iter()
+            .map(|out| {
+                let folder = format!("{out}-{}/", args.join("-").replace(['/', '.'], "_"));
+                let ended = robot(dir.path(), &[args, &["-o", &folder]].concat());
+                (ended.status, ended.errors().replace(&folder, "OUT/"), files(&dir.path().join(&folder)))
+            })
+            .collect();
+        assert!(made[0] == made[1], "{args:?}: other bytes the second time");
+        !made[0].2.is_empty()
+    };
+    let languages = ["rapid", "krl", "fanuc-ls", "urscript", "inform", "val3", "vplus", "kawasaki-as", "pdl2", "delmia-xml", "melfa", "spel", "nachi", "denso-pac", "setpoints"];
+    let made = languages.iter().filter(|l| twice(&["build", "bracket.ngc", "--machine", "irb2400-cell.toml", "--allow-unverified", "--target", l])).count();
+    assert!(made > 8, "only {made} languages made something");
+    for target in ["rs274ngc", "canon", "motion", "plan", "plan-json", "svg", "sheet", "sheet-html", "json", "csv"] {
+        assert!(twice(&["build", "case-study.p21", "--target", target]), "{target}");
+    }
+    assert!(twice(&["build", "bracket.ngc", "--target", "stepnc", "--tools", "tools.tbl"]));
+}
+
+/// What is told of a file does not depend on the files beside it, nor on their order.
+#[test]
+fn order_of_files() {
+    let dir = tempfile::tempdir().expect("a temporary folder");
+    for (name, text) in [("a/x.ngc", "G21\nG1 X1\nM2\n"), ("b/y.ngc", "G21 G90\nG2 X1 I3 J0 F100\nM2\n"), ("b/z.ngc", "G21 G90\nG0 X1\nM2\n")] {
+        let path = dir.path().join(name);
+        std::fs::create_dir_all(path.parent().expect("a folder")).expect("writable");
+        std::fs::write(path, text).expect("writable");
+    }
+    let check = |args: &[&str]| {
+        let ended = robot(dir.path(), &[&["check", "--message-format", "json"], args].concat());
+        let mut lines: Vec<String> = ended.output().lines().map(str::to_string).collect();
+        lines.sort();
+        (ended.status, lines)
+    };
+    let first = check(&["-j", "1", "a", "b"]);
+    assert_eq!(first.0, Some(1));
+    for args in [&["-j", "1", "b", "a"][..], &["-j", "8", "a", "b"], &["-j", "8", "b/z.ngc", "b/y.ngc", "a"]] {
+        assert_eq!(check(args), first, "{args:?}");
+    }
+}

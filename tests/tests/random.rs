@@ -4,7 +4,7 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use gr_tests::oracle::{Job, Verdict, compare, differ, kept, message, normalised, reference, score};
-use gr_tests::random::{programs, write};
+use gr_tests::random::{programs, tools, write};
 use proptest::test_runner::{Config, RngAlgorithm, TestError, TestRng, TestRunner};
 
 fn wanted() -> u32 {
@@ -12,9 +12,12 @@ fn wanted() -> u32 {
     set.unwrap_or(if std::env::var_os("CI").is_some() { 10_000 } else { 600 })
 }
 
-/// A tenth of the programs also goes through with block delete.
+/// A tenth of the programs also goes through with block delete, a third with a tool table of its own.
 fn job(text: String) -> Job {
     let mut job = Job::new(text);
+    if job.program.len() % 3 == 0 {
+        job.tools = Some(tools(u32::try_from(job.program.len()).unwrap_or(0)));
+    }
     if job.program.len() % 10 == 0 {
         job.options = vec!["-b".into()];
     }
@@ -79,6 +82,7 @@ fn random_programs() {
         let name = format!("random-{:08x}.ngc", text.bytes().fold(0x811c_9dc5_u32, |h, b| (h ^ u32::from(b)).wrapping_mul(0x0100_0193)));
         let path = kept("random").join(name);
         let _ = std::fs::write(&path, text);
+        let _ = std::fs::write(path.with_extension("tbl"), job(text.clone()).tools.unwrap_or_default());
         report.push_str(&format!("\n{}: {why}\n{text}\n", path.display()));
     }
     assert!(failures.is_empty(), "{line}\n{report}");

@@ -10,7 +10,7 @@ use gr_ir::Program;
 use gr_spec::Family;
 use gr_text::{Diagnostic, Encoding, FileId, Severity, code};
 
-use crate::commands::check::{Checked, session_sources, unreadable};
+use crate::commands::check::{Checked, byte_order_mark, is_marked, session_sources, unreadable};
 use crate::exchange::Plan;
 use crate::setup::{Levels, Station, is_for_a_printer};
 use crate::sources::{Sources, read_program};
@@ -91,6 +91,14 @@ pub fn load(path: &Path, station: &Station) -> Result<Unit, Checked> {
         let mut checked = unreadable(&name, code::FILE_UNKNOWN_CONTROL, &[name.clone(), why.to_string()]);
         checked.unreadable = false;
         return Err(checked);
+    }
+    if is_marked(unit.encoding) && !unit.exchange {
+        // As `check` has it.
+        let mut checked = Checked::nothing();
+        byte_order_mark(&mut checked, (&name, path), unit.text.to_string(), station);
+        if checked.found.iter().any(|d| d.severity == Severity::Error) {
+            return Err(checked);
+        }
     }
     Ok(unit)
 }

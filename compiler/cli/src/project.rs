@@ -138,6 +138,7 @@ impl Project {
             for (key, value) in &row.options {
                 let alone = toml::Table::from_iter([(key.clone(), value.clone())]);
                 if let Err(why) = crate::commands::build::options_of(&alone) {
+                    let why = if why.starts_with("unexpected argument") { "no target has it".to_string() } else { why };
                     say(code::PROJECT_TARGET_OPTION, &at(key), &[key.clone(), why]);
                 }
             }

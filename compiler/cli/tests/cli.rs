@@ -163,6 +163,39 @@ fn a_project() {
     insta::assert_snapshot!(whole(&in_folder(at, &["check"])).replace(&*at.to_string_lossy(), "FOLDER"));
 }
 
+/// What a project names and there is not: told where the project names it, by `check` and `build`.
+#[test]
+fn a_project_with_wrong_names() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    std::fs::write(at.join("a.ngc"), "G21 G90\nG0 X1\nM2\n").unwrap();
+    for (text, place, code_of) in [
+        ("[project]\ndialect = \"foo\"\n", "3:11", "E0834"),
+        ("[[dialects]]\nfiles = \"*\"\ndialect = \"foo\"\n", "4:11", "E0834"),
+        ("[project]\ntools = \"no.tbl\"\n", "3:9", "E0820"),
+        ("[project]\nini = \"no.ini\"\n", "3:7", "E0820"),
+        ("[project]\nmachine = \"no/such\"\n", "3:11", "E0820"),
+        ("[lints]\nallow = [\"no/such\"]\n", "3:10", "E0804"),
+        ("[[targets]]\ntarget = \"rs275\"\n", "3:10", "E0846"),
+        ("[[targets]]\ntarget = \"rs274ngc\"\ndecimal = 3\n", "4:11", "E0847"),
+        ("[project]\nmaschine = 3\n", "3:1", "E0831"),
+    ] {
+        std::fs::write(at.join("gcc-robot.toml"), format!("schema = 1\n{text}")).unwrap();
+        for command in [&["check", "a.ngc"][..], &["build"]] {
+            let o = in_folder(at, &[command, &["--message-format", "short"]].concat());
+            let told = text_of_first(&o);
+            assert_eq!(code(&o), 1, "{text}: {}", whole(&o));
+            assert!(told.contains(&format!("gcc-robot.toml:{place}: error[{code_of}]")), "{text}: {told}");
+        }
+    }
+    let job = in_folder(at, &["build", "a.ngc", "--target", "inform", "--machine", "abb/irb140", "--job", "no.toml"]);
+    assert!(whole(&job).contains("there is no file no.toml"), "{}", whole(&job));
+}
+
+fn text_of_first(o: &Output) -> String {
+    text(&o.stderr).lines().next().unwrap_or_default().to_string()
+}
+
 #[test]
 fn reference_ufmg2008() {
     let folder = tempfile::tempdir().unwrap();
@@ -194,6 +227,58 @@ fn other_commands() {
     assert_eq!(code(&run(&["--version"])), 0);
     insta::assert_snapshot!("diff", whole(&run(&["diff", "part.ngc", "other.ngc"])));
     assert_eq!(code(&run(&["verify", "part.ngc", "--to", "grbl"])), 0);
+}
+
+/// `--watch` builds again when a program changes, also after a mistake in it.
+#[test]
+fn watching() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let write = |x: &str| std::fs::write(at.join("a.ngc"), format!("G21 G90\n{x}\nM2\n")).unwrap();
+    write("G0 X1");
+    let mut child = command(&["build", "a.ngc", "--target", "canon", "-o", "a.canon", "--watch", "-q"])
+        .current_dir(at)
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    let wait_for = |what: &str| {
+        let until = std::time::Instant::now() + std::time::Duration::from_secs(120);
+        while !std::fs::read_to_string(at.join("a.canon")).is_ok_and(|t| t.contains(what)) {
+            if std::time::Instant::now() > until {
+                return false;
+            }
+            std::thread::sleep(std::time::Duration::from_millis(50));
+        }
+        true
+    };
+    let mut seen = vec![wait_for("STRAIGHT_TRAVERSE(1.0000")];
+    write("G0 X[");
+    std::thread::sleep(std::time::Duration::from_millis(1500));
+    // The last good result stays.
+    seen.push(wait_for("STRAIGHT_TRAVERSE(1.0000"));
+    write("G0 X22");
+    seen.push(wait_for("STRAIGHT_TRAVERSE(22.0000"));
+    let running = child.try_wait().unwrap().is_none();
+    child.kill().unwrap();
+    child.wait().unwrap();
+    assert!(running && seen == [true, true, true], "{running} {seen:?}");
+}
+
+/// What `completions` writes, the shells can read.
+#[test]
+fn completions_are_read_by_their_shells() {
+    let folder = tempfile::tempdir().unwrap();
+    for (shell, option) in [("bash", "-n"), ("zsh", "-n"), ("fish", "--no-execute")] {
+        let file = folder.path().join(shell);
+        std::fs::write(&file, run(&["completions", shell]).stdout).unwrap();
+        match Command::new(shell).arg(option).arg(&file).output() {
+            Ok(o) => assert!(o.status.success() && o.stderr.is_empty(), "{shell}: {}", text(&o.stderr)),
+            Err(e) => {
+                assert!(std::env::var_os("CI").is_none(), "{shell} is missing: {e}");
+                eprintln!("skipped: {shell} is missing");
+            }
+        }
+    }
 }
 
 #[test]
@@ -272,6 +357,9 @@ fn byte_order_mark() {
         let o = in_folder(folder.path(), &["check", "--dialect", dialect, "a.ngc"]);
         assert_eq!(code(&o), expected, "{}", whole(&o));
         assert!(whole(&o).contains("E0105"), "{}", whole(&o));
+        // A build refuses what the check refuses.
+        let o = in_folder(folder.path(), &["build", "--dialect", dialect, "a.ngc"]);
+        assert_eq!((code(&o), o.stdout.is_empty()), (expected, expected == 1), "{}", whole(&o));
     }
     std::fs::write(folder.path().join("b.ngc"), b"\xFF\xFEG\x000\x00X\x001\x00\n\x00M\x002\x00\n\x00").unwrap();
     let o = in_folder(folder.path(), &["check", "b.ngc"]);

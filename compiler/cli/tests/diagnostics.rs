@@ -105,7 +105,16 @@ fn axes_and_remaps_of_the_ini_file() {
     told("E0258", &[ini, file("a.ngc", "G21 G90 F100\nG0 A400\nM2\n")], "check -i a.ini a.ngc");
     let ini = file("a.ini", "[RS274NGC]\nREMAP = M405 modalgroup=6 argspec=PQ ngc=sub405\nSUBROUTINE_PATH = .\n");
     let sub = file("sub405.ngc", "o<sub405> sub\no<sub405> endsub\n");
-    told("E0259", &[ini, sub, file("a.ngc", "G21\nM405 P1\nM2\n")], "check -i a.ini a.ngc");
+    told("E0259", &[ini.clone(), sub, file("a.ngc", "G21\nM405 P1\nM2\n")], "check -i a.ini a.ngc");
+    // Its subroutine is not there; the line itself is wrong; the line is odd.
+    told("E0848", &[ini, file("a.ngc", "G21\nM2\n")], "check -i a.ini a.ngc");
+    for (line, code) in [("M405 modalgroup=99 ngc=b", "E0848"), ("X5 modalgroup=10 ngc=b", "E0849")] {
+        let ini = file("a.ini", &format!("[RS274NGC]\nREMAP = {line}\nSUBROUTINE_PATH = .\n"));
+        let sub = file("b.ngc", "o<b> sub\no<b> endsub\n");
+        told(code, &[ini, sub, file("a.ngc", "G21\nM2\n")], "check -i a.ini a.ngc");
+    }
+    let ini = file("a.ini", "[AXIS_A]\nLOCKING_INDEXER_JOINT = 3\n[TRAJ]\nLINEAR_UNITS = mm\n");
+    told("E0190", &[ini, file("a.ngc", "G21 G90 F100\nG1 A40\nM2\n")], "check -i a.ini a.ngc");
 }
 
 #[test]

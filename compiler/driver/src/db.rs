@@ -269,7 +269,12 @@ pub(crate) fn shape_of(scan: &Scan, text: &str, setup: &gr_interp::Setup) -> Sha
                 b'm' if word.form != Form::Literal || matches!(word.value as i64, 98 | 99) => {
                     shape.control = true;
                     if let Some(p) = scan.words(n).iter().find(|w| w.letter == b'p' && w.form == Form::Literal) {
-                        let name = (p.value as i64).to_string().into();
+                        let beside_l = scan.words(n).iter().any(|w| w.letter == b'l');
+                        let number = match setup.dialect.family == gr_spec::Family::Fanuc && word.value as i64 == 98 {
+                            true => gr_gcode::fanuc_call(p.value as i64, beside_l).0,
+                            false => p.value as i64,
+                        };
+                        let name = number.to_string().into();
                         labels.push(Label { name, line: n, kind: LabelKind::Call });
                         shape.jumps |= word.value as i64 == 99;
                     }

@@ -254,6 +254,8 @@ fn percent_line(chunk: &Chunk, from: u32) -> u32 {
 pub(crate) fn of_finding(f: &Finding, options: &Options) -> Option<Found> {
     let code = f.fault.code;
     let severity = match options.rules.severity(code) {
+        // What the controller refuses is an error, whatever its row says of its milder form.
+        _ if f.fault.rs.is_some() => Severity::Error,
         None if !code.def().lint => code.def().severity,
         severity => severity?,
     };

@@ -98,8 +98,9 @@ pub(crate) fn atan2(y: f64, x: f64) -> f64 {
     if y == 0.0 || x == 0.0 || !y.is_finite() || !x.is_finite() {
         return t;
     }
-    let scale = libm::fmax(x.abs(), y.abs());
-    let (x, y) = (x / scale, y / scale);
+    // By a power of two, so that nothing is rounded.
+    let exponent = libm::ilogb(libm::fmax(x.abs(), y.abs()));
+    let (x, y) = (libm::scalbn(x, -exponent), libm::scalbn(y, -exponent));
     let (s, c) = sin_cos_pair((t, 0.0));
     let across = add(multiply((y, 0.0), c), multiply((-x, 0.0), s));
     let along = x * c.0 + y * s.0;

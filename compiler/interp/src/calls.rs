@@ -102,6 +102,9 @@ impl<S: Sink> Interp<'_, S> {
             if self.config.no_fanuc_subs {
                 return Err(structure(rs274::RT_M99_DISABLED, "M99 as end of a subroutine is switched off in the INI file"));
             }
+            if self.skip.is_none() && !self.is_fanuc() && rest.iter().any(|w| w.form != Form::Comment) {
+                return Err(Fault::new(code::OWORD_TRAILING_TEXT, rs274::AFTER_O_WORD));
+            }
             if self.defining_sub {
                 return Err(structure(rs274::RT_M99_ENDSUB, "`o… endsub` is missing: M99 can't end an `o… sub`"));
             }
@@ -191,7 +194,7 @@ impl<S: Sink> Interp<'_, S> {
 
     pub(crate) fn convert_return(&mut self, keyword: Keyword, m99: bool) -> Res {
         if self.level() == 0 && self.sub_name.is_none() && !self.came_back {
-            let args = [self.sequence().to_string(), self.line_text().to_string()];
+            let args = [self.sequence().to_string(), self.line_text().trim_end().to_string()];
             let fault = structure(rs274::RT_O_NOT_IN_SUB_LINE, "").own_args(&["this ends a subroutine, but none has begun"]);
             return Err(with_args(fault, &[&args[0], &args[1]]));
         }
@@ -240,7 +243,7 @@ impl<S: Sink> Interp<'_, S> {
         self.came_back = level == 1 && !self.main_unnamed;
         if left.restore && left.saved_valid {
             if let Some(saved) = &left.saved {
-                self.restore_modes(saved)?;
+                self.restore_modes(saved).map(drop)?;
             }
         }
         if left.kind == CallKind::Remap { self.remap_finished() } else { Ok(()) }

@@ -29,6 +29,13 @@ pub(crate) struct Skip {
     pub from: Option<Place>,
 }
 
+/// Whether the damage of an O-word line begins in its label: that is read even on lines that are skipped.
+fn label_is_damaged(scan: &Scan, text: &str, line: u32, word: &Word) -> bool {
+    let Some(fault) = scan.faults_of(line).first() else { return false };
+    let before = text.get(word.start as usize + 1..fault.span.start as usize).unwrap_or("");
+    !fault.code.def().slug.starts_with("oword/") && !before.contains(|c: char| c.is_ascii_alphabetic())
+}
+
 /// A loop that is going on.
 #[derive(Clone, Debug)]
 pub(crate) struct Loop {
@@ -80,7 +87,8 @@ impl<S: Sink> Interp<'_, S> {
             _ => None,
         };
         let Some(c) = control else {
-            return if self.defining_sub { Ok(()) } else { Err(self.parse_fault(scan)) };
+            let unread = self.defining_sub && !label_is_damaged(scan, text, line, word);
+            return if unread { Ok(()) } else { Err(self.parse_fault(scan)) };
         };
         if c.keyword == Keyword::Program && text.get(c.label_span.range()).is_some_and(|l| l.starts_with('<') && !l.ends_with('>')) {
             let mut doubt = Fault::own(code::OWORD_NAME_OPEN);
@@ -173,7 +181,7 @@ impl<S: Sink> Interp<'_, S> {
                 if at.keyword != Keyword::If {
                     let name = self.full_name(label);
                     let fault = self.label_fault(rs274::RT_O_NO_ENDIF, label, "no `if` with this label");
-                    let line = self.line_text().to_string();
+                    let line = self.line_text().trim_end().to_string();
                     return Err(with_args(fault, &[&self.sequence().to_string(), &name, op_name(at.keyword), &(at.sequence + 1).to_string(), &line]));
                 }
                 self.skip = None;

@@ -351,6 +351,15 @@ impl<S: Sink> Interp<'_, S> {
                 self.emit(Call::ProgramStop);
             }
             1 => self.emit(Call::OptionalProgramStop),
+            99 if self.level() > 0 && self.is_fanuc() => {
+                let back = self.block.get(b'p');
+                self.convert_return(gr_gcode::Keyword::MacroEnd, true)?;
+                return back.map_or(Ok(()), |n| self.go_to_number(n));
+            }
+            99 if self.level() > 0 => {
+                let fault = Fault::new(code::SUB_STRUCTURE, rs274::RT_M99_BUG).at(b'm');
+                return Err(fault.own_args(&["M99 ends a subroutine only at the start of its line"]));
+            }
             99 if self.setup.loop_on_main_m99 => {
                 self.next = 0;
                 self.shift = 0;

@@ -40,7 +40,8 @@ impl<S: Sink> Interp<'_, S> {
 
     /// Codes with no place among those of LinuxCNC: true when it is one.
     pub(crate) fn take_fanuc_g(&mut self, n: i32) -> bool {
-        let known = matches!(n, 680 | 690) && self.setup.dialect.code(if n == 680 { "G68" } else { "G69" }).is_some();
+        let turns = matches!(n, 680 | 690) && self.setup.dialect.code(if n == 680 { "G68" } else { "G69" }).is_some();
+        let known = turns || n == 500 && is_lathe(self.setup.dialect);
         if known {
             self.block.turning = n as i16;
         }
@@ -49,8 +50,10 @@ impl<S: Sink> Interp<'_, S> {
 
     /// Before the block is looked at as a whole: words that mean something else here become those that it knows.
     pub(crate) fn fanuc_words(&mut self) -> Res {
-        if self.block.turning != -1 {
-            return self.turn_coordinates();
+        match self.block.turning {
+            -1 => {}
+            500 => return self.clamp_spindle(),
+            _ => return self.turn_coordinates(),
         }
         let dwell = self.block.g(Group::NonModal) == 40;
         if is_lathe(self.setup.dialect) && self.block.has_any_of(INCREMENT_MASK) && !dwell {
@@ -80,6 +83,24 @@ impl<S: Sink> Interp<'_, S> {
             let from = if self.block.g(Group::NonModal) == 530 { self.machine_position()[at] } else { self.start_point()[at] };
             self.block.unset(letter);
             self.block.set(axis, from + by);
+        }
+        Ok(())
+    }
+
+    /// G50 S: the highest speed of surface speed control. G50 with axis words sets coordinates.
+    fn clamp_spindle(&mut self) -> Res {
+        self.block.turning = -1;
+        if self.has_axes() || self.block.has(b'h') {
+            return Err(self.not_carried_out(rs274::RT_UNKNOWN_G, "G50 with axis words".into()).at(b'g'));
+        }
+        let Some(speed) = self.block.get(b's') else {
+            return Err(Fault::new(code::WORD_MISSING, rs274::RT_UNKNOWN_G).arg("G50").arg("S").at(b'g'));
+        };
+        self.block.unset(b's');
+        self.m.spindle_clamp = speed;
+        let spindle = self.m.active_spindle;
+        if self.m.css[spindle.clamp(0, 7) as usize] != 0 {
+            self.emit_queued(Call::SetSpindleMode(spindle, if speed > 0.0 { speed } else { 1e30 }));
         }
         Ok(())
     }

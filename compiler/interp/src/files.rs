@@ -89,7 +89,10 @@ fn tool_line(line: &str) -> Result<Tool, (&str, String)> {
     let mut tool = empty_row();
     let (words, comment) = line.split_once(';').unwrap_or((line, ""));
     tool.comment = comment.trim().into();
-    for word in words.split_ascii_whitespace() {
+    for word in words.split([' ', '\r']).map(|w| w.trim_end_matches('\t')).filter(|w| !w.is_empty()) {
+        if word.contains('\t') {
+            return Err((word, "words are set apart by blanks; a tab does not do that".into()));
+        }
         let mut rest = word.chars();
         let letter = rest.next().unwrap_or(' ').to_ascii_uppercase();
         let rest = rest.as_str();

@@ -68,6 +68,10 @@ impl<S: Sink> Interp<'_, S> {
         let written = self.block.g(Group::Motion);
         let motion = if written != -1 { i32::from(written) } else { self.m.motion };
         let moves = matches!(motion, 0 | 10 | 20 | 30 | 50 | 51);
+        if crate::check::is_cycle(written) || written == 760 {
+            // Blocks behind a cycle that is not there are positions.
+            self.m.motion = 0;
+        }
         if !(moves || matches!(motion, 52 | 330 | 382..=385)) || !matches!(self.block.g(Group::NonModal), -1 | 40 | 530) {
             return;
         }

@@ -168,7 +168,7 @@ impl<S: Sink> Interp<'_, S> {
     }
 
     pub(crate) fn label_message(&self, rs: Rs274, label: Label, what: &str, found: Option<&LabelAt>) -> Box<Fault> {
-        let mut args = vec![self.sequence().to_string(), self.line_text().to_string()];
+        let mut args = vec![self.sequence().to_string(), self.line_text().trim_end().to_string()];
         if let Some(at) = found {
             args.push(op_name(at.keyword).to_string());
             args.push((at.sequence + 1).to_string());
@@ -213,7 +213,7 @@ impl<S: Sink> Interp<'_, S> {
             return Ok(());
         }
         let what = "it is used at two places of this subroutine";
-        let (sequence, line, first) = (self.sequence().to_string(), self.line_text().to_string(), (at.sequence + 1).to_string());
+        let (sequence, line, first) = (self.sequence().to_string(), self.line_text().trim_end().to_string(), (at.sequence + 1).to_string());
         Err(if keyword == Keyword::If {
             with_args(self.label_fault(rs274::RT_O_DUPLICATE_IF, label, what), &[&sequence, &first, &line])
         } else {

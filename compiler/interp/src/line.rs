@@ -117,6 +117,15 @@ impl<S: Sink> Interp<'_, S> {
                 return Err(fault);
             }
         }
+        if at.faulty
+            && !(at.deleted && self.setup.block_delete)
+            && let Some(fault) = scan.faults_of(line).first().filter(|f| f.code == code::BLOCK_BAD_LINE_NUMBER)
+            && text.get(at.start as usize..fault.span.start as usize).is_none_or(|t| t.trim_matches([' ', '\t', '/', 'n', 'N']).is_empty())
+        {
+            // The number of a line is read even where the line is skipped.
+            self.opened.damaged_met.insert((self.place.file, self.place.line));
+            return Err(crate::findings::convert_fault(fault));
+        }
         if at.kind == LineKind::Percent && self.m.percent != 0 && !at.deleted {
             self.emit(Call::Finish);
             if let Some(skip) = &self.skip {

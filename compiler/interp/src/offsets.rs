@@ -92,6 +92,21 @@ impl<S: Sink> Interp<'_, S> {
         self.set_tool_parameters();
     }
 
+    /// The machine stands at its zero when a run begins: with stored offsets that is another point of the work frame. The
+    /// real `rs274` leaves a stored rotation out of account there.
+    pub(crate) fn start_at_machine_zero(&mut self) {
+        self.m.current = [0.0; 9];
+        if self.is_rs274() {
+            self.m.current[..6].copy_from_slice(&self.world.position);
+            return;
+        }
+        self.arrive_at_origin();
+        for i in 0..9 {
+            self.m.current[i] -= self.m.g92[i];
+        }
+        self.world.position.copy_from_slice(&self.m.current[..6]);
+    }
+
     /// From the active frame to machine coordinates without tool offset: origin added.
     pub(crate) fn leave_origin(&mut self) {
         rotate_xy(&mut self.m.current, self.m.rotation);

@@ -6,7 +6,7 @@ use gr_canon::{Sink, Units, Version};
 use gr_spec::{code, rs274};
 use rustc_hash::FxHashMap;
 
-use crate::block::Block;
+use crate::block::{Block, Group};
 use crate::params::coord_system;
 use crate::state::SavedModes;
 use crate::{Fault, Interp, Res, Setup};
@@ -599,14 +599,27 @@ impl<S: Sink> Interp<'_, S> {
         match (&here.saved, here.saved_valid) {
             (Some(saved), true) => {
                 let saved = saved.clone();
-                self.restore_modes(&saved)
+                if self.restore_modes(&saved)? {
+                    self.lose_rest();
+                }
+                Ok(())
             }
             _ => Err(Fault::new(code::WORD_MISSING, rs274::RT_M72).arg("M72").arg("M70 or M73 before it").at(b'm')),
         }
     }
 
-    /// Brings saved modes back by executing blocks, as the controller does.
-    pub(crate) fn restore_modes(&mut self, saved: &SavedModes) -> Res {
+    /// The blocks that bring modes back take the place of the one with M72: what is not done yet never will be.
+    fn lose_rest(&mut self) {
+        let b = &self.block;
+        let early = (1 << Group::Feed as u32) | (1 << Group::SpindleMode as u32);
+        if b.motion != -1 || b.g_mask & !early != 0 || [4, 8, 9, 10].iter().any(|g| b.m[*g] != -1) {
+            self.warn(Fault::own(code::MODES_REST_LOST).at(b'm'));
+        }
+        self.block.clear();
+    }
+
+    /// Brings saved modes back by executing blocks, as the controller does; false: there was nothing to do.
+    pub(crate) fn restore_modes(&mut self, saved: &SavedModes) -> Res<bool> {
         let kept = (self.block.clone(), self.comment.take());
         let shown = (self.reading.start, self.reading.end);
         // The command texts are what is "read last" now: no N number.
@@ -623,8 +636,9 @@ impl<S: Sink> Interp<'_, S> {
         self.execute_block()
     }
 
-    fn restore_by_blocks(&mut self, saved: &SavedModes) -> Res {
-        if self.modes().g[5] != saved.g[5] {
+    fn restore_by_blocks(&mut self, saved: &SavedModes) -> Res<bool> {
+        let units = self.modes().g[5] != saved.g[5];
+        if units {
             self.block.clear();
             self.block.set_g(6, saved.g[5] as i16);
             self.run_own_block()?;
@@ -679,12 +693,13 @@ impl<S: Sink> Interp<'_, S> {
         if any {
             self.run_own_block()?;
         }
+        let done = units || any;
         for m in codes {
             self.block.clear();
             self.take_word(b'm', f64::from(m))?;
             self.run_own_block()?;
         }
-        Ok(())
+        Ok(done)
     }
 
     /// Sends what cutter compensation holds back, before a stop.

@@ -338,6 +338,7 @@ impl<'a, S: Sink> Interp<'a, S> {
         self.emit(Call::SetG92Offset(self.m.g92));
         self.emit(Call::SetXyRotation(self.m.rotation));
         self.emit(Call::SetFeedReferenceXyz);
+        self.start_at_machine_zero();
         self.fanuc_power_up();
         self.run_startup();
     }
@@ -481,9 +482,14 @@ impl<'a, S: Sink> Interp<'a, S> {
         None
     }
 
+    /// Stands in for `rs274`.
+    pub(crate) fn is_rs274(&self) -> bool {
+        !self.setup.startup_code
+    }
+
     /// Stands in for `rs274`: told to go on after an error, it does so with whatever the controller is left with.
     pub(crate) fn stands_in(&self) -> bool {
-        self.setup.keep_going && !self.setup.startup_code
+        self.setup.keep_going && self.is_rs274()
     }
 
     /// Forgets calls, loops and skipping, as after an error or at the end.
@@ -557,12 +563,15 @@ impl<'a, S: Sink> Interp<'a, S> {
         let before = self.findings.len();
         let result = if chunk.scan.lines.is_empty() { Ok(()) } else { self.line(&chunk.scan, &chunk.text, 0) };
         if let Err(fault) = result {
+            let at = self.findings.len();
             self.fails(fault);
-            return Err(self.findings.remove(before));
+            return Err(self.findings.remove(at));
         }
         while self.level() > base && !matches!(self.flow, Flow::End(_)) {
             if let Some(end) = self.run_piece(1) {
-                return if self.findings.len() > before { Err(self.findings.remove(before)) } else { Ok(Some(end)) };
+                // Doubts are no reason to stop.
+                let wrong = self.findings[before..].iter().position(|f| f.fault.rs.is_some());
+                return wrong.map_or(Ok(Some(end)), |at| Err(self.findings.remove(before + at)));
             }
         }
         Ok(match self.flow {

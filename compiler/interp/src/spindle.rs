@@ -38,6 +38,7 @@ impl<S: Sink> Interp<'_, S> {
         let limit = match self.block.get(b'd') {
             _ if !css => 0.0,
             Some(d) => d.abs(),
+            None if self.m.spindle_clamp > 0.0 => self.m.spindle_clamp,
             None => 1e30,
         };
         self.emit_queued(Call::SetSpindleMode(s, limit));

@@ -72,6 +72,8 @@ pub struct Modal {
     pub spline_tail: [f64; 2],
     /// Fanuc, G68: centre of the rotation in the plane, angle in degrees.
     pub turn: [f64; 3],
+    /// Fanuc lathe: highest spindle speed of G50 S, 0 = none.
+    pub spindle_clamp: f64,
     /// Fanuc: motion code that G80 goes back to.
     pub before_cycle: i32,
     /// Keeps what follows in place.
@@ -222,7 +224,7 @@ impl State {
         modal.pocket = 1;
         modal.origin_index = 1;
         modal.n_number = -1;
-        State { modal, queue: Queue::default(), world: World::new(!setup.startup_code), saved: None, tools: None, world_tools: None }
+        State { modal, queue: Queue::default(), world: World::new(), saved: None, tools: None, world_tools: None }
     }
     /// The bytes that make two states the same state (`-0.0` counts as `0.0`).
     pub fn key_bytes(&self) -> Vec<u8> {

@@ -30,15 +30,13 @@ pub struct World {
     pub speed_held: u8,
     /// Path control as it was given out: 0 exact path, 1 exact stop, 2 blending.
     pub path: u8,
-    /// The real `rs274` does not follow splines: asked for the position, it says where the move before them ended.
-    pub deaf_to_splines: u8,
-    pad: [u8; 2],
+    pad: [u8; 3],
 }
 
 impl World {
-    /// At the start; for `rs274` itself, or for the machine.
-    pub fn new(stands_in: bool) -> World {
-        World { deaf_to_splines: u8::from(stands_in), units: Units::Mm as u8, plane: Plane::Xy as u8, path: 2, ..World::zeroed() }
+    /// At the start.
+    pub fn new() -> World {
+        World { units: Units::Mm as u8, plane: Plane::Xy as u8, path: 2, ..World::zeroed() }
     }
     fn moved(&mut self, to: &Axes) {
         self.position.copy_from_slice(&to[..6]);
@@ -63,7 +61,7 @@ impl World {
                 self.position[..3].copy_from_slice(&xyz);
                 self.position[3..].copy_from_slice(&rest[..3]);
             }
-            Call::NurbsFeed(n) if self.deaf_to_splines == 0 => {
+            Call::NurbsFeed(n) => {
                 if let Some(last) = n.points.last() {
                     self.position[..2].copy_from_slice(&last[..2]);
                 }
@@ -127,6 +125,6 @@ impl World {
 
 impl Default for World {
     fn default() -> Self {
-        World::new(false)
+        World::new()
     }
 }

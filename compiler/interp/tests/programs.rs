@@ -758,6 +758,7 @@ fn one_mistake_one_finding() {
         "G3 X1\nX3 I1\n",
         "G91 G2 X10 Y0 I4 J0\nX10 I5\nG90 G2 X30 Y0 I5\n",
         "G5 X3 Y4 I1 P0 Q1\nX4 Y5 P1 Q1\n",
+        "G81 X1 Y2\nX3\nG80\nG1 X4\n",
     ] {
         let (_, outcome) = run_with(&setup, &format!("G21 G90 G17 F100\nG0 X0 Y0\n{text}M2\n"), 100);
         let errors: Vec<_> = outcome.findings.iter().filter(|f| f.fault.rs.is_some()).collect();
@@ -839,5 +840,106 @@ fn labels_with_blanks_are_closed() {
     for text in ["o 1 0 if [1]\no10 endif\nm2\n", "o< ab>sub\no<ab>endsub\no<a b>call\nm2\n", "o01 repeat [2]\no1 endrepeat\nm2\n"] {
         let (_, outcome) = run_with(&setup(), text, 100);
         assert!(outcome.findings.is_empty(), "{text}: {:?}", outcome.findings);
+    }
+}
+
+/// As `rs274` does: blocks that bring modes back take the place of the one that asked for them.
+#[test]
+fn m72_loses_the_rest_of_its_block() {
+    for (text, moves) in [("M70\nG91\nM72 G0 X5\nG0 X6\nM2\n", 1), ("M70\nM72 G0 X5\nG0 X6\nM2\n", 2), ("M70\nG20\nM72 M8 G0 X5\nM2\n", 0)] {
+        let (out, outcome) = run_with(&setup(), text, 100);
+        assert!(outcome.ok(), "{:?}", outcome.findings);
+        assert_eq!(out.matches("STRAIGHT_TRAVERSE").count(), moves, "{text}");
+        assert!(!out.contains("FLOOD_ON"), "{text}");
+        assert_eq!(outcome.findings.iter().any(|f| f.fault.code == code::MODES_REST_LOST), moves != 2, "{text}");
+    }
+}
+
+/// Fanuc lathe manual: G50 S holds surface speed control below a speed, before and after G96.
+#[test]
+fn a_fanuc_lathe_clamps_the_spindle() {
+    for text in ["G50 S2000\nG96 S150 M3\nM30\n", "G96 S150 M3\nG50 S2000\nM30\n"] {
+        let (calls, outcome) = run_fanuc("fanuc-turn", text);
+        assert!(outcome.ok(), "{text}: {:?}", outcome.findings);
+        let modes: Vec<&String> = calls.iter().filter(|c| c.starts_with("SET_SPINDLE_MODE")).collect();
+        assert!(modes.iter().any(|m| m.contains("2000.0000")), "{text}: {modes:?}");
+        assert_eq!(calls.iter().filter(|c| c.starts_with("SET_SPINDLE_SPEED")).count(), 1, "{text}");
+    }
+    let (_, outcome) = run_fanuc("fanuc-turn", "G50 X100. Z50.\nM30\n");
+    assert_eq!(outcome.findings[0].fault.code, code::CODE_NOT_CARRIED_OUT);
+}
+
+/// `rs274 -v` with stored offsets: the machine stands at its zero.
+#[test]
+fn stored_offsets_move_the_start() {
+    for (stored, text, wanted) in [
+        (vec![(5222, 3.0)], "g0 x1\nm2\n", "STRAIGHT_TRAVERSE(1.0000, -76.2000, 0.0000"),
+        (vec![(5220, 2.0), (5242, 3.0)], "g0 x1\nm2\n", "STRAIGHT_TRAVERSE(1.0000, -76.2000, 0.0000"),
+        (vec![(5210, 1.0), (5212, 3.0)], "g0 x1\nm2\n", "STRAIGHT_TRAVERSE(1.0000, -76.2000, 0.0000"),
+        (vec![(5221, 2.0)], "g91 g0 x1\nm2\n", "STRAIGHT_TRAVERSE(-49.8000, 0.0000, 0.0000"),
+        (vec![(5222, 3.0)], "(debug,#5421 #<_y> #<_abs_y>)\nm2\n", "MESSAGE(\"-76.200000 -76.200000 0.000000"),
+        (vec![(5222, 3.0), (5230, 90.0)], "g0 z1\nm2\n", "STRAIGHT_TRAVERSE(0.0000, -76.2000, 1.0000"),
+    ] {
+        let setup = Setup { params: stored.iter().copied().collect(), ..setup() };
+        let (out, outcome) = run_with(&setup, text, 100);
+        assert!(outcome.ok(), "{:?}", outcome.findings);
+        assert!(out.contains(wanted), "{stored:?} {text}: {out}");
+        let Some(rs274) = reference() else { continue };
+        let lines: String = stored.iter().map(|(n, v)| format!("{n}\t{v}\n")).collect();
+        let theirs = Job { params: Some(lines), ..Job::new(text) }.reference(&rs274).canon;
+        assert!(theirs.replace("-0.0000", "0.0000").contains(wanted), "{stored:?} {text}: {theirs}");
+    }
+    // The machine itself turns with a stored rotation.
+    let setup = Setup { params: [(5222, 3.0), (5230, 90.0)].into(), startup_code: true, ..setup() };
+    let (out, _) = run_with(&setup, "g0 z1\nm2\n", 100);
+    assert!(out.replace("-0.0000", "0.0000").contains("STRAIGHT_TRAVERSE(-76.2000, 0.0000, 1.0000"), "{out}");
+}
+
+/// As `rs274` has it: nothing but a comment beside M99 in a subroutine, and M99 first.
+#[test]
+fn words_beside_m99() {
+    for (line, wanted) in [
+        ("m99 x5", Some(code::OWORD_TRAILING_TEXT)),
+        ("m99 p5", Some(code::OWORD_TRAILING_TEXT)),
+        ("m99#1=2", Some(code::OWORD_TRAILING_TEXT)),
+        ("x2 m99", Some(code::SUB_STRUCTURE)),
+        ("(c) m99", Some(code::SUB_STRUCTURE)),
+        ("m99 (c)", None),
+        ("n5 m99", None),
+    ] {
+        let (_, outcome) = run_with(&setup(), &format!("m98 p100\nm2\no100\ng0 x1\n{line}\n"), 100);
+        assert_eq!(outcome.findings.first().map(|f| f.fault.code), wanted, "{line}");
+    }
+    // A Fanuc control moves, then returns.
+    let (calls, outcome) = run_fanuc("fanuc-mill", "G21 G90\nM98 P100\nG0 Y3.\nM30\nO100\nG0 X1.\nX2. M99\n");
+    assert!(outcome.findings.is_empty(), "{:?}", outcome.findings);
+    assert_eq!(moves_of(&calls), ["rapid 1 0 0", "rapid 2 0 0", "rapid 2 3 0"]);
+}
+
+/// What `rs274` reads of lines that it skips: the line number and the label.
+#[test]
+fn faults_on_skipped_lines() {
+    for (line, wanted) in [
+        ("n g0 x1", Some("Bad format unsigned integer")),
+        ("nx", Some("Bad format unsigned integer")),
+        ("n-5 o2 call", Some("Bad format unsigned integer")),
+        ("g0 n", None),
+        ("o2 foo", None),
+        ("o2 if [1", None),
+        ("o2 if 3", None),
+        ("ow<x> endif", Some("Unknown word where unary operation could be")),
+        ("o endif", Some("Unknown word starting with e")),
+        ("o[1 if [1]", Some("Unknown operation")),
+    ] {
+        for (text, in_if) in [(format!("o1 sub\n{line}\no1 endsub\nm2\n"), false), (format!("o1 if [0]\n{line}\no1 endif\nm2\n"), true)] {
+            let (_, outcome) = run_with(&setup(), &text, 100);
+            let told = outcome.findings.iter().find_map(|f| f.fault.rs_text());
+            if !in_if {
+                assert_eq!(told.as_deref(), wanted, "{text}");
+            }
+            let Some(rs274) = reference() else { continue };
+            let theirs = Job::new(text.clone()).reference(&rs274);
+            assert_eq!(theirs.ok(), told.is_none(), "{text}: {told:?}, {}", theirs.ended.errors());
+        }
     }
 }

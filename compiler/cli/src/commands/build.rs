@@ -32,7 +32,8 @@ pub fn run(global: &Global, args: &BuildArgs) -> Exit {
     }
     loop {
         if !global.quiet {
-            eprintln!("watching {} files; Ctrl-C ends", round.files.len());
+            let count = round.files.len();
+            eprintln!("watching {count} file{}; Ctrl-C ends", if count == 1 { "" } else { "s" });
         }
         let seen = stamps(&round.files);
         while stamps(&round.files) == seen {

@@ -163,7 +163,7 @@ pub fn check(path: &Path, station: &Station) -> Checked {
     match read_program(path) {
         Ok(decoded) => {
             let mut checked = checked(&name, path, &decoded.text, station);
-            if !matches!(decoded.encoding, gr_text::Encoding::Utf8 | gr_text::Encoding::Latin1) && !exchange::is_exchange(path, &decoded.text) {
+            if is_marked(decoded.encoding) && !exchange::is_exchange(path, &decoded.text) {
                 byte_order_mark(&mut checked, (&name, path), decoded.text, station);
             }
             checked
@@ -172,8 +172,13 @@ pub fn check(path: &Path, station: &Station) -> Checked {
     }
 }
 
+/// Whether a byte order mark was left out of the text of a program.
+pub fn is_marked(decoded: gr_text::Encoding) -> bool {
+    !matches!(decoded, gr_text::Encoding::Utf8 | gr_text::Encoding::Latin1)
+}
+
 /// The mark is not part of the text, but the control reads it.
-fn byte_order_mark(checked: &mut Checked, (name, path): (&str, &Path), text: String, station: &Station) {
+pub fn byte_order_mark(checked: &mut Checked, (name, path): (&str, &Path), text: String, station: &Station) {
     if station.lints.allow.contains(&code::TEXT_BYTE_ORDER_MARK) {
         return;
     }

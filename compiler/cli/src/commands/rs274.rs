@@ -532,6 +532,10 @@ fn by_hand(run: &mut Interp<'_, Out>, choice: &Choice) {
             let _ = std::io::stdout().flush();
         }
         let Some(line) = input_line().filter(|l| l != "quit") else { return };
+        // Whatever the switch says, the real command passes over these here.
+        if line.trim_start().starts_with('/') {
+            continue;
+        }
         let scan = gr_gcode::scan(&line, dialect(choice.version));
         let chunk = Chunk { text: line.as_str().into(), scan: std::sync::Arc::new(scan) };
         if let Err(finding) = run.mdi(&chunk) {

@@ -82,10 +82,13 @@ pub(super) fn by_shape<'p>(a: &'p Program, b: &'p Program, tolerance: &Tolerance
             }
             (Piece::Chord(c, to), Piece::Chord(d, other)) if c.class == d.class => {
                 compare_conditions(&mut out, &c, &d, p.spot, q.spot, &mut last, tolerance);
-                if !side_by_side(&mut out, &mut p, &mut q, &to, &other, tolerance) {
+                if let Err(gap) = side_by_side(&mut out, &mut p, &mut q, &to, &other, tolerance) {
                     let mut message = format!("goes to {}, the other to {}", point(&to), point(&other));
                     if point(&to) == point(&other) {
                         message += &format!(", {:.2e} mm apart", distance(&to, &other));
+                    } else if gap < NEAR {
+                        // The two corners need not belong together.
+                        message = format!("goes to {}, the other passes {gap:.2e} mm beside its way", point(&to));
                     }
                     out.note(tolerance.limit, Aspect::Path, p.spot, q.spot, message);
                     return out;
@@ -141,7 +144,10 @@ fn skip_event(p: &mut Chain<'_>, q: &mut Chain<'_>, tolerance: &Tolerance) -> bo
     true
 }
 
-/// Advances both chains to the nearer of their two corners. False when the corner is off the other chord.
+/// Below this distance, mm, two paths are told apart by their distance and not by their corners.
+const NEAR: f64 = 0.01;
+
+/// Advances both chains to the nearer of their two corners. `Err`: how far the corner is off the other chord.
 fn side_by_side<'p>(
     out: &mut Diff,
     p: &mut Chain<'p>,
@@ -149,14 +155,14 @@ fn side_by_side<'p>(
     to: &Axes,
     other: &Axes,
     tolerance: &Tolerance,
-) -> bool {
+) -> Result<(), f64> {
     let gap = distance(to, other);
     if gap <= tolerance.length && turned(to, other) <= tolerance.angle {
         out.deviation = out.deviation.max(gap);
         (p.here, q.here) = (*to, *other);
         p.pull(tolerance);
         q.pull(tolerance);
-        return true;
+        return Ok(());
     }
     let (left, right) = (reach(&p.here, to), reach(&q.here, other));
     let (short, long, corner, end) = if left <= right { (p, q, to, other) } else { (q, p, other, to) };
@@ -164,12 +170,12 @@ fn side_by_side<'p>(
     let there = between(&long.here, end, share);
     let gap = distance(&there, corner);
     if gap.is_nan() || gap > tolerance.length || turned(&there, corner) > tolerance.angle {
-        return false;
+        return Err(if gap > tolerance.length { gap } else { f64::INFINITY });
     }
     out.deviation = out.deviation.max(gap);
     (short.here, long.here) = (*corner, there);
     short.pull(tolerance);
-    true
+    Ok(())
 }
 
 fn reach(a: &Axes, b: &Axes) -> f64 {
