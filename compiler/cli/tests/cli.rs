@@ -188,6 +188,7 @@ fn a_project_with_wrong_names() {
             assert!(told.contains(&format!("gcc-robot.toml:{place}: error[{code_of}]")), "{text}: {told}");
         }
     }
+    std::fs::remove_file(at.join("gcc-robot.toml")).unwrap();
     let job = in_folder(at, &["build", "a.ngc", "--target", "inform", "--machine", "abb/irb140", "--job", "no.toml"]);
     assert!(whole(&job).contains("there is no file no.toml"), "{}", whole(&job));
 }

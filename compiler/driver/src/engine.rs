@@ -255,7 +255,7 @@ pub(crate) fn of_finding(f: &Finding, options: &Options) -> Option<Found> {
     let code = f.fault.code;
     let severity = match options.rules.severity(code) {
         // What the controller refuses is an error, whatever its row says of its milder form.
-        _ if f.fault.rs.is_some() => Severity::Error,
+        _ if f.fault.rs.is_some() => gr_text::Severity::Error,
         None if !code.def().lint => code.def().severity,
         severity => severity?,
     };
