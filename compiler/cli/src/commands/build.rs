@@ -25,6 +25,7 @@ use crate::sources::{Sources, reason};
 const POLL: Duration = Duration::from_millis(250);
 
 pub fn run(global: &Global, args: &BuildArgs) -> Exit {
+    let mut begun = SystemTime::now();
     let mut round = Round::new(global, args).run();
     // A wrong command line stays wrong.
     if !args.watch || round.exit == Exit::Usage {
@@ -36,9 +37,14 @@ pub fn run(global: &Global, args: &BuildArgs) -> Exit {
             eprintln!("watching {count} file{}; Ctrl-C ends", if count == 1 { "" } else { "s" });
         }
         let seen = stamps(&round.files);
-        while stamps(&round.files) == seen {
-            std::thread::sleep(POLL);
+        // What changed during the round may have been read before that.
+        let late = begun..=SystemTime::now();
+        if !seen.values().flatten().any(|t| late.contains(t)) {
+            while stamps(&round.files) == seen {
+                std::thread::sleep(POLL);
+            }
         }
+        begun = SystemTime::now();
         round = Round::new(global, args).run();
     }
 }
