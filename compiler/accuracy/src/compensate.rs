@@ -9,7 +9,7 @@ use gr_machine::{Control, Kinematics, KinematicsError, Machine};
 use gr_robot::{Action, RobotProgram, Step, Target, Zone};
 
 mod motion;
-pub use motion::{CompensatedMotion, motion, work_shift};
+pub use motion::{CompensatedMotion, motion};
 
 /// A machine whose geometry is known to differ from what its control computes with.
 pub struct Corrector {

@@ -42,6 +42,8 @@ impl Budget {
         let single = file.map(|a| &a.parameters);
         let says = grade.is_some() || single.is_some_and(|p| !p.is_empty());
         let by_grade = if options.usp2009 { grade::tolerance_usp2009 } else { grade::tolerance };
+        let joints_unsaid = unsaid.len();
+        let mut said_of_any = false;
         let geometry = says.then(|| {
             let mut out = Vec::new();
             for p in machine.parameters() {
@@ -55,10 +57,16 @@ impl Budget {
                 if tolerance.is_none() && !p.name.ends_with(".zero") {
                     unsaid.push(p.name.clone());
                 }
+                said_of_any |= tolerance.is_some();
                 out.push(tolerance.unwrap_or(0.0));
             }
             out
         });
+        if !said_of_any {
+            // A grade says nothing of a machine whose numbers are all angles.
+            unsaid.truncate(joints_unsaid);
+            return Budget { joints, geometry: None, unsaid };
+        }
         Budget { joints, geometry, unsaid }
     }
 }
@@ -155,12 +163,15 @@ impl Spread {
     }
 }
 
-/// Up to so many causes all patterns of signs are tried.
+/// Up to so many causes in space all patterns of signs are tried.
 const ALL_PATTERNS: usize = 14;
 
 /// The greatest length of a sum of vectors with free signs. With many vectors a sum that no single change of sign and
 /// no turn towards it makes longer, found from many directions.
 fn longest(moves: &[V3]) -> f64 {
+    if moves.iter().all(|v| v[2] == 0.0) {
+        return longest_flat(moves);
+    }
     if moves.len() > ALL_PATTERNS {
         return moves.iter().map(|d| climbed(moves, *d)).fold(0.0, f64::max);
     }
@@ -175,6 +186,27 @@ fn longest(moves: &[V3]) -> f64 {
         best = best.max(dot(sum, sum));
     }
     libm::sqrt(best)
+}
+
+/// The same for vectors across Z: the corners of the polygon that all sums fill are those where the signs follow a
+/// direction square to one of the vectors.
+fn longest_flat(moves: &[V3]) -> f64 {
+    let mut best = 0.0f64;
+    for d in moves {
+        // Those along the direction's vector itself may go either way.
+        let (mut across, mut along) = ([0.0; 2], [0.0; 2]);
+        for v in moves {
+            let side = d[0] * v[1] - d[1] * v[0];
+            let sum = if side == 0.0 { &mut along } else { &mut across };
+            let sign = if side == 0.0 { d[0] * v[0] + d[1] * v[1] } else { side };
+            let sign = if sign < 0.0 { -1.0 } else { 1.0 };
+            *sum = [sum[0] + sign * v[0], sum[1] + sign * v[1]];
+        }
+        for s in [1.0, -1.0] {
+            best = best.max(libm::hypot(across[0] + s * along[0], across[1] + s * along[1]));
+        }
+    }
+    best
 }
 
 fn climbed(moves: &[V3], mut direction: V3) -> f64 {
@@ -236,4 +268,27 @@ pub fn closed_form(machine: &Machine) -> bool {
         machine.chain,
         Chain::TwoLegs(_) | Chain::Opw(_) | Chain::Scara(_) | Chain::Planar3r(_) | Chain::Cartesian
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// In a plane as in space: a little way out of the plane makes nearly no difference.
+        #[test]
+        fn flat_vectors_as_others(list in prop::collection::vec((-10.0..10.0f64, -10.0..10.0f64), 1..9)) {
+            let flat: Vec<V3> = list.iter().map(|(x, y)| [*x, *y, 0.0]).collect();
+            let lifted: Vec<V3> = flat.iter().map(|v| [v[0], v[1], 1e-9]).collect();
+            prop_assert!((longest(&flat) - longest(&lifted)).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn parallel_vectors_add_up() {
+        assert_eq!(longest(&[[3.0, 4.0, 0.0], [-6.0, -8.0, 0.0]]), 15.0);
+        assert_eq!(longest(&[[3.0, 0.0, 0.0], [0.0, 4.0, 0.0]]), 5.0);
+        assert_eq!(longest(&[]), 0.0);
+    }
 }

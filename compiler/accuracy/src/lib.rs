@@ -11,6 +11,7 @@
 //! | `picture` | maps and bar charts as PNG and SVG |
 //! | `place` | where a part is best put |
 //! | `report` | errors along a program |
+//! | `words` | joints of machine tools from the words of a program |
 //! | `compensate` | correction for known deviations, of a robot's program or of motion |
 
 // `!(x <= limit)` is meant: a value that is not a number must fail the test.
@@ -25,5 +26,7 @@ pub mod outline;
 pub mod picture;
 pub mod place;
 pub mod report;
+mod words;
 
 pub use error::{Budget, BudgetOptions, Errors, Sensitivity, Spread, closed_form};
+pub use words::work_shift;

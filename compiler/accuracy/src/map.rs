@@ -1,8 +1,9 @@
 //! Maps over the work space: a quantity on a grid in a plane of the base.
 
 use crate::error::{Budget, Sensitivity, Spread, at_lever};
-use gr_machine::math::{Frame, M3, V3, eigenvalues, norm, product, rot_x, rotate, sub};
-use gr_machine::{Chain, Control, Kinematics, Machine, Opw, TwoLegs, differential};
+use gr_machine::math::{Frame, M3, V3, dot, eigenvalues, norm, product, rot_x, rotate, sub};
+use gr_machine::{Chain, Control, JointKind, Kinematics, Machine, Opw, TwoLegs, differential};
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// What a map shows.
@@ -10,9 +11,9 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 pub enum Quantity {
     /// Where the tool can go: 1.
     Workspace,
-    /// Condition number of the velocities of the tool point.
+    /// Condition number: one over the distance from a singularity.
     Condition,
-    /// Distance from a singularity: least over greatest singular value, 0 to 1.
+    /// Distance from a singularity: least over greatest singular value of the velocities, 0 to 1, whatever the units.
     Singularity,
     /// Product of the singular values of the velocities of the tool point (Yoshikawa); for three joints the determinant
     /// without its sign.
@@ -27,6 +28,8 @@ pub enum Quantity {
     Elastic(Part),
     /// Kinematic + geometric + elastic, the longest of each, µm.
     Total,
+    /// Root of the squares of the typical kinematic and geometric errors and the deflection, µm.
+    TotalRss,
     /// Stiffness in the softest direction, N/µm.
     Stiffness,
 }
@@ -42,7 +45,7 @@ pub enum Part {
 
 impl Quantity {
     /// Its name on the command line, and the other way round.
-    pub const NAMES: [(&'static str, Quantity); 19] = [
+    pub const NAMES: [(&'static str, Quantity); 20] = [
         ("workspace", Quantity::Workspace),
         ("condition", Quantity::Condition),
         ("singularity", Quantity::Singularity),
@@ -61,6 +64,7 @@ impl Quantity {
         ("elastic-y", Quantity::Elastic(Part::Axis(1))),
         ("elastic-z", Quantity::Elastic(Part::Axis(2))),
         ("total", Quantity::Total),
+        ("total-rss", Quantity::TotalRss),
         ("stiffness", Quantity::Stiffness),
     ];
 
@@ -84,7 +88,8 @@ impl Quantity {
             Quantity::Kinematic(part) => of("error by the joints", part),
             Quantity::Geometric(part) => of("error by the geometry", part),
             Quantity::Elastic(part) => of("deflection", part),
-            Quantity::Total => "joints, geometry and deflection together".into(),
+            Quantity::Total => "sum of the longest errors".into(),
+            Quantity::TotalRss => "root of squares of the typical errors".into(),
             Quantity::Stiffness => "stiffness in the softest direction".into(),
         }
     }
@@ -92,7 +97,7 @@ impl Quantity {
     /// Its unit; empty for a plain number and for what depends on the units of the joints.
     pub fn unit(self) -> &'static str {
         match self {
-            Quantity::Kinematic(_) | Quantity::Geometric(_) | Quantity::Elastic(_) | Quantity::Total => "µm",
+            Quantity::Kinematic(_) | Quantity::Geometric(_) | Quantity::Elastic(_) | Quantity::Total | Quantity::TotalRss => "µm",
             Quantity::Stiffness => "N/µm",
             _ => "",
         }
@@ -104,7 +109,7 @@ impl Quantity {
             Quantity::Kinematic(_) => (true, false, false),
             Quantity::Geometric(_) => (false, true, false),
             Quantity::Elastic(_) | Quantity::Stiffness => (false, false, true),
-            Quantity::Total => (true, true, false),
+            Quantity::Total | Quantity::TotalRss => (true, true, false),
             _ => (false, false, false),
         }
     }
@@ -139,7 +144,8 @@ pub struct Request {
     pub plane: Plane,
     /// Nodes to the right and up.
     pub size: (usize, usize),
-    /// Least and greatest coordinates to the right and up, mm; none = the whole work space.
+    /// Coordinates of the first and the last node to the right and up, mm; none = the whole work space, each node in the
+    /// middle of its mesh, so that the area has no bias.
     pub window: Option<[(f64, f64); 2]>,
     /// Force on the tool, N, for deflections.
     pub force: V3,
@@ -160,9 +166,16 @@ pub struct Map {
     pub size: (usize, usize),
     /// Coordinates of the first and the last node to the right and up, mm.
     pub window: [(f64, f64); 2],
+    /// The nodes are the middles of their meshes.
+    pub centred: bool,
+    /// There is a deflection in it.
+    pub elastic: bool,
     /// Values.
     pub values: Vec<f32>,
 }
+
+/// What everybody must know who reads a deflection.
+pub const DOUBT: &str = "deflection: springs of the drives only; the model of its source was never confirmed by better than a factor of 2";
 
 /// The range of a map, its extremes and their places.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -177,7 +190,7 @@ pub struct Summary {
     pub greatest: (f64, [f64; 2]),
     /// Mean value.
     pub mean: f64,
-    /// Extent of the nodes within reach, to the right and up, mm.
+    /// Extent of the nodes within reach, to the right and up, mm; of their meshes where the nodes are the middles.
     pub extent: [(f64, f64); 2],
 }
 
@@ -191,6 +204,11 @@ impl Map {
     pub fn place(&self, i: usize, j: usize) -> [f64; 2] {
         let step = self.step();
         [self.window[0].0 + i as f64 * step[0], self.window[1].0 + j as f64 * step[1]]
+    }
+    /// Least and greatest coordinates that are drawn, to the right and up, mm: those of the meshes where they are known.
+    pub fn border(&self) -> [(f64, f64); 2] {
+        let half = if self.centred { self.step().map(|s| s / 2.0) } else { [0.0; 2] };
+        [0, 1].map(|i| (self.window[i].0 - half[i], self.window[i].1 + half[i]))
     }
     /// Extremes; none when nothing is within reach.
     pub fn summary(&self) -> Option<Summary> {
@@ -220,7 +238,13 @@ impl Map {
             }
         }
         let step = self.step();
-        out.map(|s| Summary { area: s.nodes as f64 * step[0] * step[1], mean: sum / s.nodes as f64, ..s })
+        let half = if self.centred { 0.5 } else { 0.0 };
+        out.map(|s| Summary {
+            area: s.nodes as f64 * step[0] * step[1],
+            mean: sum / s.nodes as f64,
+            extent: [0, 1].map(|i| (s.extent[i].0 - half * step[i], s.extent[i].1 + half * step[i])),
+            ..s
+        })
     }
     /// As a table: one row per node within reach.
     pub fn csv(&self) -> String {
@@ -229,7 +253,8 @@ impl Map {
         let unit = self.quantity.unit();
         let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
         let name = |i: usize| ["x", "y", "z"][i];
-        let mut out = format!("{} mm,{} mm,{}{unit}\n", name(a), name(b), self.quantity.name());
+        let doubt = if self.elastic { " (deflection: to a factor of 2 at best)" } else { "" };
+        let mut out = format!("{} mm,{} mm,{}{unit}{doubt}\n", name(a), name(b), self.quantity.name());
         for (n, v) in self.values.iter().enumerate().filter(|(_, v)| !v.is_nan()) {
             let [x, y] = self.place(n % self.size.0, n / self.size.0);
             let _ = writeln!(out, "{x:.4},{y:.4},{v}");
@@ -247,13 +272,19 @@ pub struct Probe<'a> {
     /// Tool point on the flange.
     tool: Frame,
     start: Vec<f64>,
+    /// What one radian of a turning joint counts beside one mm of a sliding one, mm; once it is asked for.
+    lever: OnceLock<f64>,
+    /// The part of the base the tool can reach; once it is asked for.
+    extent: OnceLock<[(f64, f64); 3]>,
 }
 
 impl<'a> Probe<'a> {
     /// With the tool turned as at the machine's start.
     pub fn new(machine: &'a Machine) -> Probe<'a> {
         let start = machine.start_joints.clone().unwrap_or_default();
-        Probe { machine, kinematics: machine.kinematics(), turn: machine.start.frame().turn, tool: Frame::IDENTITY, start }
+        let kinematics = machine.kinematics();
+        let turn = machine.start.frame().turn;
+        Probe { machine, kinematics, turn, tool: Frame::IDENTITY, start, lever: OnceLock::new(), extent: OnceLock::new() }
     }
 
     /// With the point of this tool (on the flange) in place of the flange, and its axis as the flange's was; in a base
@@ -371,47 +402,111 @@ impl<'a> Probe<'a> {
 
     /// The part of the base the tool can reach, roughly: least and greatest X, Y and Z, mm.
     pub fn extent(&self) -> [(f64, f64); 3] {
+        *self.extent.get_or_init(|| self.searched_extent())
+    }
+
+    fn searched_extent(&self) -> [(f64, f64); 3] {
         if let Chain::TwoLegs(k) = &self.machine.chain {
             let (s, yaw) = (&k.shape, k.shape.yaw.0.abs().max(k.shape.yaw.1.abs()));
             let side = s.arm.1 * libm::sin(yaw);
             return [(s.arm.0 * libm::cos(yaw), s.arm.1), (-side, side), s.column];
         }
-        let mut out = [(f64::INFINITY, f64::NEG_INFINITY); 3];
-        let spread = |j: &gr_machine::Joint| {
-            let wide = if j.kind == gr_machine::JointKind::Revolute { std::f64::consts::PI } else { 500.0 };
-            (j.min.unwrap_or(-wide), j.max.unwrap_or(wide))
+        // The furthest places found so far, X down and up, Y, Z, with the joints there.
+        let mut far: [Option<(f64, Vec<f64>)>; 6] = Default::default();
+        let place = |q: &[f64], way: usize| {
+            let p = self.kinematics.forward_frame(q).ok()?.position[way / 2];
+            Some(if way % 2 == 0 { -p } else { p })
         };
-        for n in 1..4000u32 {
-            let q: Vec<f64> = self
-                .machine
-                .joints
-                .iter()
-                .enumerate()
-                .map(|(i, j)| {
-                    let (low, high) = spread(j);
-                    low + (high - low) * halton(n, [2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37][i % 12])
-                })
-                .collect();
-            if let Ok(f) = self.kinematics.forward_frame(&q) {
-                for (o, p) in out.iter_mut().zip(f.position) {
-                    *o = (o.0.min(p), o.1.max(p));
+        // The forward solution of a Tricept is a search itself.
+        let (samples, halvings) = if matches!(self.machine.chain, Chain::Tricept(_)) { (300, 10) } else { (4000, 22) };
+        for n in 1..samples {
+            let q = spread_joints(self.machine, n);
+            let Ok(f) = self.kinematics.forward_frame(&q) else { continue };
+            for (way, best) in far.iter_mut().enumerate() {
+                let v = if way % 2 == 0 { -f.position[way / 2] } else { f.position[way / 2] };
+                if best.as_ref().is_none_or(|(b, _)| v > *b) {
+                    *best = Some((v, q.clone()));
                 }
             }
         }
-        out.map(|(a, b)| if a <= b { (a, b) } else { (-1000.0, 1000.0) })
+        let mut out = [-1000.0, 1000.0, -1000.0, 1000.0, -1000.0, 1000.0];
+        for (way, best) in far.into_iter().enumerate() {
+            let Some((v, q)) = best else { continue };
+            let v = self.climbed(v, q, halvings, |q| place(q, way));
+            out[way] = if way % 2 == 0 { -v } else { v };
+        }
+        [0, 1, 2].map(|i| (out[2 * i], out[2 * i + 1]))
+    }
+
+    /// The greatest value near those joints: one joint after the other, in steps that are halved.
+    fn climbed(&self, mut best: f64, mut q: Vec<f64>, halvings: u32, value: impl Fn(&[f64]) -> Option<f64>) -> f64 {
+        for halving in 0..halvings {
+            for (i, joint) in self.machine.joints.iter().enumerate() {
+                let (low, high) = limits(joint);
+                let step = (high - low) / f64::from(4u32 << halving);
+                for by in [step, -step] {
+                    let was = q[i];
+                    q[i] = (was + by).clamp(low, high);
+                    match value(&q).filter(|v| *v > best) {
+                        Some(v) => best = v,
+                        None => q[i] = was,
+                    }
+                }
+            }
+        }
+        best
+    }
+
+    /// Distance from a singularity at a place. On machines that place only a point that of the point alone; elsewhere the
+    /// turn of the tool counts too, a radian as much as the longest lever, so that neither mm nor rad decide; on a machine
+    /// whose spindle turns the tool anyway only the lean of its axis counts.
+    fn evenness(&self, p: V3) -> Option<f64> {
+        if matches!(self.machine.chain, Chain::TwoLegs(_) | Chain::Cartesian) || self.kinematics.control() == Control::Position {
+            return Some(share(&self.sensitivity(p, false)?.joints));
+        }
+        let size = *self.lever.get_or_init(|| longest_lever(self.machine));
+        let (q, mut columns) = match &self.machine.chain {
+            Chain::Opw(k) => {
+                let q = self.opw(k, p)?;
+                (q.to_vec(), differential::opw(k, &q).to_vec())
+            }
+            _ => {
+                let q = self.joints(p)?;
+                let columns = differential::velocity(self.machine, &q).ok()?;
+                (q, columns)
+            }
+        };
+        let lever = self.lever(&q)?;
+        if lever != [0.0; 3] {
+            columns.iter_mut().for_each(|c| {
+                let v = at_lever(c, lever);
+                c[..3].copy_from_slice(&v);
+            });
+        }
+        if self.kinematics.control() == Control::Axis {
+            let axis = self.kinematics.forward_frame(&q).ok()?.axis(2);
+            for c in &mut columns {
+                let along = c[3] * axis[0] + c[4] * axis[1] + c[5] * axis[2];
+                (0..3).for_each(|i| c[3 + i] -= along * axis[i]);
+            }
+        }
+        Some(differential::evenness(&columns, size))
     }
 
     fn value(&self, p: V3, request: &Request, budget: &Budget) -> Option<f64> {
         if request.quantity == Quantity::Workspace {
             return self.reaches(p).then_some(1.0);
         }
-        let geometry = matches!(request.quantity, Quantity::Geometric(_) | Quantity::Total);
+        match request.quantity {
+            Quantity::Condition => return self.evenness(p).map(|v| 1.0 / v.max(1e-12)),
+            Quantity::Singularity => return self.evenness(p),
+            _ => {}
+        }
+        let geometry = matches!(request.quantity, Quantity::Geometric(_) | Quantity::Total | Quantity::TotalRss);
         let s = self.sensitivity(p, geometry)?;
         let um = 1e3;
         Some(match request.quantity {
-            Quantity::Workspace => 1.0,
-            Quantity::Condition => 1.0 / share(&s.joints).max(1e-12),
-            Quantity::Singularity => share(&s.joints),
+            Quantity::Workspace | Quantity::Condition | Quantity::Singularity => return None,
             Quantity::Manipulability => libm::sqrt(spectrum(&s.joints).iter().map(|v| v.max(0.0)).product()),
             Quantity::Norm => libm::sqrt(s.joints.iter().map(|c| norm(*c) * norm(*c)).sum()),
             Quantity::Kinematic(part) => match (&request.signs, &budget.joints) {
@@ -434,6 +529,11 @@ impl<'a> Probe<'a> {
                 let of = |c: &[V3], b: &Option<Vec<f64>>| b.as_ref().map_or(0.0, |b| worst(c, b, Part::Length));
                 um * (of(&s.joints, &budget.joints) + of(&s.geometry, &budget.geometry) + elastic)
             }
+            Quantity::TotalRss => {
+                let elastic = s.deflection(request.force).map_or(0.0, norm);
+                let of = |c: &[V3], b: &Option<Vec<f64>>| b.as_ref().map_or(0.0, |b| typical(c, b));
+                um * libm::hypot(libm::hypot(of(&s.joints, &budget.joints), of(&s.geometry, &budget.geometry)), elastic)
+            }
             Quantity::Stiffness => {
                 let c = s.compliance()?;
                 let most = eigenvalues(c.iter().map(|r| r.to_vec()).collect()).into_iter().fold(0.0, f64::max);
@@ -452,6 +552,36 @@ fn legs_reach(k: &TwoLegs, at: V3) -> bool {
     }
     let h = k.lengths(at);
     within(h[0], s.legs[0]) && within(h[1], s.legs[1]) && k.broken(at).is_empty()
+}
+
+/// Places of the joints that are looked at for the longest lever.
+const LEVERS: u32 = 100;
+
+/// The longest way from an axis of a turning joint to the tool, mm: what a radian counts beside a mm.
+fn longest_lever(machine: &Machine) -> f64 {
+    let mut longest = 0.0f64;
+    for n in 1..LEVERS {
+        let Ok(columns) = differential::velocity(machine, &spread_joints(machine, n)) else { continue };
+        let turning = columns.iter().zip(&machine.joints).filter(|(_, j)| j.kind == JointKind::Revolute);
+        longest = turning.map(|(c, _)| norm([c[0], c[1], c[2]])).fold(longest, f64::max);
+    }
+    if longest > 0.0 { longest } else { 1.0 }
+}
+
+/// Limits of a joint; half a turn or half a metre where it has none.
+fn limits(j: &gr_machine::Joint) -> (f64, f64) {
+    let wide = if j.kind == JointKind::Revolute { std::f64::consts::PI } else { 500.0 };
+    (j.min.unwrap_or(-wide), j.max.unwrap_or(wide))
+}
+
+/// Joint values spread evenly over their limits, the n-th of as many as wanted.
+fn spread_joints(machine: &Machine, n: u32) -> Vec<f64> {
+    const BASES: [u32; 12] = [2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37];
+    let one = |(j, base): (&gr_machine::Joint, &u32)| {
+        let (low, high) = limits(j);
+        low + (high - low) * halton(n, *base)
+    };
+    machine.joints.iter().zip(BASES.iter().cycle()).map(one).collect()
 }
 
 fn halton(mut n: u32, base: u32) -> f64 {
@@ -495,6 +625,10 @@ fn worst(columns: &[V3], sizes: &[f64], part: Part) -> f64 {
     }
 }
 
+fn typical(columns: &[V3], sizes: &[f64]) -> f64 {
+    libm::sqrt(columns.iter().zip(sizes).map(|(c, s)| dot(*c, *c) * s * s).sum())
+}
+
 fn fixed(columns: &[V3], sizes: &[f64], part: Part) -> f64 {
     let mut sum = [0.0; 3];
     for (c, s) in columns.iter().zip(sizes) {
@@ -505,12 +639,39 @@ fn fixed(columns: &[V3], sizes: &[f64], part: Part) -> f64 {
 
 /// Draws up a map, on all cores; `progress` hears how many rows of how many are done.
 pub fn map(probe: &Probe<'_>, budget: &Budget, request: &Request, progress: &(dyn Fn(usize, usize) + Sync)) -> Map {
+    map_of(probe, budget, request, &probe.extent(), progress)
+}
+
+fn map_of(
+    probe: &Probe<'_>,
+    budget: &Budget,
+    request: &Request,
+    extent: &[(f64, f64); 3],
+    progress: &(dyn Fn(usize, usize) + Sync),
+) -> Map {
     let (a, b) = request.plane.axes();
-    let extent = probe.extent();
-    let window = request.window.unwrap_or([extent[a], extent[b]]);
     let (nx, ny) = request.size;
-    let mut out =
-        Map { quantity: request.quantity, plane: request.plane, size: request.size, window, values: Vec::new() };
+    let centred = request.window.is_none();
+    let window = request.window.unwrap_or_else(|| {
+        [(a, nx), (b, ny)].map(|(i, n)| {
+            let (low, high) = extent[i];
+            let half = (high - low) / (2 * n.max(1)) as f64;
+            (low + half, high - half)
+        })
+    });
+    let mut out = Map {
+        quantity: request.quantity,
+        plane: request.plane,
+        size: request.size,
+        window,
+        centred,
+        elastic: match request.quantity {
+            Quantity::Elastic(_) | Quantity::Stiffness => true,
+            Quantity::Total | Quantity::TotalRss => request.force != [0.0; 3],
+            _ => false,
+        },
+        values: Vec::new(),
+    };
     out.values = vec![f32::NAN; nx * ny];
     let step = out.step();
     let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
@@ -559,7 +720,7 @@ pub fn volume(probe: &Probe<'_>, layers: usize, nodes: usize) -> f64 {
                 signs: None,
                 deviations: None,
             };
-            map(probe, &budget, &request, &|_, _| {}).summary().map_or(0.0, |s| s.area) * height
+            map_of(probe, &budget, &request, &extent, &|_, _| {}).summary().map_or(0.0, |s| s.area) * height
         })
         .sum()
 }
@@ -579,8 +740,21 @@ pub fn sample(probe: &Probe<'_>, budget: &Budget, request: &Request, count: usiz
     (1..=u32::try_from(count).unwrap_or(u32::MAX)).filter(one).count()
 }
 
+/// The same for mean sensitivities.
+pub fn sample_sensitivity(probe: &Probe<'_>, plane: Plane, count: usize) {
+    let (a, b) = plane.axes();
+    let extent = probe.extent();
+    for n in 1..=u32::try_from(count).unwrap_or(u32::MAX) {
+        let mut p = [0.0; 3];
+        p[plane.axis] = plane.at;
+        p[a] = extent[a].0 + (extent[a].1 - extent[a].0) * halton(n, 2);
+        p[b] = extent[b].0 + (extent[b].1 - extent[b].0) * halton(n, 3);
+        probe.sensitivity(p, true);
+    }
+}
+
 /// Calls with every place of a grid in a plane of the work space, borders included.
-fn nodes(probe: &Probe<'_>, plane: Plane, size: (usize, usize), mut look: impl FnMut(V3)) {
+fn nodes(probe: &Probe<'_>, plane: Plane, size: (usize, usize), progress: &dyn Fn(usize, usize), mut look: impl FnMut(V3)) {
     let (a, b) = plane.axes();
     let extent = probe.extent();
     let at = |e: (f64, f64), n: usize, of: usize| e.0 + (e.1 - e.0) * n as f64 / (of.max(2) - 1) as f64;
@@ -591,16 +765,22 @@ fn nodes(probe: &Probe<'_>, plane: Plane, size: (usize, usize), mut look: impl F
             (p[a], p[b]) = (at(extent[a], i, size.0), at(extent[b], j, size.1));
             look(p);
         }
+        progress(j + 1, size.1);
     }
 }
 
 /// Mean movement of the tool point per unit of each number of the geometry, over the nodes within reach: by axis and
-/// in length, mm per mm or rad.
-pub fn mean_sensitivity(probe: &Probe<'_>, plane: Plane, size: (usize, usize)) -> Vec<(String, [f64; 4])> {
+/// in length, mm per mm or rad; none when nothing is within reach. `progress` hears how many rows of how many are done.
+pub fn mean_sensitivity(
+    probe: &Probe<'_>,
+    plane: Plane,
+    size: (usize, usize),
+    progress: &dyn Fn(usize, usize),
+) -> Option<Vec<(String, [f64; 4])>> {
     let names = probe.machine.parameters();
     let mut sums = vec![[0.0; 4]; names.len()];
     let mut count = 0usize;
-    nodes(probe, plane, size, |p| {
+    nodes(probe, plane, size, progress, |p| {
         let Some(s) = probe.sensitivity(p, true) else { return };
         count += 1;
         for (sum, c) in sums.iter_mut().zip(&s.geometry) {
@@ -608,8 +788,8 @@ pub fn mean_sensitivity(probe: &Probe<'_>, plane: Plane, size: (usize, usize)) -
             sum[3] += norm(*c);
         }
     });
-    let mean = |s: [f64; 4]| s.map(|v| v / count.max(1) as f64);
-    names.into_iter().zip(sums).map(|(p, s)| (p.name, mean(s))).collect()
+    let mean = |s: [f64; 4]| s.map(|v| v / count as f64);
+    (count > 0).then(|| names.into_iter().zip(sums).map(|(p, s)| (p.name, mean(s))).collect())
 }
 
 /// The same as Gojtan 2009, equation 7.5, has it: mean change of the yaw, rad/mm, and of the arm's length, mm/mm. None
@@ -619,7 +799,7 @@ pub fn mean_sensitivity_usp2009(probe: &Probe<'_>, plane: Plane, size: (usize, u
     let names = probe.machine.parameters();
     let mut sums = vec![[0.0; 2]; names.len()];
     let mut count = 0usize;
-    nodes(probe, plane, size, |p| {
+    nodes(probe, plane, size, &|_, _| {}, |p| {
         let at = k.place_of(p);
         let Some(columns) = k.by_parameters(at).filter(|_| legs_reach(k, at)) else { return };
         count += 1;

@@ -77,19 +77,22 @@ impl Picture {
         }
     }
 
-    /// A map with axes and a bar of colors.
-    pub fn map(map: &Map, title: &str) -> Picture {
+    /// A map with axes and a bar of colors; below it, what else must be known to read it.
+    pub fn map(map: &Map, title: &str, notes: &[String]) -> Picture {
         const WIDE: f32 = 820.0;
         const TALL: f32 = 820.0;
         const LEFT: f32 = 86.0;
         const TOP: f32 = 78.0;
-        let span = [0, 1].map(|i| (map.window[i].1 - map.window[i].0).max(1e-9));
+        const NOTE: f32 = 9.0;
+        let border = map.border();
+        let span = [0, 1].map(|i| (border[i].1 - border[i].0).max(1e-9));
         let scale = (f64::from(WIDE) / span[0]).min(f64::from(TALL) / span[1]);
         let (w, h) = ((span[0] * scale) as f32, (span[1] * scale) as f32);
         // The machine in the first line, what is shown in the second.
         let (machine, what) = title.split_once(": ").unwrap_or((title, ""));
-        let wide = (LEFT + w + 150.0).max(LEFT + 20.0 + font::width(machine, 14.0).max(font::width(what, 11.0)));
-        let size = (wide.ceil() as u32, (TOP + h + 92.0).ceil() as u32);
+        let longest = notes.iter().map(|n| font::width(n, NOTE)).fold(font::width(machine, 14.0).max(font::width(what, 11.0)), f32::max);
+        let wide = (LEFT + w + 150.0).max(LEFT + 20.0 + longest);
+        let size = (wide.ceil() as u32, (TOP + h + 92.0 + 18.0 * notes.len() as f32).ceil() as u32);
         let mut p = Picture { size, title: title.to_string(), shapes: Vec::new() };
         p.text(machine, [LEFT, 26.0], 14.0, 0.0);
         p.text(what, [LEFT, 48.0], 11.0, 0.0);
@@ -98,12 +101,18 @@ impl Picture {
         let flat = !(range.1 - range.0 > 1e-9 * range.1.abs().max(1e-9));
         let share = |v: f64| if flat { 0.6 } else { (v - range.0) / (range.1 - range.0) };
         let (iw, ih) = (w.max(1.0) as usize, h.max(1.0) as usize);
+        let step = map.step();
+        // The node whose mesh a place to the right or up is in.
+        let node = |share: f64, k: usize, count: usize| {
+            let at = (border[k].0 + share * span[k] - map.window[k].0) / step[k].max(1e-12);
+            (libm::round(at).max(0.0) as usize).min(count.max(1) - 1)
+        };
         let mut pixels = Vec::with_capacity(iw * ih);
         for y in 0..ih {
             for x in 0..iw {
-                let i = (x as f64 + 0.5) / iw as f64 * (map.size.0.max(1) - 1) as f64;
-                let j = (1.0 - (y as f64 + 0.5) / ih as f64) * (map.size.1.max(1) - 1) as f64;
-                let at = libm::round(j) as usize * map.size.0 + libm::round(i) as usize;
+                let i = node((x as f64 + 0.5) / iw as f64, 0, map.size.0);
+                let j = node(1.0 - (y as f64 + 0.5) / ih as f64, 1, map.size.1);
+                let at = j * map.size.0 + i;
                 let v = map.values.get(at).copied().unwrap_or(f32::NAN);
                 pixels.push((!v.is_nan()).then(|| color(share(f64::from(v)))));
             }
@@ -128,10 +137,13 @@ impl Picture {
             };
             p.text(text, [LEFT, TOP + h + 76.0], 11.0, 0.0);
             if !flat {
-                let spot = |at: [f64; 2]| [LEFT + ((at[0] - map.window[0].0) * scale) as f32, TOP + h - ((at[1] - map.window[1].0) * scale) as f32];
+                let spot = |at: [f64; 2]| [LEFT + ((at[0] - border[0].0) * scale) as f32, TOP + h - ((at[1] - border[1].0) * scale) as f32];
                 p.mark(spot(s.least.1), "least", LEFT + w);
                 p.mark(spot(s.greatest.1), "greatest", LEFT + w);
             }
+        }
+        for (n, note) in notes.iter().enumerate() {
+            p.text(note.as_str(), [LEFT, TOP + h + 98.0 + 18.0 * n as f32], NOTE, 0.0);
         }
         p
     }
@@ -151,7 +163,7 @@ impl Picture {
     fn axes(&mut self, map: &Map, [x, y, w, h]: [f32; 4]) {
         let (a, b) = map.plane.axes();
         let name = |i: usize| ["X", "Y", "Z"][i];
-        let [(x0, x1), (y0, y1)] = map.window;
+        let [(x0, x1), (y0, y1)] = map.border();
         for t in ticks(x0, x1, 8) {
             let at = x + ((t - x0) / (x1 - x0)) as f32 * w;
             self.shapes.push(Shape::Line([at, y + h], [at, y + h + 6.0], INK));

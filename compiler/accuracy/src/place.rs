@@ -193,18 +193,32 @@ fn search(parts: &[Part<'_>], budget: &Budget, points: &Points, aim: Aim, progre
     best.map(|(_, f)| f)
 }
 
-/// The largest rectangle, symmetric about Y = 0, whose every point is within reach at all heights given: X from, X to,
-/// and half its width, mm. X on a grid of 10 mm, the width to 1 mm.
-pub fn rectangle(probe: &Probe<'_>, heights: &[f64]) -> Option<(f64, f64, f64)> {
+/// A rectangle of stock.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Rectangle {
+    /// X from and to, mm.
+    pub x: (f64, f64),
+    /// Y of its middle, mm.
+    pub middle: f64,
+    /// Half its width, mm.
+    pub half: f64,
+}
+
+/// The largest rectangle, symmetric about the middle of the reach in Y, whose every point is within reach at all heights
+/// given. X on a grid of 10 mm, the width to 1 mm.
+pub fn rectangle(probe: &Probe<'_>, heights: &[f64]) -> Option<Rectangle> {
     const STEP: f64 = 10.0;
     const FINE: i64 = 10;
     let extent = probe.extent();
     let first = libm::floor(extent[0].0 / STEP) as i64;
     let last = libm::ceil(extent[0].1 / STEP) as i64;
+    let middle = libm::round((extent[1].0 + extent[1].1) * 5.0) / 10.0 + 0.0;
+    let most = (extent[1].1 - extent[1].0) / 2.0 + 1.0;
     // Half width at each X between the grid lines too: the border is not straight.
     let wide = |x: f64| -> f64 {
         let mut y = 0.0;
-        while y <= extent[1].1 && heights.iter().all(|z| probe.reaches([x, y, *z]) && probe.reaches([x, -y, *z])) {
+        let reached = |y: f64| heights.iter().all(|z| probe.reaches([x, middle + y, *z]) && probe.reaches([x, middle - y, *z]));
+        while y <= most && reached(y) {
             y += 1.0;
         }
         y - 1.0
@@ -227,5 +241,5 @@ pub fn rectangle(probe: &Probe<'_>, heights: &[f64]) -> Option<(f64, f64, f64)> 
             }
         }
     }
-    best.map(|(_, r)| r)
+    best.map(|(_, (from, to, half))| Rectangle { x: (from, to), middle, half })
 }

@@ -1,9 +1,13 @@
 //! Errors along a program, operation by operation.
 
+mod mill;
+
+pub use mill::report_of_words;
+
 use crate::error::{Budget, Errors, Sensitivity};
-use crate::material::{Cut, Material};
-use gr_ir::{Marker, Op, Program, Source};
-use gr_machine::{Kinematics, Machine};
+use crate::material::{Bore, Cut, Material};
+use gr_ir::{Marker, Op, Program, Source, State, Turn};
+use gr_machine::{Chain, Control, Kind, Kinematics, Machine};
 use gr_machine::math::{Frame, V3, add, about, cross, dot, norm, rotate, scale, sub, turn_of};
 use gr_robot::{Action, RobotProgram, Target};
 use std::collections::HashMap;
@@ -19,6 +23,12 @@ pub struct CutData {
     pub depth: Option<f64>,
     /// Width across it, mm.
     pub width: Option<f64>,
+    /// Lips of a drill; none = two.
+    pub lips: Option<f64>,
+    /// Half of a drill's point angle, rad.
+    pub point: Option<f64>,
+    /// Diameter of the hole that a drill makes wider, mm.
+    pub before: Option<f64>,
 }
 
 impl CutData {
@@ -29,17 +39,45 @@ impl CutData {
             teeth: self.teeth.or(other.teeth),
             depth: self.depth.or(other.depth),
             width: self.width.or(other.width),
+            lips: self.lips.or(other.lips),
+            point: self.point.or(other.point),
+            before: self.before.or(other.before),
         }
     }
-    /// Names of what is not known.
-    pub fn missing(&self) -> Vec<&'static str> {
-        let all = [
+    /// Names of what is not known for this kind of work.
+    pub fn missing(&self, work: Work) -> Vec<&'static str> {
+        let mill = [
             (self.diameter, "the diameter of the tool"),
             (self.teeth, "its number of teeth"),
             (self.depth, "the depth of cut"),
             (self.width, "the width of cut"),
         ];
-        all.into_iter().filter(|(v, _)| v.is_none()).map(|(_, n)| n).collect()
+        let drill = [(self.diameter, "the diameter of the drill"), (self.point, "the point angle of the drill (`--point`)")];
+        let all = match work {
+            Work::Mill => &mill[..],
+            Work::Drill => &drill[..],
+            Work::Other => &[],
+        };
+        all.iter().filter(|(v, _)| v.is_none()).map(|(_, n)| *n).collect()
+    }
+}
+
+/// How a tool takes the material away, as far as a force law goes.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub enum Work {
+    /// Across its axis, with teeth at its side.
+    #[default]
+    Mill,
+    /// Along its axis, with lips at its end: G73 G81 G82 G83, and the drilling of STEP-NC.
+    Drill,
+    /// Tapping, boring, reaming, countersinking: no law here.
+    Other,
+}
+
+impl Work {
+    /// By a canned cycle's number times ten.
+    fn of_cycle(code: i32) -> Work {
+        if matches!(code, 730 | 810 | 820 | 830) { Work::Drill } else { Work::Other }
     }
 }
 
@@ -56,6 +94,8 @@ pub struct Operation {
     pub tolerance: Option<f64>,
     /// How it cuts.
     pub cut: CutData,
+    /// What it does all the time, where that is known; else each place says.
+    pub work: Option<Work>,
 }
 
 /// The operations of a program, and which one each place of the source belongs to.
@@ -63,7 +103,24 @@ pub struct Operation {
 pub struct Operations {
     /// In order.
     pub list: Vec<Operation>,
-    places: HashMap<Source, (usize, f64)>,
+    /// The kinds of work of each.
+    works: Vec<Vec<Work>>,
+    places: HashMap<Source, Place>,
+}
+
+/// What happens at a place of the source.
+#[derive(Clone, Copy, PartialEq, Debug)]
+struct Place {
+    operation: usize,
+    /// Turns per minute.
+    turns: f64,
+    work: Work,
+}
+
+/// Turns per minute; 0 where it stands still or a surface speed decides.
+fn turns(state: &State) -> f64 {
+    let s = state.spindle(0);
+    if s.turn == Turn::Stop || s.surface.is_some() { 0.0 } else { s.speed.abs() }
 }
 
 impl Operations {
@@ -74,8 +131,11 @@ impl Operations {
         let mut tool = (0u32, String::new());
         let mut cursor = program.cursor();
         let mut open = None;
+        let mut work = Work::Mill;
         while let Some(view) = cursor.next() {
             match view.op {
+                Op::Begin { marker: Marker::Cycle, code, .. } => work = Work::of_cycle(code),
+                Op::Close(Marker::Cycle) => work = Work::Mill,
                 Op::Begin { marker: Marker::Workingstep, code, text } => {
                     step = Some((code, text.to_string()));
                     open = None;
@@ -105,12 +165,24 @@ impl Operations {
                     };
                     let workingstep = step.as_ref().map_or(0, |s| s.0);
                     out.list.push(Operation { name, tool: tool.0, workingstep, ..Operation::default() });
+                    out.works.push(Vec::new());
                     out.list.len() - 1
                 });
-                out.places.insert(view.source, (at, view.state.spindle(0).speed.abs()));
+                if let Some(works) = out.works.get_mut(at).filter(|w| !w.contains(&work)) {
+                    works.push(work);
+                }
+                out.places.insert(view.source, Place { operation: at, turns: turns(view.state), work });
             }
         }
         out
+    }
+
+    /// Kinds of work that an operation has.
+    pub fn works(&self, operation: usize) -> Vec<Work> {
+        if let Some(work) = self.list.get(operation).and_then(|o| o.work) {
+            return vec![work];
+        }
+        self.works.get(operation).cloned().unwrap_or_default()
     }
 }
 
@@ -121,6 +193,8 @@ pub struct Worst {
     pub source: Source,
     /// Tool point in the base, mm.
     pub point: V3,
+    /// Joints there, mm or rad.
+    pub joints: Vec<f64>,
     /// Errors there.
     pub errors: Errors,
     /// What makes most of it: names of joints and numbers of the geometry, and how far each alone moves the tool point,
@@ -143,6 +217,17 @@ pub struct Stretch {
     pub rss: f64,
 }
 
+/// Why the force at a place is not known, besides data that the whole operation lacks.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Unforced {
+    /// A mill is fed along its axis.
+    Axial,
+    /// There is no law of such work here.
+    NoLaw,
+    /// No turns per minute are known.
+    NoSpeed,
+}
+
 /// One row of the report.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Row {
@@ -156,8 +241,13 @@ pub struct Row {
     pub over: Vec<Stretch>,
     /// Largest kinematic, geometric and elastic error anywhere in it, mm.
     pub most: [Option<f64>; 3],
-    /// Least and greatest thickness of the chip, mm.
-    pub chip: Option<(f64, f64)>,
+    /// Least and greatest thickness of the chip, mm, and where.
+    pub chip: Option<[(f64, Source); 2]>,
+    /// Places whose force is not known: the first of each kind, and why.
+    pub unforced: Vec<(Source, Unforced)>,
+    /// How far at most the measured deviations of the machine put the tool point off, mm, and where: what compensation takes
+    /// away, and no part of the errors.
+    pub measured: Option<(f64, Source)>,
 }
 
 /// Errors along a program.
@@ -181,18 +271,7 @@ pub fn report(
     progress: &dyn Fn(usize, usize),
 ) -> Report {
     let kinematics = program.machine.kinematics();
-    let mut walk = Walk {
-        program,
-        operations,
-        budget,
-        material,
-        kinematics: &*kinematics,
-        frame: Frame::IDENTITY,
-        tool: Frame::IDENTITY,
-        rows: operations.list.iter().map(|o| row(o.clone())).collect(),
-        last: None,
-        over: None,
-    };
+    let mut walk = Walk::new(&program.machine, &*kinematics, operations, budget, material);
     let mut from = program.home;
     for (n, step) in program.steps.iter().enumerate() {
         if n % 4096 == 0 {
@@ -220,19 +299,38 @@ pub fn report(
             _ => {}
         }
     }
-    Report { rows: walk.rows.into_iter().filter(|r| r.places > 0).collect() }
+    walk.finish()
 }
 
 fn row(operation: Operation) -> Row {
-    Row { operation, places: 0, worst: None, over: Vec::new(), most: [None; 3], chip: None }
+    Row { operation, places: 0, worst: None, over: Vec::new(), most: [None; 3], chip: None, unforced: Vec::new(), measured: None }
+}
+
+/// A place that is looked at.
+struct Spot {
+    place: Place,
+    source: Source,
+    joints: Vec<f64>,
+    /// Tool point in the base, mm.
+    point: V3,
+    /// From the flange to it, base directions, mm.
+    lever: V3,
+    /// Direction of the feed in the base; zero where it does not move.
+    feed: V3,
+    /// Direction from the tip to the spindle in the base.
+    axis: V3,
+    /// Speed of the tool point, mm/s.
+    speed: f64,
 }
 
 struct Walk<'a> {
-    program: &'a RobotProgram,
+    machine: &'a Machine,
     operations: &'a Operations,
     budget: &'a Budget,
     material: Option<&'a Material>,
     kinematics: &'a dyn Kinematics,
+    /// Measured deviations of the geometry.
+    measured: Option<Vec<f64>>,
     frame: Frame,
     tool: Frame,
     rows: Vec<Row>,
@@ -241,7 +339,33 @@ struct Walk<'a> {
     over: Option<usize>,
 }
 
-impl Walk<'_> {
+impl<'a> Walk<'a> {
+    fn new(
+        machine: &'a Machine,
+        kinematics: &'a dyn Kinematics,
+        operations: &'a Operations,
+        budget: &'a Budget,
+        material: Option<&'a Material>,
+    ) -> Walk<'a> {
+        let rows = operations.list.iter().map(|o| row(o.clone())).collect();
+        let (frame, tool) = (Frame::IDENTITY, Frame::IDENTITY);
+        let measured = crate::compensate::deviations(machine);
+        Walk { machine, operations, budget, material, kinematics, measured, frame, tool, rows, last: None, over: None }
+    }
+
+    fn finish(self) -> Report {
+        Report { rows: self.rows.into_iter().filter(|r| r.places > 0).collect() }
+    }
+
+    /// What happens at a place of the source, where it is not too near to the one before.
+    fn place(&self, source: Source, point: V3) -> Option<Place> {
+        let mut place = *self.operations.places.get(&source)?;
+        let operation = self.operations.list.get(place.operation)?;
+        place.work = operation.work.unwrap_or(place.work);
+        let near = self.last.is_some_and(|(o, q)| o == place.operation && norm(sub(q, point)) < NEAR);
+        (!near).then_some(place)
+    }
+
     fn line(&mut self, from: &Target, end: &Target, speed: f64, source: Source) {
         let way = sub(end.position, from.position);
         let length = norm(way);
@@ -283,23 +407,42 @@ impl Walk<'_> {
 
     #[allow(clippy::too_many_arguments)]
     fn look(&mut self, p: V3, from: &Target, end: &Target, t: f64, feed: V3, speed: f64, source: Source) {
-        let Some(&(operation, turns)) = self.operations.places.get(&source) else { return };
         let here = self.frame.then(&Frame { position: p, turn: turn_of(end.quaternion) });
-        if self.last.is_some_and(|(o, q)| o == operation && norm(sub(q, here.position)) < NEAR) {
-            return;
-        }
+        let Some(place) = self.place(source, here.position) else { return };
         let flange = here.then(&self.tool.inverse());
         let Some(joints) = self.joints(&flange, from, end, t) else { return };
         // A machine that decides the turn of its tool itself stands otherwise than asked; the tool point is the same.
         let Ok(real) = self.kinematics.forward_frame(&joints) else { return };
         let lever = rotate(&real.turn, self.tool.position);
-        let Ok(at) = Sensitivity::new(&self.program.machine, &joints, lever) else { return };
-        self.last = Some((operation, here.position));
-        let axis = here.turn.map(|r| -r[2]);
-        let force = self.force(operation, turns, speed, rotate(&self.frame.turn, feed), axis);
+        let axis = self.towards_spindle(&here, &real);
+        let feed = rotate(&self.frame.turn, feed);
+        self.record(&Spot { place, source, joints, point: here.position, lever, feed, axis, speed });
+    }
+
+    /// Puts what is predicted at a place into its row.
+    fn record(&mut self, spot: &Spot) {
+        let Ok(at) = Sensitivity::new(self.machine, &spot.joints, spot.lever) else { return };
+        let (source, operation) = (spot.source, spot.place.operation);
+        self.last = Some((operation, spot.point));
+        let force = match spot.place.work {
+            Work::Drill => self.thrust(spot),
+            Work::Mill => self.force(spot),
+            Work::Other => None,
+        };
         let errors = Errors::new(&at, self.budget, force.map(|f| f.0));
+        let unforced = if force.is_none() { self.unforced(spot) } else { None };
         let Some(row) = self.rows.get_mut(operation) else { return };
+        if let Some(why) = unforced.filter(|why| row.unforced.iter().all(|(_, w)| w != why)) {
+            row.unforced.push((source, why));
+        }
         row.places += 1;
+        if let Some(deviations) = &self.measured {
+            let off = at.geometry.iter().zip(deviations).fold([0.0; 3], |sum, (c, d)| add(sum, scale(*c, *d)));
+            let off = norm(off);
+            if row.measured.is_none_or(|(most, _)| off > most) {
+                row.measured = Some((off, source));
+            }
+        }
         let parts = [
             errors.kinematic.map(|s| s.longest),
             errors.geometric.map(|s| s.longest),
@@ -311,8 +454,9 @@ impl Walk<'_> {
                 (a, b) => a.or(b),
             };
         }
-        if let Some((_, chip)) = force {
-            row.chip = Some(row.chip.map_or((chip, chip), |(a, b)| (a.min(chip), b.max(chip))));
+        if let Some(chip) = force.and_then(|f| f.1) {
+            let [least, most] = row.chip.unwrap_or([(chip, source); 2]);
+            row.chip = Some([if chip < least.0 { (chip, source) } else { least }, if chip > most.0 { (chip, source) } else { most }]);
         }
         let sum = errors.sum();
         if row.operation.tolerance.is_some_and(|t| sum > t) {
@@ -331,27 +475,76 @@ impl Walk<'_> {
             self.over = None;
         }
         if row.worst.as_ref().is_none_or(|w| sum > w.errors.sum()) {
-            let causes = causes(&self.program.machine, &at, self.budget);
-            row.worst = Some(Worst { source, point: here.position, errors, causes });
+            let causes = causes(self.machine, &at, self.budget);
+            row.worst = Some(Worst { source, point: spot.point, joints: spot.joints.clone(), errors, causes });
         }
     }
 
-    /// Force on the tool and the thickness of the chip.
-    fn force(&self, operation: usize, turns: f64, speed: f64, feed: V3, axis: V3) -> Option<(V3, f64)> {
-        let cut = self.operations.list.get(operation)?.cut;
+    /// Direction from the tip to the spindle: along Z of the frame on machine tools, against it on arms, whose frame points at
+    /// the part; a machine that decides the turn of its tool itself stands as it stands.
+    fn towards_spindle(&self, wanted: &Frame, real: &Frame) -> V3 {
+        let machine = self.machine;
+        if self.kinematics.control() == Control::Position {
+            return real.turn.map(|r| r[2]);
+        }
+        let away = machine.kind == Kind::Robot && !matches!(machine.chain, Chain::Planar3r(_));
+        wanted.turn.map(|r| if away { -r[2] } else { r[2] })
+    }
+
+    /// Why there is no force at a place, where that is not that a number of the whole operation is not known.
+    fn unforced(&self, spot: &Spot) -> Option<Unforced> {
+        self.material?;
+        let cut = self.operations.list.get(spot.place.operation)?.cut;
+        if norm(spot.feed) < 0.5 || !cut.missing(spot.place.work).is_empty() {
+            return None;
+        }
+        Some(match spot.place {
+            Place { work: Work::Other, .. } => Unforced::NoLaw,
+            Place { turns, .. } if !(turns > 0.0) => Unforced::NoSpeed,
+            _ => Unforced::Axial,
+        })
+    }
+
+    /// Thrust of a drill, and the thickness of its chip; on the way out there is none.
+    fn thrust(&self, spot: &Spot) -> Option<(V3, Option<f64>)> {
+        let cut = self.operations.list.get(spot.place.operation)?.cut;
+        if dot(spot.feed, spot.axis) > 0.0 {
+            return Some(([0.0; 3], None));
+        }
+        let bore = Bore {
+            diameter: cut.diameter?,
+            before: cut.before.unwrap_or(0.0),
+            lips: cut.lips.unwrap_or(LIPS),
+            edge: cut.point?,
+            feed: spot.speed * 60.0,
+            speed: spot.place.turns,
+        };
+        let (thrust, chip) = bore.thrust(self.material?)?;
+        Some((scale(spot.feed, -thrust), Some(chip)))
+    }
+
+    /// Force on a mill and the thickness of the chip; straight out of the material there is none.
+    fn force(&self, spot: &Spot) -> Option<(V3, Option<f64>)> {
+        let cut = self.operations.list.get(spot.place.operation)?.cut;
         let cut = Cut {
             diameter: cut.diameter?,
             teeth: cut.teeth?,
-            feed: speed * 60.0,
-            speed: turns,
+            feed: spot.speed * 60.0,
+            speed: spot.place.turns,
             depth: cut.depth?,
             width: cut.width?,
             edge: std::f64::consts::FRAC_PI_2,
         };
         let force = cut.force(self.material?)?;
-        Some((force.vector(feed, axis)?, force.chip))
+        match force.vector(spot.feed, spot.axis) {
+            Some(v) => Some((v, Some(force.chip))),
+            None => (dot(spot.feed, spot.axis) > 0.0).then_some(([0.0; 3], None)),
+        }
     }
 }
+
+/// Lips of a drill that nobody gives another number of: twist drills have two (ISO 5419).
+const LIPS: f64 = 2.0;
 
 /// So many causes are named.
 const NAMED: usize = 4;

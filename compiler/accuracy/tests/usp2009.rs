@@ -263,9 +263,9 @@ fn rectangles_and_volume() {
                 heights.iter().all(|z| probe.reaches([x, half, *z]) && probe.reaches([x, -half, *z]))
             })
         };
-        assert!(all(from, to, half) && all(got.0, got.1, got.2));
-        assert!(!all(from, to, half + 20.0) && !all(got.0, got.1, got.2 + 20.0));
-        assert!((got.1 - got.0) * got.2 >= (to - from) * half, "{got:?}");
+        assert!(got.middle == 0.0 && all(from, to, half) && all(got.x.0, got.x.1, got.half));
+        assert!(!all(from, to, half + 20.0) && !all(got.x.0, got.x.1, got.half + 20.0));
+        assert!((got.x.1 - got.x.0) * got.half >= (to - from) * half, "{got:?}");
     }
     let v = volume(&probe, 68, 120) / 1e6;
     assert!((v - 212.3).abs() < 1.0, "{v}");

@@ -204,9 +204,6 @@ pub fn build(unit: &Unit, goal: &Goal<'_>) -> Result<Result<(Built, Checked), St
         return of_exchange(unit, goal);
     }
     if goal.target == "canon" {
-        if goal.options.robot.compensate {
-            return Ok(Err("--compensate goes with targets that are made of motion, not with canon".into()));
-        }
         if goal.from_line.is_some() {
             return Ok(Err("--from-line goes with targets that are made of motion, not with canon".into()));
         }
@@ -256,8 +253,7 @@ fn idle(unit: &Unit, goal: &Goal<'_>) -> Option<String> {
     let reference = |o: &&str| !o.starts_with("--reference");
     let planned = id == "joint-gcode" && crate::robot::plans_joints(goal);
     // Motion is corrected before any target is made of it, by straight pieces within the tolerance.
-    let compensate = goal.options.robot.compensate && !id.starts_with("plan");
-    let corrects = |o: &&str| compensate && matches!(*o, "--compensate" | "--arc-tolerance");
+    let corrects = |o: &&str| goal.options.robot.compensate && *o == "--arc-tolerance" && heeded.contains(&"--compensate");
     let option = given(goal.options).into_iter().filter(|o| reference(o) && !corrects(o)).find(|o| !heeded.contains(o) || (planned && *o == "--round"))?;
     Some(format!("{option} does nothing for the target {}; `gcc-robot target show {}` says what it heeds", goal.target, goal.target))
 }

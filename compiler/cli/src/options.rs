@@ -519,12 +519,18 @@ pub struct AccuracyArgs {
     /// Width of cut across the tool, where the program states none, mm
     #[arg(long, value_name = "MM")]
     pub width: Option<f64>,
-    /// Teeth of the tools, where the program states none
+    /// Teeth of the mills, where the program states none
     #[arg(long, value_name = "COUNT")]
     pub teeth: Option<f64>,
+    /// Point angle of the drills, where the program states none, degrees; such drills have two lips
+    #[arg(long, value_name = "DEGREES")]
+    pub point: Option<f64>,
     /// Diameter of the tools, where neither program nor tool table states it, mm
     #[arg(long, value_name = "MM")]
     pub diameter: Option<f64>,
+    /// Map of the errors by joints and geometry over the work space, at the height of the largest error (.png, .svg, .csv)
+    #[arg(long, value_name = "FILE")]
+    pub map: Option<PathBuf>,
     /// How the report is written
     #[arg(long, value_enum, default_value_t, value_name = "FORMAT")]
     pub format: TableFormat,
@@ -562,7 +568,7 @@ pub struct MapArgs {
     #[arg(long, value_name = "MACHINE")]
     pub machine: String,
     /// workspace, condition, singularity, manipulability, norm, kinematic[-x|-y|-z], geometric[-x|-y|-z], elastic[-x|-y|-z], total,
-    /// stiffness, or sensitivity (bars)
+    /// total-rss, stiffness, or sensitivity (bars)
     #[arg(long, value_name = "NAME", default_value = "workspace")]
     pub quantity: String,
     /// Plane of the base: x=…, y=… or z=…, mm
@@ -577,6 +583,10 @@ pub struct MapArgs {
     /// Force on the tool, N: three numbers, for deflections
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
     pub force: Option<String>,
+    /// Deviations of the geometry, such as ls1x=0.0077,lu2y=-0.013 (mm or degrees); without them the worst pattern of the
+    /// tolerances
+    #[arg(long, value_name = "NAME=VALUE,…", allow_hyphen_values = true)]
+    pub deviations: Option<String>,
     /// Signs of the joint errors, such as +-+; without them the worst pattern
     #[arg(long, value_name = "SIGNS", allow_hyphen_values = true)]
     pub signs: Option<String>,

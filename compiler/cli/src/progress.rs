@@ -20,19 +20,23 @@ impl Progress {
         let mut text = what.into();
         let thread = std::thread::spawn(move || {
             let start = Instant::now();
-            let mut wait = Duration::from_secs(1);
+            // Drawn by the clock: news may come more often than anybody reads.
+            let mut next = start + Duration::from_secs(1);
+            let mut drawn = false;
             loop {
-                match receiver.recv_timeout(wait) {
+                match receiver.recv_timeout(next.saturating_duration_since(Instant::now())) {
                     Ok(Some(new)) => text = new,
-                    Err(RecvTimeoutError::Timeout) => {
-                        wait = Duration::from_millis(200);
-                        // A terminal that takes nothing is no reason to stop.
-                        let _ = write!(std::io::stderr(), "\r\x1b[K{text} ({} s)", start.elapsed().as_secs());
-                    }
+                    Err(RecvTimeoutError::Timeout) => {}
                     Ok(None) | Err(RecvTimeoutError::Disconnected) => break,
                 }
+                if Instant::now() >= next {
+                    next = Instant::now() + Duration::from_millis(200);
+                    drawn = true;
+                    // A terminal that takes nothing is no reason to stop.
+                    let _ = write!(std::io::stderr(), "\r\x1b[K{text} ({} s)", start.elapsed().as_secs());
+                }
             }
-            if wait < Duration::from_secs(1) {
+            if drawn {
                 let _ = write!(std::io::stderr(), "\r\x1b[K");
             }
         });

@@ -366,8 +366,9 @@ impl Reader<'_> {
         }
     }
     fn machine(&mut self, name: &str) -> Option<gr_machine::Machine> {
-        match crate::commands::machine::load(name, self.sources) {
-            Ok(machine) => {
+        match crate::commands::machine::doubted(name, self.sources) {
+            Ok((machine, doubts)) => {
+                self.show(&doubts);
                 if gr_machine::is_path(name) {
                     self.files.push(name.into());
                 }

@@ -162,3 +162,258 @@ fn compensated() {
     ];
     insta::assert_snapshot!("compensated_refused", refused.iter().map(whole).collect::<Vec<_>>().join("\n"));
 }
+
+/// Machine files with data of accuracy and stiffness for every kind of kinematics: id, more of the file, where the part is, and
+/// the program's cut, rotary words too where the machine has them.
+const KINDS: [(&str, &str, [f64; 3], &str); 9] = [
+    ("usp/2ups-prp", "", [800.0, 0.0, 0.0], "X1"),
+    ("abb/irb2400", "", [900.0, 50.0, 600.0], "X1"),
+    ("adept/one", "", [500.0, 200.0, 700.0], "X1"),
+    ("universal-robots/ur5", "", [400.0, 200.0, 100.0], "X1"),
+    ("unimation/puma560", "", [400.0, 200.0, 100.0], "X1"),
+    (
+        "comau/tricept806",
+        "[kinematics]\nkind = \"tricept\"\nbase_radius = 400\nplatform_radius = 150\nwrist_offset = 300\nflange_offset = 200\n",
+        [120.0, 60.0, -1700.0],
+        "X1",
+    ),
+    ("generic/mill3", "", [0.0, 0.0, 0.0], "X1"),
+    ("generic/mill5-ac-table", "", [0.0, 0.0, 0.0], "X60 A-30 C10"),
+    ("generic/mill5-cb-head", "", [0.0, 0.0, 0.0], "X60 B20"),
+];
+
+/// A file with an error of 5 µm or 0.01° in every joint, IT7, and springs of 10 kN/mm or 1e9 N·mm/rad.
+fn with_data(id: &str, more: &str, [x, y, z]: [f64; 3]) -> String {
+    let base = gr_machine::builtin(id).unwrap();
+    let turns = |j: &gr_machine::Joint| j.kind == gr_machine::JointKind::Revolute;
+    let errors: Vec<&str> = base.joints.iter().map(|j| if turns(j) { "0.01" } else { "0.005" }).collect();
+    let springs: String = base
+        .joints
+        .iter()
+        .map(|j| {
+            let k = if turns(j) { 1e9 } else { 1e4 };
+            format!("[[stiffness.member]]\njoint = \"{}\"\nname = \"drive\"\nstiffness = {k:.1}\n", j.name)
+        })
+        .collect();
+    let length = if base.is_upright() { -80 } else { 80 };
+    format!(
+        "format = 1\nid = \"test/kind\"\nextends = \"{id}\"\n{more}[frames.part]\nposition = [{x}, {y}, {z}]\n\
+         [[tool]]\nnumber = 1\nname = \"mill\"\nposition = [0, 0, {length}]\n\
+         [accuracy]\nsource = \"made up for this test\"\njoints = [{}]\ngrade = 7\n[stiffness]\nsource = \"made up for this test\"\n{springs}",
+        errors.join(", ")
+    )
+}
+
+fn vector(v: &serde_json::Value) -> [f64; 3] {
+    std::array::from_fn(|i| v[i].as_f64().unwrap())
+}
+
+/// Every kind of machine gets the report, and each number of it is what differences of the forward solution give, without
+/// anything of the models: the tool is where it is said to be, the deflection is that of springs under the force of the
+/// formula, and no pattern of signs makes more than the longest error.
+#[test]
+fn reports_of_every_kind_of_machine() {
+    use gr_machine::math::{Frame, add, dot, norm, scale, sub};
+    for (id, more, at, cut) in KINDS {
+        let folder = tempfile::tempdir().unwrap();
+        let text = with_data(id, more, at);
+        std::fs::write(folder.path().join("m.toml"), &text).unwrap();
+        let program = format!("G21 G90 G94 G17 G54\nT1 M6\nS1000 M3\nG0 X0 Y0 Z0\nF100\nG1 {cut}\nM2\n");
+        std::fs::write(folder.path().join("p.ngc"), program).unwrap();
+        let cutting = ["--material=1045", "--teeth=3", "--depth=1", "--width=6", "--diameter=10", "--format=json"];
+        let o = run(folder.path(), &[&["accuracy", "p.ngc", "--machine=m.toml", "--message-format=short"], &cutting[..]].concat());
+        let v: serde_json::Value = serde_json::from_slice(&o.stdout).unwrap_or_else(|e| panic!("{id}: {e}\n{}", whole(&o)));
+        let worst = &v["operations"][0]["worst"];
+        let joints: Vec<f64> = worst["joints"].as_array().unwrap().iter().map(|j| j.as_f64().unwrap()).collect();
+        let machine = gr_machine::parse(gr_text::FileId(0), &text).unwrap();
+        let (k, tool) = (machine.kinematics(), machine.cell.tool_frame(1));
+        let tip = |k: &dyn gr_machine::Kinematics, q: &[f64]| k.forward_frame(q).unwrap().then(&tool);
+        let point = vector(&worst["point"]);
+        assert!(norm(sub(tip(&*k, &joints).position, point)) < 1e-6, "{id}: {point:?}");
+        // The force: against the feed along X, the spindle's axis as it stands.
+        let spindle = if machine.is_upright() { tip(&*k, &joints).axis(2) } else { scale(tip(&*k, &joints).axis(2), -1.0) };
+        let across = sub([1.0, 0.0, 0.0], scale(spindle, spindle[0]));
+        let u = scale(across, 1.0 / norm(across));
+        let side = gr_machine::math::cross(spindle, u);
+        let (per_turn, angle) = (100.0 / 1000.0, 2.0 / 3.0 * std::f64::consts::FRAC_PI_2);
+        let cutting = per_turn * 2110.0 * (per_turn / 3.0f64).powf(-0.17);
+        let ahead = add(scale(u, angle.sin()), scale(side, angle.cos()));
+        let force = scale(add(scale(ahead, cutting), scale(u, 0.2 * cutting)), -1.0);
+        let column = |i: usize| {
+            let h = 1e-4;
+            let moved = |by: f64| {
+                let mut q = joints.clone();
+                q[i] += by;
+                tip(&*k, &q).position
+            };
+            scale(sub(moved(h), moved(-h)), 1.0 / (2.0 * h))
+        };
+        let columns: Vec<[f64; 3]> = (0..joints.len()).map(column).collect();
+        let springs = machine.cell.stiffness.as_ref().unwrap();
+        let stiffness = |i: usize| springs.joint(i, joints[i]).unwrap();
+        let mut deflection = [0.0; 3];
+        let mut energy = 0.0;
+        for (i, c) in columns.iter().enumerate() {
+            let yields = dot(*c, force) / stiffness(i);
+            deflection = add(deflection, scale(*c, yields));
+            energy += stiffness(i) * yields * yields;
+        }
+        let said = vector(&worst["elastic"]);
+        assert!(norm(sub(said, deflection)) < 1e-4 * norm(deflection), "{id}: {said:?}, not {deflection:?}");
+        assert!((dot(said, force) - energy).abs() < 1e-3 * energy && energy > 0.0, "{id}: work {} energy {energy}", dot(said, force));
+        // Signs: some patterns of joints, and of the geometry with the machine built so.
+        let longest = |of: &str| worst[of]["longest"].as_f64().unwrap();
+        let budget = gr_accuracy::Budget::new(&machine, gr_accuracy::BudgetOptions::default());
+        let (of_joints, of_geometry) = (budget.joints.unwrap(), budget.geometry.unwrap_or_default());
+        let sign = |n: usize, i: usize| if (n * 2654435761 >> (i % 24)) & 1 == 1 { 1.0 } else { -1.0 };
+        let mut most = 0.0f64;
+        for n in 0..64 {
+            let off = columns.iter().zip(&of_joints).enumerate().fold([0.0; 3], |s, (i, (c, e))| add(s, scale(*c, e * sign(n, i))));
+            assert!(norm(off) <= longest("kinematic") * 1.0001, "{id}");
+            most = most.max(norm(off));
+            if of_geometry.is_empty() || id.starts_with("comau") {
+                continue;
+            }
+            let deviations: Vec<f64> = of_geometry.iter().enumerate().map(|(i, e)| e * sign(n, i)).collect();
+            let Ok(f) = machine.deviated(&deviations).forward_frame(&joints) else { continue };
+            let off = sub(Frame::then(&f, &tool).position, point);
+            assert!(norm(off) <= longest("geometric") * 1.001 + 1e-9, "{id}: {off:?}");
+        }
+        assert!(most > 0.5 * longest("kinematic"), "{id}: {most}");
+        let parts = longest("kinematic") + if of_geometry.is_empty() { 0.0 } else { longest("geometric") } + norm(said);
+        assert!((worst["sum"].as_f64().unwrap() - parts).abs() < 1e-12, "{id}");
+    }
+}
+
+/// Gojtan 2009, section 8.4, as recomputed: deflection at (800, 0, 0) in µm, through the command.
+#[test]
+fn deflections_of_the_publication() {
+    let folder = tempfile::tempdir().unwrap();
+    let cut = ["--part=800,0,0", "--material=1045", "--teeth=14", "--depth=0.5", "--width=50", "--diameter=100", "--format=json"];
+    for (from, want) in [("X-10 Y0", [-0.620, -1.319]), ("X0 Y-10", [0.291, -2.811])] {
+        let program = format!("G21 G90 G94 G17 G54\nT1 M6\nS1591.5494309189532 M3\nF50\nG0 {from} Z0\nG1 X0 Y0\nM2\n");
+        std::fs::write(folder.path().join("p.ngc"), program).unwrap();
+        let o = run(folder.path(), &[&["accuracy", "p.ngc", "--machine=usp/2ups-prp"], &cut[..]].concat());
+        let v: serde_json::Value = serde_json::from_slice(&o.stdout).unwrap();
+        let worst = &v["operations"][0]["worst"];
+        assert!(vector(&worst["point"]).iter().zip([800.0, 0.0, 0.0]).all(|(a, b)| (a - b).abs() < 1e-9), "{worst}");
+        let said = vector(&worst["elastic"]);
+        assert!((0..2).all(|i| (said[i] * 1e3 - want[i]).abs() < 5e-4), "{from}: {said:?}");
+    }
+}
+
+/// A drill's thrust, a plunge whose force nobody knows, a spindle that stands still.
+#[test]
+fn forces_along_the_axis() {
+    let folder = tempfile::tempdir().unwrap();
+    let program = "G21 G90 G94 G17 G54\nT1 M6\nS1000 M3\nG0 X0 Y0 Z20\nG81 X0 Y0 Z-5 R2 F200\nG80\nT2 M6\nM3\nG0 X10 Y0 Z2\nF100\nG1 Z-2\nG1 X20\nG1 Z2\n\
+        T3 M6\nG0 X30 Z2\nG1 Y1\nM3\nG85 X30 Y0 Z-4 R2\nG80\nM2\n";
+    std::fs::write(folder.path().join("p.ngc"), program).unwrap();
+    let cut = ["--part=800,0,0", "--material=C45E", "--teeth=3", "--depth=1", "--width=6", "--diameter=10"];
+    let report = |more: &[&str]| run(folder.path(), &[&["accuracy", "p.ngc", "--machine=usp/2ups-prp", "--message-format=short"], &cut[..], more].concat());
+    insta::assert_snapshot!("forces_along_the_axis", whole(&report(&["--point=118"])));
+    insta::assert_snapshot!("no_point_angle", whole(&report(&["--format=csv"])));
+    // 0.5 · 2220 · (0.1 · sin 59°)^−0.14 · 5 · 0.2 · sin 59° = 1342 N up, on the column's spring.
+    let v: serde_json::Value = serde_json::from_slice(&report(&["--point=118", "--format=json"]).stdout).unwrap();
+    let elastic = vector(&v["operations"][0]["worst"]["elastic"]);
+    let column = gr_machine::builtin("usp/2ups-prp").unwrap().cell.stiffness.unwrap().joint(2, 0.0).unwrap();
+    assert!(elastic[2] > 0.0 && elastic[2] < 1342.0 / column * 1.01, "{elastic:?} {column}");
+}
+
+/// Numbers that no tool has are refused; so is a publication that is not about the machine.
+#[test]
+fn senseless_options() {
+    let folder = examples();
+    let all = [
+        vec!["--teeth=0"],
+        vec!["--width=nan"],
+        vec!["--depth=-1"],
+        vec!["--diameter=0"],
+        vec!["--point=5"],
+        vec!["--tolerance=-1"],
+        vec!["--reference=usp2009", "--it=6"],
+    ];
+    let mut text: Vec<String> = all.iter().map(|more| whole(&run(folder, &[&PLACED[..], more, &["--message-format=short"]].concat()))).collect();
+    text.push(whole(&run(folder, &["map", "--machine=abb/irb2400", "--reference=usp2009", "--message-format=short"])));
+    insta::assert_snapshot!(text.join("\n"));
+}
+
+/// What a map lacks is told beside it, and nothing is drawn as exact without a word.
+#[test]
+fn maps_say_what_they_lack() {
+    let folder = tempfile::tempdir().unwrap();
+    let arm = "format = 1\nid = \"test/arm\"\nextends = \"abb/irb2400\"\n[accuracy]\nsource = \"made up\"\njoints = [0.01, 0.01, 0.01, 0.01, 0.01, 0.01]\n\
+        parameter = [{ name = \"c2\", tolerance = 0.05 }]\n";
+    std::fs::write(folder.path().join("arm.toml"), arm).unwrap();
+    let slide = "format = 1\nid = \"test/tricept\"\nextends = \"comau/tricept806\"\n[kinematics]\nkind = \"tricept\"\nbase_radius = 400\nplatform_radius = 150\n\
+        wrist_offset = 300\nflange_offset = 200\n";
+    std::fs::write(folder.path().join("tricept.toml"), slide).unwrap();
+    let map = |args: &[&str]| {
+        let text = whole(&run(folder.path(), &[&["map", "--resolution=12", "--message-format=short", "-q"], args].concat()));
+        text.lines().filter(|l| !l.starts_with("outline") && !l.starts_with("least") && !l.starts_with("greatest")).collect::<Vec<_>>().join("\n")
+    };
+    let all = [
+        map(&["--machine=arm.toml", "--quantity=geometric", "--plane=z=800"]),
+        map(&["--machine=arm.toml", "--quantity=total", "--plane=z=800", "--force=-100,0,0"]),
+        map(&["--machine=usp/2ups-prp", "--quantity=total"]),
+        map(&["--machine=usp/2ups-prp", "--quantity=total-rss", "--force=-100,0,0"]),
+        map(&["--machine=generic/mill3", "--quantity=geometric", "--it=7"]),
+        map(&["--machine=tricept.toml", "--plane=z=-1700"]).lines().filter(|l| l.contains("E0701")).collect(),
+        map(&["--machine=adept/one", "--quantity=condition"]),
+    ];
+    insta::assert_snapshot!(all.join("\n"));
+}
+
+/// A limit altered in a file of one's own, by a copy and by `extends`: the model of the publication follows it. The numbers
+/// of nodes are those of the reference model with that limit.
+#[test]
+fn the_publication_with_other_limits() {
+    let folder = tempfile::tempdir().unwrap();
+    let limits = "[[joint]]\nname = \"h1\"\ntype = \"prismatic\"\nmin = 850\nmax = 1295\n[[joint]]\nname = \"h2\"\ntype = \"prismatic\"\nmin = 850\nmax = 1295\n";
+    std::fs::write(folder.path().join("extends.toml"), format!("format = 1\nid = \"test/extends\"\nextends = \"usp/2ups-prp\"\n{limits}")).unwrap();
+    let copy = gr_machine::source("usp/2ups-prp").unwrap().replace("1294.1", "1295");
+    std::fs::write(folder.path().join("copy.toml"), copy).unwrap();
+    for file in ["extends.toml", "copy.toml"] {
+        for (plane, nodes) in [("z=0", 9223), ("z=480", 4438)] {
+            let o = run(folder.path(), &["map", "--machine", file, "--reference=usp2009", "--plane", plane]);
+            assert!(whole(&o).contains(&format!("({nodes} nodes")), "{file} {plane}: {}", whole(&o));
+        }
+    }
+}
+
+/// The two patterns of table 7.1 over the work space: their ranges in the middle plane, µm.
+#[test]
+fn patterns_of_the_publication() {
+    let folder = tempfile::tempdir().unwrap();
+    let symmetric = "--deviations=ls1x=0.0077,ls1y=0.0099,ls2x=0.0077,ls2y=-0.0099,lu1x=-0.0083,lu1y=0.013,lu2x=-0.0083,lu2y=-0.013";
+    let asymmetric = "--deviations=ls1x=0.0077,ls1y=0.0099,ls2x=-0.0077,ls2y=0.0099,lu1x=-0.0083,lu1y=0.013,lu2x=0.0083,lu2y=0.013";
+    for (pattern, quantity, least, greatest) in [
+        (symmetric, "geometric-x", -16.75, -5.65),
+        (symmetric, "geometric-y", -22.43, 22.43),
+        (asymmetric, "geometric-x", -12.18, 12.18),
+        (asymmetric, "geometric-y", 27.41, 45.45),
+    ] {
+        let o = run(folder.path(), &["map", "--machine=usp/2ups-prp", "--reference=usp2009", pattern, "--quantity", quantity]);
+        let text = whole(&o);
+        let of = |word: &str| -> f64 { text.split(word).nth(1).and_then(|t| t.split(' ').next()).unwrap().parse().unwrap() };
+        assert!((of("\nleast ") - least).abs() < 0.006 && (of("\ngreatest ") - greatest).abs() < 0.006, "{quantity}: {text}");
+    }
+}
+
+/// Places for parts: the middle of a router that is not about zero, an arm.
+#[test]
+fn rectangles_elsewhere() {
+    let folder = tempfile::tempdir().unwrap();
+    let all = ["unb/router", "generic/mill3"].map(|id| whole(&run(folder.path(), &["place", "--machine", id])));
+    insta::assert_snapshot!(all.join("\n"));
+}
+
+/// A report with its map, as the README has it.
+#[test]
+fn a_report_with_its_map() {
+    let folder = tempfile::tempdir().unwrap();
+    let goal = folder.path().join("map.png");
+    let o = run(examples(), &[&PLACED[..], &["-q", "--map", goal.to_str().unwrap()]].concat());
+    assert!(o.status.success(), "{}", whole(&o));
+    assert!(std::fs::read(&goal).unwrap().starts_with(b"\x89PNG"));
+}

@@ -134,3 +134,86 @@ pub fn condition(columns: &[[f64; 6]], size: f64) -> f64 {
         _ => f64::INFINITY,
     }
 }
+
+/// Least over greatest singular value of a Jacobian, its turns and the lengths of its levers in units of `size`, mm: 0 where
+/// the tool can't go some way that its joints suffice for, 1 where all ways are alike. Of more than twelve joints the rest is
+/// left out.
+pub fn evenness(columns: &[[f64; 6]], size: f64) -> f64 {
+    const MOST: usize = 12;
+    let n = columns.len().min(MOST);
+    // The smaller of JᵀJ and JJᵀ: the rest of the other's eigenvalues are 0 and mean nothing.
+    let small = n.min(6);
+    let scaled = |c: &[f64; 6]| [c[0] / size, c[1] / size, c[2] / size, c[3], c[4], c[5]];
+    let mut j = [[0.0; 6]; MOST];
+    j.iter_mut().zip(columns).for_each(|(to, from)| *to = scaled(from));
+    let mut square = [[0.0; 6]; 6];
+    for (a, row) in square.iter_mut().enumerate().take(small) {
+        for (b, cell) in row.iter_mut().enumerate().take(small) {
+            *cell = if n <= 6 { (0..6).map(|k| j[a][k] * j[b][k]).sum() } else { j[..n].iter().map(|c| c[a] * c[b]).sum() };
+        }
+    }
+    let (least, most) = extremes(square, small);
+    if most > 0.0 { libm::sqrt((least / most).max(0.0)) } else { 0.0 }
+}
+
+/// Least and greatest eigenvalue of the first rows of a symmetric matrix, by Jacobi's turns, without a heap.
+fn extremes(mut a: [[f64; 6]; 6], n: usize) -> (f64, f64) {
+    for _ in 0..32 {
+        let off: f64 = (0..n).flat_map(|i| (0..i).map(move |k| (i, k))).map(|(i, k)| a[i][k] * a[i][k]).sum();
+        let size: f64 = (0..n).map(|i| a[i][i] * a[i][i]).sum();
+        if !(off > size * 1e-24) {
+            break;
+        }
+        for p in 0..n {
+            for q in p + 1..n {
+                if a[p][q] == 0.0 {
+                    continue;
+                }
+                let theta = (a[q][q] - a[p][p]) / (2.0 * a[p][q]);
+                let t = theta.signum() / (theta.abs() + libm::sqrt(theta * theta + 1.0));
+                let c = 1.0 / libm::sqrt(t * t + 1.0);
+                let s = t * c;
+                for row in a.iter_mut().take(n) {
+                    (row[p], row[q]) = (c * row[p] - s * row[q], s * row[p] + c * row[q]);
+                }
+                for k in 0..n {
+                    (a[p][k], a[q][k]) = (c * a[p][k] - s * a[q][k], s * a[p][k] + c * a[q][k]);
+                }
+            }
+        }
+    }
+    (0..n).map(|i| a[i][i]).fold((f64::INFINITY, 0.0), |(l, m), v| (l.min(v), m.max(v)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{builtin, math::rot_x};
+
+    fn at(id: &str, joints: &[f64], size: f64) -> f64 {
+        evenness(&velocity(&builtin(id).unwrap(), joints).unwrap(), size)
+    }
+
+    /// A stretched elbow, a straight wrist, a wrist over the first axis: none is hidden by the others.
+    #[test]
+    fn singular_places_are_seen() {
+        assert!(at("adept/one", &[0.3, 0.0, 100.0, 0.2], 800.0) < 1e-6);
+        assert!(at("adept/one", &[0.3, 1.2, 100.0, 0.2], 800.0) > 0.05);
+        let arm = [0.3, -0.2, 0.4, 0.5, 0.6, 0.1];
+        assert!(at("abb/irb2400", &arm, 1500.0) > 0.01);
+        assert!(at("abb/irb2400", &[0.3, -0.2, 0.4, 0.5, 0.0, 0.1], 1500.0) < 1e-6);
+        // Its size in other units changes nothing.
+        let m = builtin("abb/irb2400").unwrap();
+        let columns = velocity(&m, &arm).unwrap();
+        let metres: Vec<[f64; 6]> = columns.iter().map(|c| [c[0] / 1e3, c[1] / 1e3, c[2] / 1e3, c[3], c[4], c[5]]).collect();
+        assert!((evenness(&columns, 1500.0) - evenness(&metres, 1.5)).abs() < 1e-9);
+    }
+
+    #[test]
+    fn even_is_one() {
+        let turn = rot_x(0.4);
+        let columns: Vec<[f64; 6]> = (0..3).map(|i| [turn[0][i], turn[1][i], turn[2][i], 0.0, 0.0, 0.0]).collect();
+        assert!((evenness(&columns, 1.0) - 1.0).abs() < 1e-12);
+        assert_eq!(evenness(&[], 1.0), 0.0);
+    }
+}

@@ -28,6 +28,7 @@
 mod cartesian;
 mod cell;
 pub mod differential;
+mod doubts;
 mod figure;
 mod five_axis;
 mod identify;
@@ -51,6 +52,7 @@ mod urdf;
 
 pub use cartesian::Cartesian;
 pub use cell::{Cell, Controller, Coupling, External, Rapid, Signal, Spindle, ToolData, Zones, signal_number};
+pub use doubts::doubts;
 pub use five_axis::{Carrier, FiveAxis, Rotary};
 pub use identify::{Fit, identify};
 pub use keys::json_schema;
@@ -211,6 +213,8 @@ pub struct Machine {
     pub structure: Option<String>,
     /// What surrounds the joints: tools, frames, signals, controller.
     pub cell: Cell,
+    /// The machine with the `[reference]` of its file laid over it, where there is one.
+    pub published: Option<Box<Machine>>,
 }
 
 /// Kinematics of a template: no values, only the names of the missing keys.
@@ -232,6 +236,17 @@ impl Kinematics for Template {
 }
 
 impl Machine {
+    /// Whether Z of the flange points away from the part: on machine tools and on machines that only place a point. On
+    /// arms it points at the part.
+    pub fn is_upright(&self) -> bool {
+        self.kind != Kind::Robot || self.kinematics().control() == Control::Position
+    }
+    /// The tool point on the flange of a tool of which only the length is known.
+    pub fn tool_of_length(&self, length: f64) -> crate::math::Frame {
+        let nose = self.cell.tool_frame(u32::MAX);
+        nose.then(&crate::math::Frame::shift([0.0, 0.0, if self.is_upright() { -length } else { length }]))
+    }
+
     /// Its kinematics.
     pub fn kinematics(&self) -> Box<dyn Kinematics> {
         match &self.chain {

@@ -24,9 +24,10 @@ pub fn reference(id: &str) -> Option<Machine> {
     source(id).and_then(|text| parse_reference(FileId(0), text).ok())
 }
 
-/// A machine with the model of its publication, where there is one, and its cell as it is.
+/// A machine with the model of its publication, where its file has one, and its cell as it is.
 pub fn as_published(machine: &Machine) -> Machine {
-    reference(&machine.id).map_or_else(|| machine.clone(), |m| Machine { cell: machine.cell.clone(), ..m })
+    let published = machine.published.as_deref();
+    published.map_or_else(|| machine.clone(), |m| Machine { cell: machine.cell.clone(), ..m.clone() })
 }
 
 /// The id that a misspelt one most likely means.

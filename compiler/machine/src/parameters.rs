@@ -256,13 +256,19 @@ impl Kinematics for Skewed {
 }
 
 /// Movement of the tool (mm, then rad) per unit of each of the [`Machine::parameters`] with the joints held, one
-/// column each; central differences, exact for [`TwoLegs`].
+/// column each; exact for [`TwoLegs`] and for chains whose lengths don't turn the tool, by central differences elsewhere.
 pub fn parameter_columns(machine: &Machine, joints: &[f64]) -> Result<Vec<[f64; 6]>, KinematicsError> {
-    let parameters = machine.parameters();
     if let Chain::TwoLegs(k) = &machine.chain {
         let &[h1, h2, h3] = crate::kinematics::checked(joints, 3)? else { return Err(KinematicsError::NotFinite) };
         return k.parameter_columns([h1, h2, h3]).ok_or(KinematicsError::Singular);
     }
+    if let Some(lengths) = by_unit_lengths(&machine.chain, joints) {
+        let mut out = lengths?;
+        // A joint whose zero is off stands where its value would be greater by so much.
+        out.extend(crate::differential::velocity(machine, joints)?);
+        return Ok(out);
+    }
+    let parameters = machine.parameters();
     if let Chain::Tricept(_) = machine.chain {
         return by_inverse(machine, &parameters, joints);
     }
@@ -280,6 +286,43 @@ pub fn parameter_columns(machine: &Machine, joints: &[f64]) -> Result<Vec<[f64; 
     Ok(out)
 }
 
+/// Chains whose place is a sum of lengths times directions that the joints alone decide: the direction of a length is
+/// where the tool is when that length is 1 mm and the others are 0.
+fn by_unit_lengths(chain: &Chain, joints: &[f64]) -> Option<Result<Vec<[f64; 6]>, KinematicsError>> {
+    let column = |arm: &dyn Kinematics| {
+        let [x, y, z] = arm.forward_frame(joints)?.position;
+        Ok([x, y, z, 0.0, 0.0, 0.0])
+    };
+    Some(match chain {
+        Chain::Planar3r(_) => (0..3).map(|i| column(&Planar3r::new(one(i)))).collect(),
+        Chain::Scara(_) => scara(joints, column),
+        Chain::Opw(k) => (0..7).map(|i| column(&Opw::new(one(i), k.offsets(), k.signs()))).collect(),
+        Chain::ParallelWrist(_) => (0..6).map(|i| column(&ParallelWrist::new(one(i)))).collect(),
+        _ => return None,
+    })
+}
+
+/// A list of zeros with a 1 there.
+fn one<const N: usize>(at: usize) -> [f64; N] {
+    std::array::from_fn(|i| if i == at { 1.0 } else { 0.0 })
+}
+
+/// The stroke of a SCARA is no length of its arm: it is taken as 0.
+fn scara(
+    joints: &[f64],
+    column: impl Fn(&dyn Kinematics) -> Result<[f64; 6], KinematicsError>,
+) -> Result<Vec<[f64; 6]>, KinematicsError> {
+    let stroke = joints.get(2).copied().unwrap_or(0.0);
+    let lengths: [[f64; 3]; 3] = [one(0), one(1), one(2)];
+    lengths
+        .into_iter()
+        .map(|[l1, l2, height]| {
+            let mut c = column(&Scara::new([l1, l2], height))?;
+            c[2] += stroke;
+            Ok(c)
+        })
+        .collect()
+}
 
 /// The same where the forward solution is a search: what the joints would have to change at the same pose, times what
 /// the joints move the tool.

@@ -31,6 +31,7 @@ fn parse_as(file: FileId, text: &str, reference: bool) -> Result<Machine, Vec<Di
         Ok(root) => root,
         Err(e) => return Err(vec![syntax(file, &e)]),
     };
+    check.own_keys(&root);
     check.extend(&mut root);
     if !check.found.is_empty() {
         return Err(check.found);
@@ -41,12 +42,25 @@ fn parse_as(file: FileId, text: &str, reference: bool) -> Result<Machine, Vec<Di
     if !check.found.is_empty() {
         return Err(check.found);
     }
-    let overlay = root.remove("reference");
-    if let (true, Some(overlay)) = (reference, overlay) {
-        root.overlay(overlay);
+    let Some(overlay) = root.remove("reference") else {
+        let machine = check.machine(&root);
+        return if check.found.is_empty() { Ok(machine) } else { Err(check.found) };
+    };
+    let mut machine = check.machine(&root);
+    if !check.found.is_empty() && !reference {
+        return Err(check.found);
     }
-    let machine = check.machine(&root);
-    if check.found.is_empty() { Ok(machine) } else { Err(check.found) }
+    check.found.clear();
+    root.overlay(overlay);
+    let published = check.machine(&root);
+    if !check.found.is_empty() {
+        return Err(check.found);
+    }
+    if reference {
+        return Ok(published);
+    }
+    machine.published = Some(Box::new(published));
+    Ok(machine)
 }
 
 fn span(range: Range<usize>) -> Span {
@@ -110,6 +124,15 @@ impl Check {
 
     fn value(&mut self, place: &Range<usize>, message: impl Into<String>) {
         self.fault(code::MACHINE_BAD_VALUE, place, &[message.into()]);
+    }
+
+    /// What a file that extends another must say itself: the other's format and name are not its own.
+    fn own_keys(&mut self, root: &Node) {
+        let Some(extends) = root.get("extends") else { return };
+        for key in ROOT.iter().filter(|k| matches!(k.name, "format" | "id") && root.get(k.name).is_none()) {
+            let message = format!("`{}` is missing in a machine file: {}", key.name, key.doc);
+            self.fault(code::MACHINE_BAD_FILE, &extends.span, &[message]);
+        }
     }
 
     /// Lays the file over the built-in machine it extends. Built-in files extend at most one other.
@@ -198,6 +221,7 @@ impl Check {
             chain,
             joints,
             cell,
+            published: None,
         };
         if start.is_none() {
             default_start(&mut machine);
@@ -676,12 +700,13 @@ mod tests {
         let mut tried = 0;
         for row in gr_text::Code::all().map(gr_text::Code::def).filter(|d| d.options == Some("machine check")) {
             let (bad, good) = (row.bad.unwrap(), row.good.unwrap());
-            let found = parse(FileId(0), bad).expect_err(row.code);
+            let told = |text: &str| parse(FileId(0), text).err().unwrap_or_else(|| crate::doubts(FileId(0), text));
+            let found = told(bad);
             assert_eq!(found.iter().map(|d| d.code.def().code).collect::<Vec<_>>(), [row.code]);
-            parse(FileId(0), good).unwrap_or_else(|e| panic!("{}: {e:?}", row.code));
+            assert_eq!(told(good), [], "{}", row.code);
             tried += 1;
         }
-        assert_eq!(tried, 6);
+        assert_eq!(tried, 7);
     }
 
     #[test]
@@ -706,6 +731,9 @@ mod tests {
         assert!(all(&format!("{cell}[kinematics]\nlengths = [0.1, -0.135, 0, 0.615, 0.705, 0.755, 0.085]\n")).contains("metres"));
         assert!(all(&format!("{cell}[kinematics]\nlengths = [0, 0, 0, 0, 0, 0, 0]\n")).contains("above zero"));
         assert!(all(&format!("{cell}[frames.table]\nposition = [nan, 0, 0]\n")).contains("finite"));
+        // What is extended doesn't say it for the file.
+        assert!(all("id = \"shop/x\"\nextends = \"abb/irb2400\"\n").contains("`format` is missing"));
+        assert!(all("format = 1\nextends = \"abb/irb2400\"\n").contains("`id` is missing"));
         assert!(all("format = 1\nid = \"shop/x\"\nextends = \"abb/irb240\"\n").contains("did you mean `abb/irb2400`?"));
         assert!(all("format = 1\nid = \"shop/x\"\nextends = \"comau/tricept806\"\n").contains("platform_radius"));
         assert!(faults(&format!("{cell}[[joint]]\nname = \"J1\"\nmin = 200\n"))[0].0 == "machine/bad-value");

@@ -235,6 +235,7 @@ impl<'m> Aim<'m> {
             shape: Shape::Toolpath,
             copies: vec![Frame::default()],
             tolerance: None,
+            fit: None,
         };
         let operation = Operation {
             origin: origin(operation),

@@ -225,8 +225,10 @@ pub struct Feature {
     pub shape: Shape,
     /// Where it is repeated: placements in the setup. Without a pattern, just `frame`.
     pub copies: Vec<Frame>,
-    /// The least plus-or-minus tolerance that its own lengths are written with, mm.
+    /// The least plus-or-minus tolerance that its own lengths are written with, mm; half the band where it is on one side.
     pub tolerance: Option<f64>,
+    /// A fit that one of its lengths is written with: its limits are not read.
+    pub fit: Option<u64>,
 }
 
 /// Shapes.

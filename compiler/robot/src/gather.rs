@@ -519,7 +519,8 @@ impl<'a> Gather<'a> {
         let nose = self.machine.cell.tool_frame(u32::MAX);
         let (name, frame, mass) = match known {
             Some(t) => {
-                let table = t.frame.position[2];
+                // Along the spindle from its nose, on upright machines too.
+                let table = if self.machine.is_upright() { -t.frame.position[2] } else { t.frame.position[2] };
                 if length != 0.0 && (length - table).abs() > 1e-3 {
                     let args = [number.to_string(), format!("{length:.3}"), format!("{table:.3}")];
                     self.findings.once_each(code::ROBOT_TOOL_LENGTH, Some(self.source), &args);
@@ -532,7 +533,7 @@ impl<'a> Gather<'a> {
                     self.cannot("a tool offset in X or Y");
                     return None;
                 }
-                (format!("tool{number}"), nose.then(&Frame::shift([0.0, 0.0, length])), None)
+                (format!("tool{number}"), self.machine.tool_of_length(length), None)
             }
             None if self.machine.kind != Kind::Robot => (format!("tool{number}"), nose, None),
             None => {

@@ -93,7 +93,10 @@ pub fn diagnose(mut view: View) -> Answer<(Vec<Diagnostic>, Elsewhere)> {
             view.release();
             let text = view.text.to_string();
             match schema {
-                gr_ide::config::Schema::Machine => gr_machine::parse(FileId(0), &text).err().unwrap_or_default(),
+                gr_ide::config::Schema::Machine => {
+                    let found = gr_machine::parse(FileId(0), &text).err().unwrap_or_default();
+                    [found, gr_machine::doubts(FileId(0), &text)].concat()
+                }
                 gr_ide::config::Schema::Project => view.host.check_project(&view.path, &text),
             }
         }

@@ -6,9 +6,10 @@
 //! count from there, and at the zero itself there is none.
 
 use super::{Correction, Corrector, halved};
+use crate::words::{Asked, Words, frame, rotary, slid, started, tool};
 use gr_ir::{Axes, Builder, FeedMode, Op, Pose, Program, Source, State, geometry};
-use gr_machine::math::{Frame, V3, add, norm, rot_z, rotate, solve, sub, transpose};
-use gr_machine::{Chain, Control, JointKind, Kind, Kinematics, KinematicsError, Machine};
+use gr_machine::math::{Frame, V3, add, rotate, sub, transpose};
+use gr_machine::{Kinematics, KinematicsError, Machine};
 
 /// A corrected program.
 #[derive(Clone, PartialEq, Debug)]
@@ -41,34 +42,6 @@ pub fn motion(
     Ok(CompensatedMotion { program: run.out.finish(), corrections: run.corrections, arcs: run.arcs })
 }
 
-/// How the words of a program put the tool where it is.
-enum Words {
-    /// Rotary words are rotary joints; these are the joints that slide, and joint and word of each that turns.
-    Joints { sliding: [usize; 3], turning: Vec<(usize, usize)> },
-    /// X Y Z alone.
-    Point,
-}
-
-impl Words {
-    fn of(machine: &Machine) -> Result<Words, String> {
-        if matches!(machine.chain, Chain::Cartesian | Chain::FiveAxis(_)) {
-            let word = |i: usize| {
-                let letter = machine.joints[i].word.map_or("XYZABCUVW".as_bytes().get(i).copied(), |c| u8::try_from(c).ok());
-                letter.and_then(|l| b"XYZABCUVW".iter().position(|w| *w == l.to_ascii_uppercase()))
-            };
-            let of_kind = |kind| (0..machine.joints.len()).filter(move |i| machine.joints[*i].kind == kind);
-            let sliding: Vec<usize> = of_kind(JointKind::Prismatic).filter(|i| word(*i).is_some_and(|w| w < 3)).collect();
-            let turning = of_kind(JointKind::Revolute).filter_map(|i| Some((i, word(i)?))).collect();
-            let sliding = sliding.try_into().map_err(|_| "its machine has no X, Y and Z that slide".to_string())?;
-            return Ok(Words::Joints { sliding, turning });
-        }
-        if machine.kinematics().control() == Control::Position {
-            return Ok(Words::Point);
-        }
-        Err("which configuration the joints take is not in this target; a robot's own language or joint-gcode has it".into())
-    }
-}
-
 /// What the correction at the program's zero depends on.
 type ZeroKey = (Frame, Frame, [f64; 3]);
 
@@ -80,13 +53,6 @@ struct Run<'a> {
     out: Builder,
     corrections: Vec<Correction>,
     arcs: usize,
-}
-
-/// A point as the program has it.
-struct Asked {
-    tip: V3,
-    tool: Frame,
-    rotary: [f64; 3],
 }
 
 impl Run<'_> {
@@ -148,7 +114,7 @@ impl Run<'_> {
         let zero = self.at_zero(state)?;
         let (by, left) = self.correction(&pose.axes, state)?;
         let by = sub(by, zero);
-        let frame = self.frame(state);
+        let frame = frame(self.machine, state);
         let mut out = *pose;
         let moved = add(pose.xyz(), rotate(&transpose(&frame.turn), by));
         out.axes[..3].copy_from_slice(&moved);
@@ -162,7 +128,7 @@ impl Run<'_> {
         if matches!(self.words, Words::Point) {
             return Ok([0.0; 3]);
         }
-        let key = (self.frame(state), self.tool(state), rotary(&[0.0; 9], state));
+        let key = (frame(self.machine, state), tool(self.machine, state), rotary(&[0.0; 9], state));
         if let Some((known, by)) = &self.zero
             && *known == key
         {
@@ -175,8 +141,7 @@ impl Run<'_> {
 
     /// How far from a point the machine must be sent, base directions, and by what the tool's axis leans there, rad.
     fn correction(&self, axes: &Axes, state: &State) -> Result<(V3, f64), KinematicsError> {
-        let tip = self.frame(state).apply([axes[0], axes[1], axes[2]]);
-        let asked = Asked { tip, tool: self.tool(state), rotary: rotary(axes, state) };
+        let asked = Asked::new(self.machine, axes, state);
         match &self.words {
             Words::Joints { sliding, turning } => self.by_joints(&asked, sliding, turning),
             Words::Point => self.by_point(&asked),
@@ -184,14 +149,7 @@ impl Run<'_> {
     }
 
     fn by_joints(&self, asked: &Asked, sliding: &[usize; 3], turning: &[(usize, usize)]) -> Result<(V3, f64), KinematicsError> {
-        let mut joints = vec![0.0; self.machine.joints.len()];
-        for (joint, word) in turning {
-            // Rotary words are A, B and C.
-            joints[*joint] = word.checked_sub(3).and_then(|w| asked.rotary.get(w)).copied().unwrap_or(0.0);
-        }
-        for (joint, v) in sliding.iter().zip(asked.tip) {
-            joints[*joint] = v;
-        }
+        let joints = started(self.machine, asked, sliding, turning);
         let (nominal, real) = (&*self.corrector.nominal, &*self.corrector.real);
         let planned = slid(nominal, &joints, sliding, asked)?;
         let sent = slid(real, &planned, sliding, asked)?;
@@ -211,65 +169,6 @@ impl Run<'_> {
         let (command, joints) = self.corrector.command(&flange, &asked.tool, &[])?;
         Ok((sub(command.position, flange.position), self.corrector.lean(&joints, &flange, &asked.tool)))
     }
-
-    /// The work frame in the base.
-    fn frame(&self, state: &State) -> Frame {
-        const NAMES: [&str; 10] = ["", "G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3"];
-        let cell = &self.machine.cell;
-        let placed = NAMES.get(usize::from(state.work)).and_then(|n| cell.frames.get(*n)).copied();
-        placed.unwrap_or_else(|| cell.part_in_base()).then(&work_shift(state))
-    }
-
-    /// The tool point on the spindle's nose: the machine file's, else a tool as long as its offset.
-    fn tool(&self, state: &State) -> Frame {
-        let number = u32::try_from(state.tool).unwrap_or(0);
-        if self.machine.cell.tools.contains_key(&number) {
-            return self.machine.cell.tool_frame(number);
-        }
-        let length = state.tool_offset[2];
-        match self.machine.kind {
-            Kind::Robot => self.machine.cell.tool_frame(number).then(&Frame::shift([0.0, 0.0, length])),
-            _ => Frame::shift([0.0, 0.0, -length]),
-        }
-    }
-}
-
-/// Joint values that put the tool point there with the turning joints as they are.
-fn slid(machine: &dyn Kinematics, joints: &[f64], sliding: &[usize; 3], asked: &Asked) -> Result<Vec<f64>, KinematicsError> {
-    let tip = |q: &[f64]| Ok::<V3, KinematicsError>(machine.forward_frame(q)?.then(&asked.tool).position);
-    let mut q = joints.to_vec();
-    for _ in 0..super::STEPS {
-        let here = tip(&q)?;
-        let left = sub(asked.tip, here);
-        if norm(left) < 1e-12 * norm(asked.tip).max(1.0) {
-            break;
-        }
-        // The tool point goes evenly with what slides: one unit each says how.
-        let mut slope = vec![vec![0.0; 3]; 3];
-        for (k, joint) in sliding.iter().enumerate() {
-            let mut moved = q.clone();
-            moved[*joint] += 1.0;
-            for (row, v) in slope.iter_mut().zip(sub(tip(&moved)?, here)) {
-                row[k] = v;
-            }
-        }
-        let step = solve(slope, left.to_vec()).ok_or(KinematicsError::Singular)?;
-        for (joint, v) in sliding.iter().zip(step) {
-            q[*joint] += v;
-        }
-    }
-    Ok(q)
-}
-
-/// The work frame in the place of the part: work offset, rotation and local offset.
-pub fn work_shift(state: &State) -> Frame {
-    let (o, l) = (&state.work_offset, &state.local_offset);
-    Frame { turn: rot_z(state.rotation), position: [o[0], o[1], o[2]] }.then(&Frame::shift([l[0], l[1], l[2]]))
-}
-
-/// Rotary words with their offsets.
-fn rotary(axes: &Axes, state: &State) -> [f64; 3] {
-    [3, 4, 5].map(|i| axes[i] + state.work_offset[i] + state.local_offset[i] + state.tool_offset[i])
 }
 
 fn mixed(from: &Axes, to: &Axes, t: f64) -> Axes {

@@ -4,7 +4,8 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use gr_accuracy::material::{self, Material};
-use gr_accuracy::report::{CutData, Operations, Report, Row, report};
+use gr_accuracy::map::DOUBT;
+use gr_accuracy::report::{CutData, Operations, Report, Row, Stretch, Unforced, Work, report, report_of_words};
 use gr_accuracy::{Budget, BudgetOptions};
 use gr_ir::{Source, Sources as _};
 use gr_machine::Machine;
@@ -49,6 +50,9 @@ pub fn run(global: &Global, args: &AccuracyArgs) -> Exit {
     let Some(machine) = station.machine.clone() else {
         return refuse("accuracy", "it needs a machine: `--machine`, or `machine` in gcc-robot.toml");
     };
+    if let Some((what, why)) = senseless(args).or_else(|| misfit(&machine, args.reference, args.grade)) {
+        return refuse(&what, &why);
+    }
     let machine = referenced(machine, args.reference);
     let part = match &args.part {
         None => None,
@@ -72,7 +76,14 @@ pub fn run(global: &Global, args: &AccuracyArgs) -> Exit {
             return if checked.unreadable { Exit::Io } else { Exit::Findings };
         }
     };
-    let result = predict(args, &unit, &motion, &machine, part, &progress);
+    let result = predict(args, &unit, &motion, &machine, part, &progress).and_then(|(text, found, height)| {
+        let Some(goal) = &args.map else { return Ok(((text, Vec::new()), found)) };
+        let budget = Budget::new(&machine, BudgetOptions { grade: args.grade, usp2009: args.reference.is_some() });
+        match super::map::beside(global, &machine, &budget, height, goal) {
+            Ok(files) => Ok(((text, files), found)),
+            Err((what, why)) => Err(vec![Diagnostic::new(code::ACCURACY_BAD_OPTION, FileId(0), Span::default(), &[what, why])]),
+        }
+    });
     drop(progress);
     show(&mut renderer, &checked);
     let (made, found) = match result {
@@ -81,15 +92,56 @@ pub fn run(global: &Global, args: &AccuracyArgs) -> Exit {
     };
     show(&mut renderer, &Checked { sources: motion.sources, found, more: 0, unreadable: false });
     let mut exit = if made.is_some() { Exit::Ok } else { Exit::Findings };
-    if let Some(text) = made {
-        exit = match &args.output {
-            None => super::print(&text),
-            Some(goal) if goal == Path::new("-") => super::print(&text),
-            Some(goal) => super::write(&mut renderer, &mut sources, &args.file, &[(goal.clone(), text.into_bytes())]),
+    if let Some((text, files)) = made {
+        let mut files = files;
+        let printed = match &args.output {
+            Some(goal) if goal != Path::new("-") => {
+                files.push((goal.clone(), text.into_bytes()));
+                None
+            }
+            _ => Some(text),
         };
+        if !files.is_empty() {
+            exit = super::write(&mut renderer, &mut sources, &args.file, &files);
+        }
+        if let (Some(text), Exit::Ok) = (printed, exit) {
+            exit = super::print(&text);
+        }
     }
     renderer.finish(false);
     exit
+}
+
+/// An option whose number no tool and no part can have.
+fn senseless(args: &AccuracyArgs) -> Option<(String, String)> {
+    let above_zero = [
+        ("--tolerance", args.tolerance),
+        ("--depth", args.depth),
+        ("--width", args.width),
+        ("--diameter", args.diameter),
+    ];
+    let wrong = |(name, v): (&str, Option<f64>)| {
+        let v = v.filter(|v| !(*v > 0.0 && v.is_finite()))?;
+        Some((name.to_string(), format!("a length above zero is wanted, not {v}")))
+    };
+    let teeth = args.teeth.filter(|t| !(*t >= 1.0 && t.is_finite()));
+    let point = args.point.filter(|p| !(*p > 10.0 && *p <= 180.0));
+    above_zero
+        .into_iter()
+        .find_map(wrong)
+        .or_else(|| teeth.map(|t| ("--teeth".to_string(), format!("a tool has one tooth or more, not {t}"))))
+        .or_else(|| point.map(|p| ("--point".to_string(), format!("a point angle is between 10° and 180°, such as 118, not {p}"))))
+}
+
+/// A machine that the publication is not about, or a grade that it has no formula for.
+pub fn misfit(machine: &Machine, reference: Option<AccuracyReference>, grade: Option<u8>) -> Option<(String, String)> {
+    reference?;
+    if machine.published.is_none() || !matches!(machine.chain, gr_machine::Chain::TwoLegs(_)) {
+        let why = format!("the publication is about a 2UPS+PRP machine, and the file of {} has no `[reference]` of one", machine.id);
+        return Some(("--reference usp2009".into(), why));
+    }
+    let grade = grade.filter(|g| ![3, 5, 7].contains(g))?;
+    Some((format!("--it {grade}"), "the publication has formulas for the grades 3, 5 and 7 only; leave out `--reference` or take one of them".into()))
 }
 
 /// Where a row of the report points.
@@ -105,10 +157,10 @@ fn predict(
     machine: &Machine,
     part: Option<Frame>,
     progress: &Progress,
-) -> Result<(String, Vec<Diagnostic>), Vec<Diagnostic>> {
+) -> Result<(String, Vec<Diagnostic>, f64), Vec<Diagnostic>> {
     let process = unit.exchange.then(|| crate::exchange::process(unit).ok().map(|(p, _, _)| p)).flatten();
     let mut operations = Operations::new(&motion.program);
-    cutting(&mut operations, args, unit, motion, process.as_ref());
+    let fits = cutting(&mut operations, args, unit, motion, process.as_ref());
     let global = process.as_ref().and_then(|p| p.workpieces.iter().find_map(|w| w.tolerance)).filter(|t| *t > 0.0);
     operations.list.iter_mut().for_each(|o| o.tolerance = args.tolerance.or(o.tolerance).or(global));
     let top = (FileId(0), Span::default());
@@ -116,6 +168,10 @@ fn predict(
     let wanted = args.material.clone().or_else(|| process.as_ref().and_then(|p| p.workpieces.iter().map(|w| w.material.clone()).find(|m| !m.is_empty())));
     let found_material = wanted.as_deref().map(|name| (name, material::find(name)));
     let mut found = Vec::new();
+    for (operation, fit) in fits.into_iter().filter(|_| args.tolerance.is_none()) {
+        let what = [format!("the tolerance #{fit} of {operation}"), "limits and fits are not read; `--tolerance` says what is allowed".to_string()];
+        found.push(say(code::ACCURACY_NO_DATA, &what));
+    }
     let material = match found_material {
         Some((name, None)) => {
             let known: Vec<&str> = material::materials().iter().filter_map(|m| m.names.first().map(String::as_str)).collect();
@@ -140,77 +196,111 @@ fn predict(
         let turn = machine.cell.part_in_base().turn;
         (planned_on.cell.table, planned_on.cell.part) = (Frame::IDENTITY, Frame { turn, ..part });
     }
-    tool_points(&mut found, &mut planned_on, &operations, &say);
-    let planned = gr_robot::plan(&motion.program, &planned_on, &texts, &options)?;
-    // What switches the spindle has no part in errors.
-    // Nor has the length of a tool that the machine file does not have.
-    let own_tools = !machine.cell.tools.is_empty();
-    let kept = |d: &Diagnostic| d.code != code::ROBOT_BY_HAND && (own_tools || d.code != code::ROBOT_TOOL_LENGTH);
-    found.extend(planned.warnings.into_iter().filter(kept));
+    tool_points(&mut found, &mut planned_on, &motion.program, &say);
     let budget = Budget::new(machine, BudgetOptions { grade: args.grade, usp2009: args.reference.is_some() });
-    missing(&mut found, machine, &budget, &operations, material, &say);
+    found.extend(unsaid(machine, &budget).into_iter().map(|args| say(code::ACCURACY_NO_DATA, &args)));
+    missing(&mut found, machine, &operations, material, &say);
     let tell = |done: usize, of: usize| progress.tell(|| format!("errors at step {done} of {of}"));
-    let report = report(&planned.program, &operations, &budget, material, &tell);
+    let report = match report_of_words(&motion.program, &planned_on, &operations, &budget, material, &tell) {
+        Some(report) => report,
+        None => {
+            let planned = gr_robot::plan(&motion.program, &planned_on, &texts, &options)?;
+            // What switches the spindle has no part in errors.
+            let kept = |d: &Diagnostic| d.code != code::ROBOT_BY_HAND;
+            found.extend(planned.warnings.into_iter().filter(kept));
+            report(&planned.program, &operations, &budget, material, &tell)
+        }
+    };
     for row in &report.rows {
         judge(&mut found, row, material, motion);
+        lawless(&mut found, row, machine, motion);
+        if let Some((off, source)) = row.measured {
+            let (file, span) = place(motion, source);
+            let why = format!("up to {} µm in {}, here, unless the program is built with `--compensate`", um(off), row.operation.name);
+            found.push(Diagnostic::new(code::ACCURACY_NO_DATA, file, span, &["the error by the measured deviations".to_string(), why]));
+        }
     }
     let text = match args.format {
         TableFormat::Text => text(&report, motion, machine, material, &budget),
         TableFormat::Json => format!("{:#}\n", as_json(&report, motion, machine, material, &budget)),
         TableFormat::Csv => csv(&report, motion),
     };
-    Ok((text, found))
+    let worst = report.rows.iter().filter_map(|r| r.worst.as_ref()).max_by(|a, b| a.errors.sum().total_cmp(&b.errors.sum()));
+    Ok((text, found, worst.map_or(0.0, |w| (w.point[2] * 10.0).round() / 10.0 + 0.0)))
 }
 
-/// A tool that the machine file does not have is looked at as if its point were on the flange.
+/// A tool that the machine file does not have and whose length the program never uses is looked at as if its point were
+/// on the flange. Where the program uses a length, the plan is the one that a build would take.
 pub fn tool_points(
     found: &mut Vec<Diagnostic>,
     machine: &mut Machine,
-    operations: &Operations,
+    program: &gr_ir::Program,
     say: &dyn Fn(gr_text::Code, &[String]) -> Diagnostic,
 ) {
-    let numbers: std::collections::BTreeSet<u32> = operations.list.iter().map(|o| o.tool).collect();
-    for number in numbers {
-        if !machine.cell.tools.contains_key(&number) && number != 0 {
-            let tool = gr_machine::ToolData { name: format!("T{number}"), frame: Frame::IDENTITY, diameter: None, mass: None };
-            machine.cell.tools.insert(number, tool);
-            // On a machine that only places a point, that point is the tool's.
-            if machine.kinematics().control() == gr_machine::Control::Full {
-                let why = format!("the machine file has no tool {number}: its point is looked at on the flange");
-                found.push(say(code::ACCURACY_NO_DATA, &["the length of a tool".to_string(), why]));
-            }
+    let mut numbers: std::collections::BTreeMap<u32, bool> = std::collections::BTreeMap::new();
+    let mut cursor = program.cursor();
+    while let Some(view) = cursor.next() {
+        if view.op.moves() {
+            let number = u32::try_from(view.state.tool).unwrap_or(0);
+            *numbers.entry(number).or_default() |= view.state.tool_offset[2] != 0.0;
+        }
+    }
+    let lever = machine.kinematics().control() != gr_machine::Control::Position;
+    let without = numbers.into_iter().filter(|(number, long)| !long && *number != 0).map(|(number, _)| number);
+    for number in without {
+        if machine.cell.tools.contains_key(&number) {
+            continue;
+        }
+        let tool = gr_machine::ToolData { name: format!("T{number}"), frame: Frame::IDENTITY, diameter: None, mass: None };
+        machine.cell.tools.insert(number, tool);
+        // On a machine that only places a point, that point is the tool's.
+        if lever {
+            let why = format!("neither the machine file nor the program has the length of tool {number}: its point is looked at on the flange");
+            found.push(say(code::ACCURACY_NO_DATA, &["the length of a tool".to_string(), why]));
         }
     }
 }
 
-/// What is not known, told once each.
-fn missing(
-    found: &mut Vec<Diagnostic>,
-    machine: &Machine,
-    budget: &Budget,
-    operations: &Operations,
-    material: Option<&Material>,
-    say: &dyn Fn(gr_text::Code, &[String]) -> Diagnostic,
-) {
-    let mut none = |what: &str, why: String| found.push(say(code::ACCURACY_NO_DATA, &[what.to_string(), why]));
+/// What a machine file does not say of joints and geometry: what is left out, and why.
+pub fn unsaid(machine: &Machine, budget: &Budget) -> Vec<[String; 2]> {
+    let mut out = Vec::new();
+    let mut none = |what: &str, why: String| out.push([what.to_string(), why]);
     let id = &machine.id;
     if budget.joints.is_none() {
         none("the error by the joints", format!("the file of {id} has no `joints` in `[accuracy]`"));
     }
     if budget.geometry.is_none() {
-        none("the error by the geometry", format!("the file of {id} has neither `grade` nor `parameter` in `[accuracy]`"));
+        none("the error by the geometry", format!("the file of {id} has neither `parameter` nor a `grade` that fits in `[accuracy]`"));
     }
     if !budget.unsaid.is_empty() {
         none("a part of the geometry", format!("nothing is said of {}: taken as exact", budget.unsaid.join(", ")));
     }
+    out
+}
+
+/// Joints of which no stiffness is known.
+pub fn soft(machine: &Machine) -> Vec<&str> {
     let stiff = machine.cell.stiffness.as_ref();
-    let soft: Vec<&str> = (0..machine.joints.len())
-        .filter(|i| stiff.is_none_or(|s| s.members.iter().all(|m| m.joint != *i)))
-        .map(|i| machine.joints[i].name.as_str())
-        .collect();
-    let unknown: std::collections::BTreeSet<&str> = operations.list.iter().flat_map(|o| o.cut.missing()).collect();
+    let known = |i: usize| stiff.is_some_and(|s| s.members.iter().any(|m| m.joint == i));
+    machine.joints.iter().enumerate().filter(|(i, _)| !known(*i)).map(|(_, j)| j.name.as_str()).collect()
+}
+
+/// Why there is no deflection, told once.
+fn missing(
+    found: &mut Vec<Diagnostic>,
+    machine: &Machine,
+    operations: &Operations,
+    material: Option<&Material>,
+    say: &dyn Fn(gr_text::Code, &[String]) -> Diagnostic,
+) {
+    let mut none = |what: &str, why: String| found.push(say(code::ACCURACY_NO_DATA, &[what.to_string(), why]));
+    let soft = soft(machine);
+    let lacks = |(i, o): (usize, &gr_accuracy::report::Operation)| {
+        operations.works(i).into_iter().flat_map(|w| o.cut.missing(w)).collect::<Vec<_>>()
+    };
+    let unknown: std::collections::BTreeSet<&str> = operations.list.iter().enumerate().flat_map(lacks).collect();
     if !soft.is_empty() {
-        none("the deflection", format!("the file of {id} has no `[stiffness]` of {}", soft.join(", ")));
+        none("the deflection", format!("the file of {} has no `[stiffness]` of {}", machine.id, soft.join(", ")));
     } else if material.is_none() {
         none("the deflection", "the material is not known: `--material`".to_string());
     } else if !unknown.is_empty() {
@@ -229,18 +319,52 @@ fn um(mm: f64) -> String {
 }
 
 fn judge(found: &mut Vec<Diagnostic>, row: &Row, material: Option<&Material>, motion: &Motion) {
-    let Some(worst) = &row.worst else { return };
     if let Some(limit) = row.operation.tolerance {
         over(found, row, limit, motion);
     }
-    let (file, span) = place(motion, worst.source);
-    if let (Some((least, most)), Some(m)) = (row.chip, material)
-        && (least < m.range.0 || most > m.range.1)
+    if let (Some([least, most]), Some(m)) = (row.chip, material)
+        && (least.0 < m.range.0 || most.0 > m.range.1)
     {
-        let chip = if least < m.range.0 { least } else { most };
+        let (chip, source) = if least.0 < m.range.0 { least } else { most };
+        let (file, span) = place(motion, source);
         let args = [row.operation.name.clone(), format!("{chip:.4}"), m.range.0.to_string(), m.range.1.to_string()];
         found.push(Diagnostic::new(code::ACCURACY_CHIP_THICKNESS, file, span, &args));
     }
+}
+
+/// Places whose force no law gives, though all that is asked for is known.
+fn lawless(found: &mut Vec<Diagnostic>, row: &Row, machine: &Machine, motion: &Motion) {
+    if !soft(machine).is_empty() {
+        return;
+    }
+    for (source, why) in &row.unforced {
+        let why = match why {
+            Unforced::Axial => "the tool is fed along its axis, and the force law is that of milling across it (a drill is known by its cycle: G73 G81 G82 G83)",
+            Unforced::NoLaw => "the force law is that of milling and drilling, not of tapping, boring, reaming and countersinking",
+            Unforced::NoSpeed => "no turns per minute are known: no S, a spindle that is stopped, or a surface speed",
+        };
+        let (file, span) = place(motion, *source);
+        let args = [format!("the deflection of {} here and at places like this", row.operation.name), why.to_string()];
+        found.push(Diagnostic::new(code::ACCURACY_NO_DATA, file, span, &args));
+    }
+}
+
+/// Stretches whose worst place is the same line are one: passes of a loop. With the number of them.
+fn passes(all: &[Stretch]) -> Vec<(Stretch, usize)> {
+    let mut out: Vec<(Stretch, usize)> = Vec::new();
+    for s in all {
+        let same = |o: &&mut (Stretch, usize)| (o.0.worst.file, o.0.worst.line) == (s.worst.file, s.worst.line);
+        match out.iter_mut().find(same) {
+            Some((kept, count)) => {
+                *count += 1;
+                if s.sum > kept.sum {
+                    *kept = *s;
+                }
+            }
+            None => out.push((*s, 1)),
+        }
+    }
+    out
 }
 
 /// So many stretches of one operation are told one by one.
@@ -248,12 +372,13 @@ const STRETCHES: usize = 10;
 
 /// Every stretch that is over the tolerance, at its worst line; of many the worst.
 fn over(found: &mut Vec<Diagnostic>, row: &Row, limit: f64, motion: &Motion) {
-    let mut told: Vec<usize> = (0..row.over.len()).collect();
-    told.sort_by(|a, b| row.over[*b].sum.total_cmp(&row.over[*a].sum));
+    let all = passes(&row.over);
+    let mut told: Vec<usize> = (0..all.len()).collect();
+    told.sort_by(|a, b| all[*b].0.sum.total_cmp(&all[*a].0.sum));
     told.truncate(STRETCHES);
     told.sort_unstable();
     for (n, i) in told.iter().enumerate() {
-        let s = &row.over[*i];
+        let (s, count) = &all[*i];
         let (file, span) = place(motion, s.worst);
         // As many digits as show that it is more.
         let close = um(s.sum) == um(limit);
@@ -263,11 +388,14 @@ fn over(found: &mut Vec<Diagnostic>, row: &Row, limit: f64, motion: &Motion) {
         if s.first.line != s.last.line {
             d.notes.push(format!("over the tolerance from line {} to line {}", line_of(motion, s.first), line_of(motion, s.last)));
         }
+        if *count > 1 {
+            d.notes.push(format!("{count} passes are over it here; this is the worst"));
+        }
         d.notes.push(format!("typical (root of squares): {} µm", um(s.rss)));
         if let (Some(w), true) = (&row.worst, row.worst.as_ref().is_some_and(|w| w.source == s.worst)) {
             d.notes.extend(most_of_it(&w.causes));
         }
-        let more = row.over.len() - told.len();
+        let more = all.len() - told.len();
         if more > 0 && n + 1 == told.len() {
             d.notes.push(format!("{more} more stretches of {} are over; these are the worst", row.operation.name));
         }
@@ -281,11 +409,25 @@ fn most_of_it(causes: &[(String, f64)]) -> Option<String> {
     (!list.is_empty()).then(|| format!("most of it, each alone: {} µm", list.join(", ")))
 }
 
-/// How each operation cuts: the file's word, then the tool table's, then the options'.
-fn cutting(operations: &mut Operations, args: &AccuracyArgs, unit: &Unit, motion: &Motion, process: Option<&Process>) {
-    let said = CutData { diameter: args.diameter, teeth: args.teeth, depth: args.depth, width: args.width };
+/// How each operation cuts: the file's word, then the tool table's, then the options'. Operations whose feature has a fit,
+/// and its instance.
+fn cutting(
+    operations: &mut Operations,
+    args: &AccuracyArgs,
+    unit: &Unit,
+    motion: &Motion,
+    process: Option<&Process>,
+) -> Vec<(String, u64)> {
+    let said = CutData {
+        diameter: args.diameter,
+        teeth: args.teeth,
+        depth: args.depth,
+        width: args.width,
+        point: args.point.map(|p| p.to_radians() / 2.0),
+        ..CutData::default()
+    };
     let tools = tool_rows(motion, unit);
-    let mut steps = Vec::new();
+    let (mut steps, mut fits) = (Vec::new(), Vec::new());
     if let Some(p) = process {
         p.elements.iter().for_each(|e| collect(e, &mut steps));
     }
@@ -293,10 +435,13 @@ fn cutting(operations: &mut Operations, args: &AccuracyArgs, unit: &Unit, motion
         let step = steps.iter().find(|s| o.workingstep != 0 && i32::try_from(s.origin.id) == Ok(o.workingstep));
         let own = step.map_or(CutData::default(), |s| of_step(s));
         o.tolerance = step.and_then(|s| s.feature.tolerance);
+        fits.extend(step.and_then(|s| s.feature.fit).map(|fit| (o.name.clone(), fit)));
         let row = tools.iter().find(|t| i64::from(t.number) == i64::from(o.tool) && t.diameter > 0.0);
         let table = CutData { diameter: row.map(|t| t.diameter), ..CutData::default() };
+        o.work = step.map(|s| work_of(s));
         o.cut = own.or(table).or(said);
     }
+    fits
 }
 
 fn collect<'p>(element: &'p Element, out: &mut Vec<&'p Workingstep>) {
@@ -314,15 +459,31 @@ fn of_step(step: &Workingstep) -> CutData {
         teeth: tool.teeth.map(f64::from),
         ..CutData::default()
     };
-    if let OperationKind::Mill(m) = &step.operation.kind {
-        cut.depth = m.axial;
-        cut.width = m.radial.or(cut.diameter);
+    match &step.operation.kind {
+        OperationKind::Mill(m) => {
+            cut.depth = m.axial;
+            cut.width = m.radial.or(cut.diameter);
+        }
+        OperationKind::Drill(d) => {
+            cut.lips = cut.teeth;
+            cut.point = tool.tip_angle.filter(|a| *a > 0.1 && *a <= std::f64::consts::FRAC_PI_2);
+            cut.before = d.previous.filter(|d| *d > 0.0);
+        }
+        OperationKind::Other => {}
     }
     cut
 }
 
+fn work_of(step: &Workingstep) -> Work {
+    match &step.operation.kind {
+        OperationKind::Mill(_) => Work::Mill,
+        OperationKind::Drill(_) if matches!(step.operation.keyword.as_str(), "DRILLING" | "MULTISTEP_DRILLING") => Work::Drill,
+        OperationKind::Drill(_) => Work::Other,
+        OperationKind::Other => Work::Mill,
+    }
+}
+
 const RULES: &str = "sum = longest kinematic + longest geometric + deflection; rss = root of the squares of the typical ones and the deflection";
-const DOUBT: &str = "deflection: springs of the drives only; the model of its source was never confirmed by better than a factor of 2";
 
 fn line_of(motion: &Motion, source: Source) -> String {
     let name = motion.sources.get(source.file).map_or("", |f| &f.name);
@@ -347,9 +508,9 @@ fn text(report: &Report, motion: &Motion, machine: &Machine, material: Option<&M
             r.operation.name.clone(),
             format!("T{}", r.operation.tool),
             line_of(motion, w.source),
-            show(r.most[0]),
-            show(r.most[1]),
-            show(r.most[2]),
+            show(w.errors.kinematic.map(|s| s.longest)),
+            show(w.errors.geometric.map(|s| s.longest)),
+            show(w.errors.elastic.map(norm)),
             show(known(&w.errors).then(|| w.errors.sum())),
             show(known(&w.errors).then(|| w.errors.root_of_squares())),
             show(r.operation.tolerance),
@@ -391,7 +552,7 @@ fn text(report: &Report, motion: &Motion, machine: &Machine, material: Option<&M
             let _ = writeln!(out, "{text}");
         }
     }
-    let _ = writeln!(out, "{RULES}");
+    let _ = writeln!(out, "each row: where the sum is largest in the operation\n{RULES}");
     if report.rows.iter().any(|r| r.most[2].is_some()) {
         let _ = writeln!(out, "{DOUBT}");
     }
@@ -412,6 +573,7 @@ fn as_json(report: &Report, motion: &Motion, machine: &Machine, material: Option
                     "file": motion.sources.get(w.source.file).map(|f| f.name.clone()),
                     "line": w.source.line + 1,
                     "point": w.point,
+                    "joints": w.joints,
                     "kinematic": w.errors.kinematic.map(spread),
                     "geometric": w.errors.geometric.map(spread),
                     "elastic": w.errors.elastic,
@@ -421,9 +583,10 @@ fn as_json(report: &Report, motion: &Motion, machine: &Machine, material: Option
                 })
             });
             let over: Vec<_> = r.over.iter().map(|s| json!({ "from": s.first.line + 1, "to": s.last.line + 1, "line": s.worst.line + 1, "sum": s.sum, "rss": s.rss })).collect();
+            let unforced: Vec<_> = r.unforced.iter().map(|(s, _)| s.line + 1).collect();
             json!({
                 "operation": r.operation.name, "tool": r.operation.tool, "places": r.places,
-                "tolerance": r.operation.tolerance, "most": r.most, "worst": worst, "over": over,
+                "tolerance": r.operation.tolerance, "most": r.most, "worst": worst, "over": over, "force_unknown": unforced, "measured": r.measured.map(|m| m.0),
             })
         })
         .collect();
@@ -436,7 +599,9 @@ fn as_json(report: &Report, motion: &Motion, machine: &Machine, material: Option
 }
 
 fn csv(report: &Report, motion: &Motion) -> String {
-    let mut out = String::from("operation,tool,line,kinematic mm,geometric mm,elastic mm,sum mm,rss mm,tolerance mm\n");
+    let mut out = String::from(
+        "operation,tool,line,kinematic mm,geometric mm,elastic mm (to a factor of 2 at best),sum mm,rss mm,tolerance mm\n",
+    );
     let show = |v: Option<f64>| v.map_or(String::new(), |v| format!("{v:.9}"));
     for r in &report.rows {
         let Some(w) = &r.worst else { continue };

@@ -58,7 +58,17 @@ fn check(global: &Global, path: &Path, print: bool, toml: bool) -> Exit {
     match parse(file, &text) {
         Ok(_) if print && toml => super::print(&text),
         Ok(machine) if print => super::print(&machine.describe()),
-        Ok(machine) => said(global, path, &machine),
+        Ok(machine) => {
+            let doubts = gr_machine::doubts(file, &text);
+            if doubts.is_empty() {
+                return said(global, path, &machine);
+            }
+            let mut renderer = global.renderer(false);
+            renderer.tally.files = 1;
+            doubts.iter().for_each(|d| renderer.show(&sources, d));
+            renderer.finish(!global.quiet);
+            Exit::Ok
+        }
         Err(found) => {
             let mut renderer = global.renderer(false);
             renderer.tally.files = 1;
@@ -98,11 +108,11 @@ fn import(global: &Global, path: &Path, id: &str, output: Option<&Path>) -> Exit
     exit
 }
 
-/// The machine of an id or of a file. What is wrong with it points into `sources`.
-pub fn load(name: &str, sources: &mut Sources) -> Result<gr_machine::Machine, Vec<gr_text::Diagnostic>> {
+/// The machine of an id or of a file, and what is doubtful in the file. What is wrong with it points into `sources`.
+pub fn doubted(name: &str, sources: &mut Sources) -> Result<(gr_machine::Machine, Vec<gr_text::Diagnostic>), Vec<gr_text::Diagnostic>> {
     use crate::sources::about_file;
     if let Some(machine) = builtin(name) {
-        return Ok(machine);
+        return Ok((machine, Vec::new()));
     }
     if !gr_machine::is_path(name) && !Path::new(name).exists() {
         let file = sources.add("", "");
@@ -111,7 +121,7 @@ pub fn load(name: &str, sources: &mut Sources) -> Result<gr_machine::Machine, Ve
     match read(Path::new(name)) {
         Ok(d) => {
             let file = sources.add(name, d.text.clone());
-            parse(file, &d.text)
+            parse(file, &d.text).map(|machine| (machine, gr_machine::doubts(file, &d.text)))
         }
         Err((code, args)) => {
             let file = sources.add(name, "");

@@ -4,23 +4,23 @@ use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
-use gr_accuracy::map::{self, Map, Plane, Probe, Quantity, Request};
+use gr_accuracy::map::{self, DOUBT, Map, Plane, Probe, Quantity, Request};
 use gr_accuracy::outline::outline;
 use gr_accuracy::picture::Picture;
 use gr_accuracy::{Budget, BudgetOptions, closed_form};
-use gr_machine::{Chain, Machine};
+use gr_machine::{Chain, JointKind, Machine, ParameterKind};
 use gr_text::code;
 
-use super::accuracy::{referenced, triple};
+use super::accuracy::{misfit, referenced, soft, triple, unsaid};
 use crate::exit::Exit;
 use crate::options::{Global, MapArgs};
 use crate::progress::Progress;
-use crate::sources::Sources;
+use crate::sources::{Sources, about_file};
 
 pub fn run(global: &Global, args: &MapArgs) -> Exit {
     let mut sources = Sources::default();
-    let machine = match super::machine::load(&args.machine, &mut sources) {
-        Ok(m) => referenced(m, args.reference),
+    let (machine, doubts) = match super::machine::doubted(&args.machine, &mut sources) {
+        Ok(found) => found,
         Err(found) => {
             let mut renderer = global.renderer(true);
             found.iter().for_each(|d| renderer.show(&sources, d));
@@ -31,6 +31,10 @@ pub fn run(global: &Global, args: &MapArgs) -> Exit {
     let refuse = |what: &str, why: &str| {
         super::refuse(global, Path::new(&args.machine), code::ACCURACY_BAD_OPTION, &[what.to_string(), why.to_string()])
     };
+    if let Some((what, why)) = misfit(&machine, args.reference, args.grade) {
+        return refuse(&what, &why);
+    }
+    let machine = referenced(machine, args.reference);
     if let Chain::Incomplete { missing, .. } = &machine.chain {
         return refuse(&machine.id, &format!("it is a template; its file must still say {}", missing.join(", ")));
     }
@@ -39,15 +43,18 @@ pub fn run(global: &Global, args: &MapArgs) -> Exit {
     };
     let budget = Budget::new(&machine, BudgetOptions { grade: args.grade, usp2009: args.reference.is_some() });
     let made = if args.quantity == "sensitivity" {
-        bars(&machine, plane, args)
+        bars(global, &machine, plane, args)
     } else {
         area(global, args, &machine, plane, &budget)
     };
-    let (text, files) = match made {
+    let Made { text, files, left_out } = match made {
         Ok(made) => made,
         Err((what, why)) => return refuse(&what, &why),
     };
     let mut renderer = global.renderer(true);
+    doubts.iter().for_each(|d| renderer.show(&sources, d));
+    let file = sources.add(&args.machine, "");
+    left_out.iter().for_each(|args| renderer.show(&sources, &about_file(code::ACCURACY_NO_DATA, file, args)));
     let exit = super::write(&mut renderer, &mut sources, Path::new(&args.machine), &files);
     renderer.finish(false);
     if exit != Exit::Ok {
@@ -56,7 +63,15 @@ pub fn run(global: &Global, args: &MapArgs) -> Exit {
     super::print(&text)
 }
 
-type Made = (String, Vec<(PathBuf, Vec<u8>)>);
+/// What a request comes to.
+#[derive(Default)]
+struct Made {
+    text: String,
+    files: Vec<(PathBuf, Vec<u8>)>,
+    /// What is not in it, and why.
+    left_out: Vec<[String; 2]>,
+}
+
 type Refused = (String, String);
 
 fn plane(text: &str) -> Option<Plane> {
@@ -76,13 +91,20 @@ fn area(global: &Global, args: &MapArgs, machine: &Machine, plane: Plane, budget
     if joints && budget.joints.is_none() {
         return lacks("the error of its joints", "`joints` in `[accuracy]`");
     }
-    if geometry && budget.geometry.is_none() {
-        return lacks("the tolerances of its geometry", "`grade` or `parameter` in `[accuracy]`, or `--it`");
+    let deviations = match &args.deviations {
+        None => None,
+        Some(text) => Some(deviations(text, machine).map_err(|why| ("--deviations".to_string(), why))?),
+    };
+    if geometry && budget.geometry.is_none() && deviations.is_none() {
+        let lengths = machine.parameters().iter().any(|p| p.kind == ParameterKind::Length && !p.name.ends_with(".zero"));
+        return match lengths {
+            true => lacks("the tolerances of its geometry", "`grade` or `parameter` in `[accuracy]`, or `--it`"),
+            false => lacks("the tolerances of its geometry, which is angles only and has no grade", "`parameter` in `[accuracy]`"),
+        };
     }
-    let stiff = machine.cell.stiffness.as_ref();
-    let soft = (0..machine.joints.len()).find(|i| stiff.is_none_or(|s| s.members.iter().all(|m| m.joint != *i)));
-    if let (true, Some(i)) = (stiffness, soft) {
-        return lacks(&format!("the stiffness of {}", machine.joints[i].name), "`[stiffness]`");
+    let soft = soft(machine);
+    if let (true, Some(joint)) = (stiffness, soft.first()) {
+        return lacks(&format!("the stiffness of {joint}"), "`[stiffness]`");
     }
     let force = match &args.force {
         Some(text) => triple(text).ok_or(("--force".to_string(), "three numbers are wanted: -100,0,0".to_string()))?,
@@ -102,17 +124,28 @@ fn area(global: &Global, args: &MapArgs, machine: &Machine, plane: Plane, budget
         if given && !fits { Err((option.to_string(), format!("it is for {whom}, not for {}", args.quantity))) } else { Ok(()) }
     };
     let by_joints = matches!(quantity, Quantity::Kinematic(_));
-    let by_force = matches!(quantity, Quantity::Elastic(_) | Quantity::Total);
-    let by_grade = matches!(quantity, Quantity::Geometric(_) | Quantity::Total);
+    let total = matches!(quantity, Quantity::Total | Quantity::TotalRss);
+    let by_force = matches!(quantity, Quantity::Elastic(_)) || total;
+    let by_grade = matches!(quantity, Quantity::Geometric(_)) || total;
+    heeds("--deviations", args.deviations.is_some(), matches!(quantity, Quantity::Geometric(_)), "errors by the geometry")?;
     heeds("--signs", args.signs.is_some(), by_joints, "errors by the joints")?;
     heeds("--force", args.force.is_some(), by_force, "deflections and the total")?;
     heeds("--it", args.grade.is_some(), by_grade, "errors by the geometry and the total")?;
     let probe = Probe::downward(machine);
     let size = size(&probe, machine, args, 400)?;
-    let request = Request { quantity, plane, size, window: None, force, signs, deviations: None };
+    // The publication counts nodes on the border too.
+    let window = args.reference.map(|_| {
+        let (extent, (a, b)) = (probe.extent(), plane.axes());
+        [extent[a], extent[b]]
+    });
+    let request = Request { quantity, plane, size, window, force, signs, deviations };
     let progress = Progress::new(global.quiet, format!("map of {}", machine.id));
+    // A search of its own on some machines, which the estimate must not count for each place.
+    probe.extent();
     if !closed_form(machine) && !global.quiet {
-        estimate(&probe, budget, &request);
+        estimate(size, cores(), |count| {
+            map::sample(&probe, budget, &request, count);
+        });
     }
     let tell = std::sync::Mutex::new(&progress);
     let map = map::map(&probe, budget, &request, &|done, of| {
@@ -120,21 +153,73 @@ fn area(global: &Global, args: &MapArgs, machine: &Machine, plane: Plane, budget
             p.tell(|| format!("map of {}: row {done} of {of}", machine.id));
         }
     });
-    let title = format!("{}: {}, {} = {} mm", machine.id, quantity.words(), ["X", "Y", "Z"][plane.axis], plane.at);
-    let mut text = told(&map, machine);
-    if quantity == Quantity::Workspace && closed_form(machine) {
+    let mut left_out = if args.deviations.is_some() { Vec::new() } else { left_out(quantity, machine, budget, force) };
+    left_out.extend(limitless(machine));
+    let elastic = map.elastic && (!total || soft.is_empty());
+    let map = Map { elastic, ..map };
+    let mut what = quantity.words();
+    if total {
+        what += if elastic { " of joints, geometry and deflection" } else { " of joints and geometry" };
+    }
+    if total && !elastic && force != [0.0; 3] {
+        left_out.push(["the deflection".into(), format!("the file of {} has no `[stiffness]` of {}", machine.id, soft.join(", "))]);
+    }
+    let title = format!("{}: {what}, {} = {} mm", machine.id, ["X", "Y", "Z"][plane.axis], plane.at);
+    let mut text = told(&map, machine, &what);
+    if quantity == Quantity::Workspace {
         progress.tell(|| format!("volume of {}", machine.id));
-        let _ = writeln!(text, "volume {:.1} dm³ (by layers of a grid)", map::volume(&probe, 68, 120) / 1e6);
+        let (layers, nodes) = if closed_form(machine) { (68, 120) } else { (16, 24) };
+        let volume = map::volume(&probe, layers, nodes) / 1e6;
+        let _ = writeln!(text, "volume {volume:.1} dm³ (by {layers} layers of {nodes} × {nodes} nodes)");
     }
     drop(progress);
-    if let Quantity::Elastic(_) | Quantity::Stiffness = quantity {
-        text += "springs of the drives only; the model of its source was never confirmed by better than a factor of 2\n";
+    let mut notes = Vec::new();
+    if by_force && force != [0.0; 3] {
+        notes.push(format!("force X {} Y {} Z {} N", force[0], force[1], force[2]));
     }
+    if let Some(text) = &args.deviations {
+        notes.push(format!("deviations: {text}"));
+    }
+    if let Some(signs) = &args.signs {
+        notes.push(format!("signs of the joint errors: {signs}"));
+    }
+    if map.elastic {
+        notes.push(DOUBT.to_string());
+    }
+    notes.iter().for_each(|n| text += &format!("{n}\n"));
     if map.summary().is_none() {
-        let _ = writeln!(text, "nothing of this plane is within reach");
+        let (low, high) = probe.extent()[plane.axis];
+        let axis = ["X", "Y", "Z"][plane.axis];
+        let _ = writeln!(text, "nothing of this plane is within reach; the tool gets to {axis} {low:.1} to {high:.1} mm at most");
     }
-    let picture = Picture::map(&map, &title);
-    Ok((text, files(&args.output, &picture, || map.csv())?))
+    let picture = Picture::map(&map, &title, &notes);
+    Ok(Made { text, files: files(&args.output, &picture, || map.csv())?, left_out })
+}
+
+/// A slide without limits reaches as far as one likes: what is drawn is only what was looked at.
+pub fn limitless(machine: &Machine) -> Option<[String; 2]> {
+    let slides = machine.joints.iter().filter(|j| j.kind == JointKind::Prismatic && (j.min.is_none() || j.max.is_none()));
+    let names: Vec<&str> = slides.map(|j| j.name.as_str()).collect();
+    let why = format!("the file of {} has no `min` or no `max` of {}: looked at as far as 500 mm each way", machine.id, names.join(", "));
+    (!names.is_empty()).then(|| ["the end of the reach".to_string(), why])
+}
+
+/// What a quantity would need and the machine file or the command does not say.
+fn left_out(quantity: Quantity, machine: &Machine, budget: &Budget, force: [f64; 3]) -> Vec<[String; 2]> {
+    let (joints, geometry, _) = quantity.needs();
+    let mut out = Vec::new();
+    if joints || geometry {
+        // What is needed and lacks altogether has been refused.
+        out.extend(unsaid(machine, budget).into_iter().filter(|[_, why]| why.contains("taken as exact")));
+    }
+    if joints && geometry && force == [0.0; 3] {
+        out.push(["the deflection".into(), "no `--force` is given".into()]);
+    }
+    if geometry && machine.cell.as_built.is_some() {
+        let why = "they are no tolerances, and `build --compensate` takes them away; `--deviations` draws what they do".to_string();
+        out.push(["the error by the deviations of `[as_built]`".into(), why]);
+    }
+    out
 }
 
 /// Nodes along each side.
@@ -156,18 +241,37 @@ fn size(probe: &Probe<'_>, machine: &Machine, args: &MapArgs, usual: usize) -> R
     }
 }
 
+fn cores() -> usize {
+    std::thread::available_parallelism().map_or(1, usize::from)
+}
+
 /// Says how long a map by search takes, from some places of it.
-fn estimate(probe: &Probe<'_>, budget: &Budget, request: &Request) {
+fn estimate(size: (usize, usize), cores: usize, some: impl FnOnce(usize)) {
     const SOME: usize = 64;
     let start = std::time::Instant::now();
-    map::sample(probe, budget, request, SOME);
-    let cores = std::thread::available_parallelism().map_or(1, usize::from);
-    let places = request.size.0 * request.size.1;
+    some(SOME);
+    let places = size.0 * size.1;
     let seconds = start.elapsed().as_secs_f64() / SOME as f64 * places as f64 / cores as f64;
     if seconds >= 2.0 {
         // Whoever closed standard error does not want to know.
-        let _ = writeln!(std::io::stderr(), "{places} places by numerical search: about {seconds:.0} s");
+        let _ = writeln!(std::io::stderr(), "{places} places, not in closed form: about {seconds:.0} s");
     }
+}
+
+/// Deviations by name, in the order of the machine's parameters, mm and rad.
+fn deviations(text: &str, machine: &Machine) -> Result<Vec<f64>, String> {
+    let all = machine.parameters();
+    let mut out = vec![0.0; all.len()];
+    for one in text.split(',').map(str::trim) {
+        let (name, value) = one.split_once('=').ok_or_else(|| format!("`{one}` is no NAME=VALUE"))?;
+        let value: f64 = value.trim().parse().ok().filter(|v: &f64| v.is_finite()).ok_or_else(|| format!("`{value}` is no number"))?;
+        let Some(i) = all.iter().position(|p| p.name == name.trim()) else {
+            let names: Vec<&str> = all.iter().map(|p| p.name.as_str()).collect();
+            return Err(format!("there is no parameter `{name}`; this machine has {}", names.join(", ")));
+        };
+        out[i] = if all[i].kind == ParameterKind::Angle { value.to_radians() } else { value };
+    }
+    Ok(out)
 }
 
 fn signs(text: &str, count: usize) -> Option<Vec<f64>> {
@@ -181,14 +285,14 @@ fn signs(text: &str, count: usize) -> Option<Vec<f64>> {
     all.filter(|s| s.len() == count)
 }
 
-fn told(map: &Map, machine: &Machine) -> String {
+fn told(map: &Map, machine: &Machine, what: &str) -> String {
     let (a, b) = map.plane.axes();
     let name = |i: usize| ["X", "Y", "Z"][i];
     let unit = match map.quantity.unit() {
         "" => String::new(),
         unit => format!(" {unit}"),
     };
-    let mut out = format!("{}: {} in the plane {} = {} mm\n", machine.id, map.quantity.name(), name(map.plane.axis), map.plane.at);
+    let mut out = format!("{}: {what} in the plane {} = {} mm\n", machine.id, name(map.plane.axis), map.plane.at);
     let Some(s) = map.summary() else { return out };
     let step = map.step();
     let _ = writeln!(out, "area {:.2} dm² ({} nodes of {:.3} × {:.3} mm)", s.area / 1e4, s.nodes, step[0], step[1]);
@@ -211,12 +315,18 @@ fn told(map: &Map, machine: &Machine) -> String {
 type Bar = (String, Vec<f64>);
 
 /// Mean sensitivities, the greatest first.
-fn bars(machine: &Machine, plane: Plane, args: &MapArgs) -> Result<Made, Refused> {
-    if args.signs.is_some() || args.force.is_some() || args.grade.is_some() {
-        return Err(("--quantity sensitivity".into(), "it goes by the geometry alone: no `--signs`, `--force` or `--it`".into()));
+fn bars(global: &Global, machine: &Machine, plane: Plane, args: &MapArgs) -> Result<Made, Refused> {
+    if args.signs.is_some() || args.force.is_some() || args.grade.is_some() || args.deviations.is_some() {
+        return Err(("--quantity sensitivity".into(), "it goes by the geometry alone: no `--signs`, `--force`, `--deviations` or `--it`".into()));
     }
     let probe = Probe::downward(machine);
     let size = size(&probe, machine, args, 120)?;
+    let progress = Progress::new(global.quiet, format!("sensitivities of {}", machine.id));
+    probe.extent();
+    if !closed_form(machine) && !global.quiet {
+        estimate(size, 1, |count| map::sample_sensitivity(&probe, plane, count));
+    }
+    let tell = |done: usize, of: usize| progress.tell(|| format!("sensitivities of {}: row {done} of {of}", machine.id));
     let published = args.reference.and_then(|_| map::mean_sensitivity_usp2009(&probe, plane, size));
     let (columns, what, mut all): (&[&str], &str, Vec<Bar>) = match published {
         Some(list) => (
@@ -226,10 +336,25 @@ fn bars(machine: &Machine, plane: Plane, args: &MapArgs) -> Result<Made, Refused
         ),
         None => (
             &["X", "Y", "Z", "length"],
-            "mean movement of the tool point per mm or rad of each number of the geometry, mm",
-            map::mean_sensitivity(&probe, plane, size).into_iter().map(|(n, v)| (n, v.to_vec())).collect(),
+            "mean movement of the tool point per mm or mrad of each number of the geometry, mm",
+            match map::mean_sensitivity(&probe, plane, size, &tell) {
+                // A radian of a joint would hide every length; a thousandth of it moves the tool about as far as a mm.
+                Some(list) => {
+                    let angles: Vec<bool> = machine.parameters().iter().map(|p| p.kind == ParameterKind::Angle).collect();
+                    let one = |((n, v), angle): ((String, [f64; 4]), bool)| {
+                        if angle { (format!("{n} (mrad)"), v.map(|v| v * 1e-3).to_vec()) } else { (n, v.to_vec()) }
+                    };
+                    list.into_iter().zip(angles).map(one).collect()
+                }
+                None => {
+                    let (low, high) = probe.extent()[plane.axis];
+                    let axis = ["X", "Y", "Z"][plane.axis];
+                    return Err((format!("--plane {}", args.plane), format!("nothing of this plane is within reach; the tool gets to {axis} {low:.1} to {high:.1} mm at most")));
+                }
+            },
         ),
     };
+    drop(progress);
     let last = |b: &Bar| b.1.last().copied().unwrap_or(0.0);
     // Rounding must not decide the order of what a symmetric machine has twice.
     let rounded = |b: &Bar| (last(b) * 1e9).round();
@@ -243,7 +368,7 @@ fn bars(machine: &Machine, plane: Plane, args: &MapArgs) -> Result<Made, Refused
     text.push('\n');
     let rows: Vec<(String, f64)> = all.iter().map(|b| (b.0.clone(), last(b))).collect();
     let title = format!("{}: mean sensitivity, {} = {} mm", machine.id, ["X", "Y", "Z"][plane.axis], plane.at);
-    let unit = if columns.len() == 2 { "arm, mm per mm" } else { "tool point, mm per mm or rad" };
+    let unit = if columns.len() == 2 { "arm, mm per mm" } else { "tool point, mm per mm or mrad" };
     let picture = Picture::bars(&rows, &title, unit);
     let csv = || {
         let mut out = format!("parameter,{}\n", columns.join(",").to_lowercase());
@@ -253,7 +378,31 @@ fn bars(machine: &Machine, plane: Plane, args: &MapArgs) -> Result<Made, Refused
         }
         out
     };
-    Ok((text, files(&args.output, &picture, csv)?))
+    Ok(Made { text, files: files(&args.output, &picture, csv)?, ..Made::default() })
+}
+
+/// The map that belongs to a report: errors by joints and geometry, those that are known, at a height.
+pub fn beside(global: &Global, machine: &Machine, budget: &Budget, height: f64, goal: &PathBuf) -> Result<Vec<(PathBuf, Vec<u8>)>, Refused> {
+    let length = gr_accuracy::map::Part::Length;
+    let (quantity, what) = match (&budget.joints, &budget.geometry) {
+        (Some(_), Some(_)) => (Quantity::Total, "sum of the longest errors of joints and geometry".to_string()),
+        (None, Some(_)) => (Quantity::Geometric(length), Quantity::Geometric(length).words()),
+        (Some(_), None) => (Quantity::Kinematic(length), Quantity::Kinematic(length).words()),
+        _ => return Err(("--map".into(), format!("the file of {} says nothing of its errors: there is nothing to draw", machine.id))),
+    };
+    let plane = Plane { axis: 2, at: height };
+    let probe = Probe::downward(machine);
+    let request = Request { quantity, plane, size: (400, 400), window: None, force: [0.0; 3], signs: None, deviations: None };
+    let progress = Progress::new(global.quiet, format!("map of {}", machine.id));
+    let tell = std::sync::Mutex::new(&progress);
+    let map = map::map(&probe, budget, &request, &|done, of| {
+        if let Ok(p) = tell.try_lock() {
+            p.tell(|| format!("map of {}: row {done} of {of}", machine.id));
+        }
+    });
+    drop(progress);
+    let title = format!("{}: {what}, Z = {height} mm", machine.id);
+    files(std::slice::from_ref(goal), &Picture::map(&map, &title, &[]), || map.csv())
 }
 
 fn files(goals: &[PathBuf], picture: &Picture, csv: impl Fn() -> String) -> Result<Vec<(PathBuf, Vec<u8>)>, Refused> {

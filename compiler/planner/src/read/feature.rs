@@ -11,17 +11,24 @@ use crate::process::*;
 const MOST_COPIES: usize = 100_000;
 
 /// The least of the plus-or-minus tolerances of the lengths that a feature is made of: its diameter, the sides of its
-/// profile, its radii. Its workpiece, its operations and other features are none of its lengths.
-fn tolerance(feature: Node<'_>) -> Option<f64> {
+/// profile, its radii; and a length whose limits are those of a fit, which are not read. Its workpiece, its operations and
+/// other features are none of its lengths.
+fn tolerance(feature: Node<'_>) -> (Option<f64>, Option<u64>) {
     let mut least: Option<f64> = None;
+    let mut fit = None;
     let mut seen = std::collections::BTreeSet::from([feature.index()]);
     let mut open = vec![feature];
     while let Some(node) = open.pop() {
         if node.is_a("plus_minus_value") {
-            let ends = ["upper_limit", "lower_limit"].map(|n| node.real(n).map(f64::abs));
-            for t in ends.into_iter().flatten().filter(|t| *t > 0.0) {
+            let [upper, lower] = ["upper_limit", "lower_limit"].map(|n| node.real(n).map_or(0.0, f64::abs));
+            // All on one side: the path is in the middle of the band, and half of it is left each way.
+            let t = if upper.min(lower) > 0.0 { upper.min(lower) } else { upper.max(lower) / 2.0 };
+            if t > 0.0 {
                 least = Some(least.map_or(t, |l| l.min(t)));
             }
+        }
+        if node.is_a("limits_and_fits") {
+            fit = Some(fit.map_or(node.id(), |f: u64| f.min(node.id())));
         }
         let foreign = |n: &Node<'_>| n.is_a("workpiece") || n.is_a("machining_operation") || n.is_a("manufacturing_feature");
         for next in node.references().filter(|n| !foreign(n)) {
@@ -30,7 +37,7 @@ fn tolerance(feature: Node<'_>) -> Option<f64> {
             }
         }
     }
-    least
+    (least, fit)
 }
 
 impl<'m> Reader<'m> {
@@ -74,8 +81,8 @@ impl<'m> Reader<'m> {
         }
         let shape = self.shape(node, operation, &placement, setup)?;
         let (keyword, name) = (node.keyword().to_string(), node.string("its_id").into_owned());
-        let tolerance = tolerance(node);
-        Some(Feature { origin: origin(node), keyword, name, frame, placement, depth, shape, copies, tolerance })
+        let (tolerance, fit) = tolerance(node);
+        Some(Feature { origin: origin(node), keyword, name, frame, placement, depth, shape, copies, tolerance, fit })
     }
 
     /// Frames that the feature's own placement is relative to: the workpiece's, or those of the compound
