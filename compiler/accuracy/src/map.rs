@@ -490,7 +490,7 @@ impl<'a> Probe<'a> {
                 (0..3).for_each(|i| c[3 + i] -= along * axis[i]);
             }
         }
-        Some(differential::evenness(&columns, size))
+        Some(differential::evenness(&self.machine.joints, &columns, size))
     }
 
     fn value(&self, p: V3, request: &Request, budget: &Budget) -> Option<f64> {

@@ -4,7 +4,7 @@ use crate::kinematics::{Kinematics, KinematicsError, checked};
 use crate::math::{
     Frame, V3, cross, eigenvalues, product, rot_z, rotate, rotation_vector, scale, solve, sub, transpose,
 };
-use crate::{Chain, Machine, Opw};
+use crate::{Chain, Joint, JointKind, Machine, Opw};
 
 /// Velocity of the tool (mm, then rad) per unit of each joint, in closed form where the machine has one.
 pub fn velocity(machine: &Machine, joints: &[f64]) -> Result<Vec<[f64; 6]>, KinematicsError> {
@@ -18,9 +18,33 @@ pub fn velocity(machine: &Machine, joints: &[f64]) -> Result<Vec<[f64; 6]>, Kine
             Ok(opw(k, q).to_vec())
         }
         Chain::Serial(k) => k.jacobian(joints),
+        Chain::Planar3r(links) => {
+            let &[a, b, c] = checked(joints, 3)? else { return Err(KinematicsError::NotFinite) };
+            Ok(flat(&[(a, links[0]), (b, links[1]), (c, links[2])]))
+        }
+        Chain::Scara(k) => {
+            let &[a, b, _, _] = checked(joints, 4)? else { return Err(KinematicsError::NotFinite) };
+            let [l1, l2, _] = k.lengths();
+            let mut out = flat(&[(a, l1), (b, l2)]);
+            out.extend([[0.0, 0.0, -1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0, 0.0, -1.0]]);
+            Ok(out)
+        }
         Chain::Tricept(_) => by_inverse(&*machine.kinematics(), joints),
         _ => jacobian(&*machine.kinematics(), joints),
     }
+}
+
+/// Velocity of the end of links in the XY plane, each with its angle from the one before and its length.
+fn flat(links: &[(f64, f64)]) -> Vec<[f64; 6]> {
+    let mut starts = Vec::with_capacity(links.len());
+    let (mut at, mut direction) = ([0.0, 0.0], 0.0);
+    for (angle, length) in links {
+        starts.push(at);
+        direction += angle;
+        let (s, c) = libm::sincos(direction);
+        at = [at[0] + length * c, at[1] + length * s];
+    }
+    starts.into_iter().map(|[x, y]| [-(at[1] - y), at[0] - x, 0.0, 0.0, 0.0, 1.0]).collect()
 }
 
 /// Velocity of the flange of an arm with a spherical wrist, per unit of each joint.
@@ -135,17 +159,17 @@ pub fn condition(columns: &[[f64; 6]], size: f64) -> f64 {
     }
 }
 
-/// Least over greatest singular value of a Jacobian, its turns and the lengths of its levers in units of `size`, mm: 0 where
-/// the tool can't go some way that its joints suffice for, 1 where all ways are alike. Of more than twelve joints the rest is
-/// left out.
-pub fn evenness(columns: &[[f64; 6]], size: f64) -> f64 {
+/// Least over greatest singular value of a Jacobian, a way or a stroke of `size` mm counted as a radian: 0 where the tool
+/// can't go some way that its joints suffice for, 1 where all ways are alike. Of more than twelve joints the rest is left out.
+pub fn evenness(joints: &[Joint], columns: &[[f64; 6]], size: f64) -> f64 {
     const MOST: usize = 12;
     let n = columns.len().min(MOST);
     // The smaller of JᵀJ and JJᵀ: the rest of the other's eigenvalues are 0 and mean nothing.
     let small = n.min(6);
-    let scaled = |c: &[f64; 6]| [c[0] / size, c[1] / size, c[2] / size, c[3], c[4], c[5]];
+    let scaled = |c: &[f64; 6], unit: f64| [c[0] / size, c[1] / size, c[2] / size, c[3], c[4], c[5]].map(|v| v * unit);
+    let unit = |i: usize| if joints.get(i).is_some_and(|j| j.kind == JointKind::Prismatic) { size } else { 1.0 };
     let mut j = [[0.0; 6]; MOST];
-    j.iter_mut().zip(columns).for_each(|(to, from)| *to = scaled(from));
+    j.iter_mut().zip(columns).enumerate().for_each(|(i, (to, from))| *to = scaled(from, unit(i)));
     let mut square = [[0.0; 6]; 6];
     for (a, row) in square.iter_mut().enumerate().take(small) {
         for (b, cell) in row.iter_mut().enumerate().take(small) {
@@ -191,7 +215,8 @@ mod tests {
     use crate::{builtin, math::rot_x};
 
     fn at(id: &str, joints: &[f64], size: f64) -> f64 {
-        evenness(&velocity(&builtin(id).unwrap(), joints).unwrap(), size)
+        let m = builtin(id).unwrap();
+        evenness(&m.joints, &velocity(&m, joints).unwrap(), size)
     }
 
     /// A stretched elbow, a straight wrist, a wrist over the first axis: none is hidden by the others.
@@ -206,14 +231,14 @@ mod tests {
         let m = builtin("abb/irb2400").unwrap();
         let columns = velocity(&m, &arm).unwrap();
         let metres: Vec<[f64; 6]> = columns.iter().map(|c| [c[0] / 1e3, c[1] / 1e3, c[2] / 1e3, c[3], c[4], c[5]]).collect();
-        assert!((evenness(&columns, 1500.0) - evenness(&metres, 1.5)).abs() < 1e-9);
+        assert!((evenness(&m.joints, &columns, 1500.0) - evenness(&m.joints, &metres, 1.5)).abs() < 1e-9);
     }
 
     #[test]
     fn even_is_one() {
         let turn = rot_x(0.4);
         let columns: Vec<[f64; 6]> = (0..3).map(|i| [turn[0][i], turn[1][i], turn[2][i], 0.0, 0.0, 0.0]).collect();
-        assert!((evenness(&columns, 1.0) - 1.0).abs() < 1e-12);
-        assert_eq!(evenness(&[], 1.0), 0.0);
+        assert!((evenness(&[], &columns, 1.0) - 1.0).abs() < 1e-12);
+        assert_eq!(evenness(&[], &[], 1.0), 0.0);
     }
 }

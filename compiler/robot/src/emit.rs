@@ -2,7 +2,7 @@
 //! figures of the summary are gathered.
 
 use gr_ir::Source;
-use gr_machine::math::{Frame, M3, quaternion_of};
+use gr_machine::math::{Frame, M3, norm, product, quaternion_of, rotation_vector, transpose};
 use gr_machine::Machine;
 use gr_text::code;
 
@@ -128,7 +128,7 @@ impl<'a> Emit<'a> {
         self.target(at.position, &at.turn, home, branch)
     }
 
-    fn mv(&mut self, g: &Gathered, m: &Move, node: &Node, here: &mut Option<Here>, last: &mut Joints, findings: &mut Findings<'_>) {
+    fn mv(&mut self, g: &mut Gathered, m: &Move, node: &Node, here: &mut Option<Here>, last: &mut Joints, findings: &mut Findings<'_>) {
         let turn = spun(&g.turns[m.turn as usize], m.free, node.spin);
         if m.way == Way::Joint {
             let joints = node.start;
@@ -144,8 +144,15 @@ impl<'a> Emit<'a> {
         }
         let Some(h) = here else { return };
         if h.frame != m.frame {
-            let base = g.frames[usize::from(h.frame)].frame.apply(h.position);
-            h.position = g.frames[usize::from(m.frame)].frame.inverse().apply(base);
+            // The same place and turn in the new frame.
+            let [old, new] = [h.frame, m.frame].map(|f| g.frames[usize::from(f)].frame);
+            let relative = new.inverse().then(&old);
+            h.position = relative.apply(h.position);
+            let turn = product(&relative.turn, &g.turns[h.turn as usize]);
+            if norm(rotation_vector(&product(&turn, &transpose(&g.turns[h.turn as usize])))) > 1e-12 {
+                g.turns.push(turn);
+                h.turn = u32::try_from(g.turns.len() - 1).unwrap_or(u32::MAX);
+            }
             h.frame = m.frame;
         }
         let (joints, via) = self.follow(g, m, node, h, findings);

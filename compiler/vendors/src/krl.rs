@@ -46,6 +46,7 @@ impl Language for Krl {
             home: String::new(),
             angles: [0.0; 3],
             set: [String::new(), String::new(), String::new()],
+            first: String::new(),
         };
         let mut out = walk(program, sources, options, &TRAITS, &mut w);
         if !any_error(&out.findings) {
@@ -64,13 +65,17 @@ struct Writer {
     angles: [f64; 3],
     /// What is in force: path speed, corner distance, axis speed.
     set: [String; 3],
+    /// Axis speed of the first joint move: the way to the home position before it is no faster.
+    first: String,
 }
 
 impl Writer {
     fn files(self, name: &str) -> Vec<OutputFile> {
         let mut files = Vec::new();
         let head = "&ACCESS RVP\r\n&REL 1\r\n";
-        let start = "BAS(#INITMOV,0)\r\n$ADVANCE=3\r\n$ORI_TYPE=#VAR\r\n$CIRC_TYPE=#PATH\r\nPTP XHOME\r\n";
+        // INITMOV puts speeds and accelerations of the axes to what the control was set up with, 100 % mostly.
+        let speed = if self.first.is_empty() { axis_speed(SLOW) } else { self.first.clone() };
+        let start = format!("BAS(#INITMOV,0)\r\n$ADVANCE=3\r\n$ORI_TYPE=#VAR\r\n$CIRC_TYPE=#PATH\r\n{speed}\r\nPTP XHOME\r\n");
         let parts = self.parts.finish();
         let mut main = format!("{head}DEF {name}()\r\n{start}");
         let lines = |text: &str| text.matches('\n').count() as u64;
@@ -143,8 +148,11 @@ impl Writer {
 
     fn joint(&mut self, cx: &mut Cx, to: &Target, share: f64) {
         let percent = libm::floor(share * 100.0 + 1e-6).clamp(1.0, 100.0);
-        let all: Vec<String> = (1..=6).map(|i| format!("$VEL_AXIS[{i}]={percent:.0}")).collect();
-        self.put(2, all.join("\r\n"));
+        let speed = axis_speed(percent);
+        if self.first.is_empty() {
+            self.first.clone_from(&speed);
+        }
+        self.put(2, speed);
         let degrees = cx.degrees(to);
         // Next to zero the turn bit of a joint could be read as a whole turn. Home is joints, at the end as at the start;
         // a part of a long program does not see the start's XHOME.
@@ -165,6 +173,14 @@ impl Writer {
         self.parts.points(1);
         self.end(cx, format!("PTP {text}"));
     }
+}
+
+/// Per cent of the axis speed to the home position where no joint move says one.
+const SLOW: f64 = 10.0;
+
+fn axis_speed(percent: f64) -> String {
+    let all: Vec<String> = (1..=6).map(|i| format!("$VEL_AXIS[{i}]={percent:.0}")).collect();
+    all.join("\r\n")
 }
 
 fn with_point(mut text: String) -> String {

@@ -174,7 +174,7 @@ fn area(global: &Global, args: &MapArgs, machine: &Machine, plane: Plane, budget
     }
     drop(progress);
     let mut notes = Vec::new();
-    if by_force && force != [0.0; 3] {
+    if map.elastic && by_force {
         notes.push(format!("force X {} Y {} Z {} N", force[0], force[1], force[2]));
     }
     if let Some(text) = &args.deviations {
@@ -192,7 +192,9 @@ fn area(global: &Global, args: &MapArgs, machine: &Machine, plane: Plane, budget
         let axis = ["X", "Y", "Z"][plane.axis];
         let _ = writeln!(text, "nothing of this plane is within reach; the tool gets to {axis} {low:.1} to {high:.1} mm at most");
     }
-    let picture = Picture::map(&map, &title, &notes);
+    // Lines of a picture are short.
+    let lines: Vec<String> = notes.iter().flat_map(|n| n.split("; ")).map(str::to_string).collect();
+    let picture = Picture::map(&map, &title, &lines);
     Ok(Made { text, files: files(&args.output, &picture, || map.csv())?, left_out })
 }
 
