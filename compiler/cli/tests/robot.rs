@@ -160,3 +160,69 @@ fn machine_import() {
     assert!(!refused.status.success() && text(&refused.stderr).contains("none.urdf"), "{}", text(&refused.stderr));
     assert!(!folder.path().join("none.toml").exists());
 }
+
+/// `--reference usp2009` for joints: legs and column of the recomputed thesis on a move along Z, and a place that only cones
+/// fixed in the base forbid.
+#[test]
+fn joints_of_usp2009() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_string();
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+    write("cell.toml", "format = 1\nid = \"test/cell\"\nextends = \"usp/2ups-prp\"\n[frames.part]\nposition = [800, 0, 0]\n");
+    write("z.ngc", "G21 G90 G94\nF600\nG0 X0 Y0 Z0\nG1 Z100\nM2\n");
+    write("cone.ngc", "G21 G90 G94\nF600\nG0 X0 Y0 Z300\nG1 X-107 Y400\nM2\n");
+    let build = |name: &str, more: &[&str]| {
+        let (source, cell, out) = (path(name), path("cell.toml"), path("out.ngc"));
+        let args = ["build", &source, "--machine", &cell, "--target", "joint-gcode", "-o", &out, "--message-format", "short"];
+        run(&[&args, more].concat())
+    };
+    let made = build("z.ngc", &["--reference", "usp2009"]);
+    assert!(made.status.success(), "{}", text(&made.stderr));
+    let program = std::fs::read_to_string(path("out.ngc")).unwrap();
+    let last = program.lines().filter(|l| l.starts_with("G1") && l.contains(" Z100 ")).next_back().unwrap();
+    let joint = |w: &str| -> f64 { last.split(' ').find_map(|p| p.strip_prefix(w)).unwrap().parse().unwrap() };
+    assert!([("X", 1049.1068), ("Y", 1049.1068), ("Z", 100.0)].iter().all(|(w, v)| (joint(w) - v).abs() < 1e-4), "{last}");
+    assert!(program.contains("X1044.32992"), "the start of the move: {program}");
+    // (693, 400, 300): reached with the cones in the platform, outside of the first one's with those in the base.
+    assert!(build("cone.ngc", &[]).status.success());
+    let refused = build("cone.ngc", &["--reference", "usp2009"]);
+    assert_eq!(refused.status.code(), Some(1));
+    insta::assert_snapshot!("usp2009_cone", text(&refused.stderr).replace(&format!("{}/", folder.path().display()), ""));
+}
+
+/// Two million moves for an arm, in files of the controller's size: `cargo test --release -p gcc-robot --test robot -- --ignored`.
+#[test]
+#[ignore = "a minute, and a gigabyte"]
+fn two_million_moves() {
+    moves(2_000_000);
+}
+
+/// The same, smaller.
+#[test]
+fn twenty_thousand_moves() {
+    moves(20_000);
+}
+
+fn moves(count: usize) {
+    use std::fmt::Write as _;
+    let folder = tempfile::tempdir().unwrap();
+    let mut program = String::from("G21 G90 G94\nT1 M6\nG0 X0 Y0 Z20\nF1200\n");
+    for i in 0..count {
+        let _ = writeln!(program, "G1 X{:.3} Y{:.3} Z{:.3}", (i % 397) as f64 * 0.25, (i % 211) as f64 * 0.5, (i % 13) as f64 * 0.1);
+    }
+    program += "M30\n";
+    let source = folder.path().join("many.ngc");
+    std::fs::write(&source, program).unwrap();
+    let out = format!("{}/out/", folder.path().display());
+    let made = run(&["build", source.to_str().unwrap(), "--machine", CELL, "--target", "rapid", "-q", "-o", &out]);
+    assert!(made.status.success(), "{}", text(&made.stderr));
+    let mut cuts = 0;
+    for file in std::fs::read_dir(&out).unwrap() {
+        let path = file.unwrap().path();
+        if path.extension().is_some_and(|e| e == "mod") {
+            cuts += std::fs::read_to_string(path).unwrap().matches("MoveL ").count();
+        }
+    }
+    // The moves, and the ways to and from the part.
+    assert!(cuts >= count && cuts <= count + 10, "{cuts}");
+}

@@ -72,9 +72,18 @@ impl<'a> Emit<'a> {
         let mut chain = 0;
         let mut node: Option<&Node> = None;
         let mut last = *home;
+        // What is in force at the end: the way home is told in it.
+        let (mut tool, mut frame) = (None, None);
         for (i, item) in items.into_iter().enumerate() {
             match item {
-                Item::Do(step) => self.steps.push(step),
+                Item::Do(step) => {
+                    match step.action {
+                        Action::UseTool(t) => tool = Some(t),
+                        Action::UseFrame(f) => frame = Some(f),
+                        _ => {}
+                    }
+                    self.steps.push(step);
+                }
                 Item::Move(m) => {
                     if list.get(chain).is_some_and(|c| c.first == i) {
                         node = nodes.get(chain);
@@ -85,7 +94,7 @@ impl<'a> Emit<'a> {
                 }
             }
         }
-        let at_home = self.home_target(g, home, here.as_ref());
+        let at_home = self.home_target(g, home, frame, tool);
         if here.is_some() {
             self.summary.rapid_seconds += self.joint_time(&last, home, 1.0);
             let to = self.keep(at_home);
@@ -119,9 +128,9 @@ impl<'a> Emit<'a> {
         Target { position, quaternion: quaternion_of(turn), joints, branch }
     }
 
-    fn home_target(&self, g: &Gathered, home: &Joints, here: Option<&Here>) -> Target {
-        let frame = here.map_or(Frame::IDENTITY, |h| g.frames[usize::from(h.frame)].frame);
-        let tool = g.tools.last().map_or(Frame::IDENTITY, |t| t.frame);
+    fn home_target(&self, g: &Gathered, home: &Joints, frame: Option<u16>, tool: Option<u16>) -> Target {
+        let frame = frame.map_or(Frame::IDENTITY, |f| g.frames[usize::from(f)].frame);
+        let tool = tool.map_or(Frame::IDENTITY, |t| g.tools[usize::from(t)].frame);
         let at = self.solver.forward(home).map_or(Frame::IDENTITY, |f| frame.inverse().then(&f).then(&tool));
         let mut all = Branches::NONE;
         let branch = self.solver.forward(home).and_then(|f| self.solver.all(&f, &mut all).ok()).map_or(0, |()| nearest(&all, home, self.solver.count));

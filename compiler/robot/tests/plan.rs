@@ -85,10 +85,15 @@ fn the_example_part() {
     insta::assert_snapshot!("bracket_summary", format!("{}{:#?}", messages(&p.warnings, text), p.summary));
 }
 
-/// Forward kinematics of every target lead back to its pose.
+/// Forward kinematics of every target lead back to its pose: in the frame and with the tool in force, the way home too, where
+/// the last tool is not the last that came new.
 #[test]
 fn joints_lead_to_poses() {
-    let text = include_str!("../../../docs/examples/bracket.ngc");
+    lead_to_poses(include_str!("../../../docs/examples/bracket.ngc"), 61);
+    lead_to_poses("G21 G90\nT1 M6\nG0 X10 Y10 Z20\nG1 Z0 F600\nG0 Z20\nT2 M6\nG0 X40 Y10\nG1 Z0\nG0 Z20\nT1 M6\nG0 X20 Y10\nG1 Z0\nG0 Z20\nM30\n", 8);
+}
+
+fn lead_to_poses(text: &str, least: usize) {
     let p = planned(text, &cell()).unwrap_or_else(|e| panic!("{}", messages(&e, text))).program;
     let k = p.machine.kinematics();
     let (mut tool, mut frame) = (0usize, 0usize);
@@ -117,7 +122,7 @@ fn joints_lead_to_poses() {
         assert!(p.machine.outside(&t.joints[..6]).is_empty());
         seen += 1;
     }
-    assert!(seen > 60);
+    assert!(seen >= least, "{seen}");
 }
 
 fn faults(text: &str, machine: &Machine) -> String {

@@ -121,6 +121,8 @@ fn inform() {
 fn val3() {
     let p = program("staubli/tx90", [10.0, 20.0, 70.0, 20.0, 50.0, 30.0]);
     has("val3", &p, &["x=\"100\" y=\"50\" z=\"5\" rx=\"180\" ry=\"0\" rz=\"-30\"", "x=\"500\" y=\"0\" z=\"-278\"", "x=\"107.071\" y=\"52.929\"", "tmax=\"25\""]);
+    // How it stands is said by the joint values of the joint move; straight moves and arcs go on as it stands.
+    has("val3", &p, &["j1=\"10\" j2=\"20\" j3=\"70\" j4=\"20\" j5=\"50\" j6=\"30\"", "shoulder=\"ssame\" elbow=\"esame\" wrist=\"wsame\""]);
 }
 
 /// DELMIA: degrees and m; turns about Z, Y, X: yaw 30, pitch 0, roll 180.
@@ -128,6 +130,11 @@ fn val3() {
 fn delmia() {
     let p = program("abb/irb140", [10.0, 20.0, 5.0, 20.0, 50.0, -30.0]);
     has("delmia-xml", &p, &["X=\"0.1\" Y=\"0.05\" Z=\"0.005\"/><Orientation Units=\"deg\" Yaw=\"30\" Pitch=\"0\" Roll=\"180\"", "<JointValue>-30.000000</JointValue>"]);
+    // The configuration: all joints of the joint move, one by one.
+    let joint = |n: u8, v: &str| format!("DOFNumber=\"{n}\"><JointValue>{v}</JointValue>");
+    for (n, v) in (1..).zip(["10.000000", "20.000000", "5.000000", "20.000000", "50.000000", "-30.000000"]) {
+        has("delmia-xml", &p, &[&joint(n, v)]);
+    }
 }
 
 /// Kawasaki, Comau: R = Rz(O)·Ry(A)·Rz(T). The tool points down, the pole of this convention: A = 180 and only T − O is
@@ -138,6 +145,11 @@ fn zyz_at_its_pole() {
     let joints = [10.0, 20.0, 5.0, 20.0, 50.0, -30.0];
     has("kawasaki-as", &program("kawasaki/rs020n", joints), &["LMOVE TRANS(100,50,5,0,180,150)", "C1MOVE TRANS(107.071,52.929,5,0,180,150)", "C2MOVE TRANS(110,60,5,"]);
     has("pdl2", &program("abb/irb140", joints), &["MOVE LINEAR TO POS(100,50,5,0,180,150,", "$LIN_SPD := 0.025"]);
+    // Kawasaki: the joint move says how it stands. Comau: wrist in front of the first axis, forearm bent forward: neither S
+    // nor E; W where the fifth joint is negative.
+    has("kawasaki-as", &program("kawasaki/rs020n", joints), &["JMOVE #[10,20,5,20,50,-30]"]);
+    has("pdl2", &program("abb/irb140", joints), &["MOVE TO {10,20,5,20,50,-30}", "0,180,150,'T1:0 T2:0 T3:0')"]);
+    has("pdl2", &program("abb/irb140", [10.0, 20.0, 5.0, 20.0, -50.0, -30.0]), &["0,180,150,'W T1:0 T2:0 T3:0')"]);
 }
 
 /// Adept V+ on a SCARA: the same pole; arcs become lines, the first of them on the circle: radius 10, tolerance 0.01 gives
@@ -153,15 +165,25 @@ fn vplus() {
         t.joints[..4].copy_from_slice(&kinematics.inverse_frame(&pose).unwrap()[0].joints);
     }
     has("vplus", &p, &["MOVES part:TRANS(100,50,5,0,180,150)", "MOVES part:TRANS(100.872,50.038,5,0,180,150)", "SPEED 25 MMPS ALWAYS"]);
+    // The configuration: the flange is at (600, 50, 305), links 424.942 and 374.904. cos q2 = (600² + 50² − 424.942² −
+    // 374.904²)/(2 · 424.942 · 374.904): q2 = ±82.540°. q1 = atan2(50, 600) ∓ atan2(371.73, 473.62), stroke 876.808 − 305, and
+    // q4 = q1 + q2 − 30°. Either elbow, but all of it.
+    let text = text("vplus", &p);
+    let told: Vec<f64> = text.split("MOVE #PPOINT(").last().unwrap().split(')').next().unwrap().split(',').map(|v| v.parse().unwrap()).collect();
+    let said = [LEFT, RIGHT].iter().any(|hand| told.iter().zip(hand).all(|(a, b)| (a - b).abs() < 2e-3));
+    assert!(told.len() == 4 && said, "{told:?}");
 }
 
-/// The others. Denso: joint values. Mitsubishi: A B C about X, Y, Z. Epson: U V W about Z, Y, X. Nachi: in the base, turns about Z,
+const LEFT: [f64; 4] = [-33.3636, 82.5395, 571.808, 19.1758];
+const RIGHT: [f64; 4] = [42.8909, -82.5395, 571.808, -69.6486];
+
+/// The others, each with the joint values of its joint move for the configuration. Denso: joint values. Mitsubishi: A B C about X, Y, Z. Epson: U V W about Z, Y, X. Nachi: in the base, turns about Z,
 /// Y, X.
 #[test]
 fn the_others() {
     let p = program("abb/irb140", [10.0, 20.0, 5.0, 20.0, 50.0, -30.0]);
-    has("denso-pac", &p, &["MOVE L, @0 J(10,20,5,20,50,-30)", "MOVE C, J(", "SPEED MPS(25)"]);
+    has("denso-pac", &p, &["MOVE P, @0 J(10,20,5,20,50,-30)", "MOVE L, @0 J(10,20,5,20,50,-30)", "MOVE C, J(", "SPEED MPS(25)"]);
     has("melfa", &p, &["(100,50,5,180,0,30)(7,0)", "Mvr P2,P3,P4", "P3=(107.071,52.929,5,180,0,30)", "Spd 25"]);
-    has("spel", &p, &["Move XY(100,50,5,30,0,180)/1", "Arc3 XY(107.071,52.929,5,30,0,180)/1, XY(110,60,5,30,0,180)/1", "SpeedS 25"]);
-    has("nachi", &p, &["M1X,L,(600,50,205,30,0,180),S=25.00", "M1X,C1,(607.071,52.929,205,30,0,180)"]);
+    has("spel", &p, &["Move XY(100,50,5,30,0,180)/1", "Go AglToPls(10,20,5,20,50,-30)", "Arc3 XY(107.071,52.929,5,30,0,180)/1, XY(110,60,5,30,0,180)/1", "SpeedS 25"]);
+    has("nachi", &p, &["M1J,P,(10,20,5,20,50,-30)", "M1X,L,(600,50,205,30,0,180),S=25.00", "M1X,C1,(607.071,52.929,205,30,0,180)"]);
 }
