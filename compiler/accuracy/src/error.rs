@@ -1,7 +1,7 @@
 //! The error of the tool point at one place of the machine: by joints, by geometry, by force.
 
 use crate::grade;
-use gr_machine::math::{V3, add, cross, dot, norm, scale};
+use gr_machine::math::{V3, add, cross, dot, norm, scale, sub};
 use gr_machine::{Chain, KinematicsError, Machine, ParameterKind, TwoLegs, differential, parameter_columns};
 
 /// How far each joint and each number of the geometry may be off, mm or rad.
@@ -163,29 +163,81 @@ impl Spread {
     }
 }
 
-/// Up to so many causes in space all patterns of signs are tried.
-const ALL_PATTERNS: usize = 14;
+/// Up to so many causes in space the longest sum is found for certain.
+const CERTAIN: usize = 24;
+/// Sine under which vectors are parallel or in a plane, squared.
+const LEVEL: f64 = 1e-24;
 
-/// The greatest length of a sum of vectors with free signs. With many vectors a sum that no single change of sign and
+/// The greatest length of a sum of vectors with free signs. With very many vectors a sum that no single change of sign and
 /// no turn towards it makes longer, found from many directions.
 fn longest(moves: &[V3]) -> f64 {
     if moves.iter().all(|v| v[2] == 0.0) {
         return longest_flat(moves);
     }
-    if moves.len() > ALL_PATTERNS {
+    if moves.len() > CERTAIN {
         return moves.iter().map(|d| climbed(moves, *d)).fold(0.0, f64::max);
     }
-    let mut sum = moves.iter().fold([0.0; 3], |s, v| add(s, *v));
-    let mut best = dot(sum, sum);
-    let mut signs = vec![1.0f64; moves.len()];
-    // In Gray's order each pattern differs from the one before by one sign; the first sign is free to stay.
-    for step in 1u32..1 << moves.len().saturating_sub(1) {
-        let i = step.trailing_zeros() as usize;
-        signs[i] = -signs[i];
-        sum = add(sum, scale(moves[i], 2.0 * signs[i]));
-        best = best.max(dot(sum, sum));
+    let mut list = [[0.0; 3]; CERTAIN];
+    let list = merged(moves, &mut list);
+    let mut best = list.iter().map(|v| dot(*v, *v)).fold(0.0, f64::max);
+    for i in 0..list.len() {
+        (0..i).for_each(|j| best = best.max(longest_about(list, i, j)));
     }
     libm::sqrt(best)
+}
+
+fn sign(v: f64) -> f64 {
+    if v < 0.0 { -1.0 } else { 1.0 }
+}
+
+/// Parallel vectors as one: in the longest sum they go the same way.
+fn merged<'a>(moves: &[V3], list: &'a mut [V3; CERTAIN]) -> &'a [V3] {
+    let mut count = 0;
+    for v in moves {
+        let same = |u: &&mut V3| {
+            let across = cross(**u, *v);
+            dot(across, across) <= LEVEL * dot(**u, **u) * dot(*v, *v)
+        };
+        match list[..count].iter_mut().find(same) {
+            Some(u) => *u = add(*u, scale(*v, sign(dot(*u, *v)))),
+            None => {
+                list[count] = *v;
+                count += 1;
+            }
+        }
+    }
+    &list[..count]
+}
+
+/// The square of the longest sum whose signs follow a direction next to the one square to two of the vectors. The longest
+/// sum is one of these: the directions that lead to the same signs fill a cone, and each of its edges is square to two.
+fn longest_about(list: &[V3], i: usize, j: usize) -> f64 {
+    let normal = cross(list[i], list[j]);
+    let level = LEVEL * dot(normal, normal);
+    let (mut across, mut free) = ([0.0; 3], 1u32 << i | 1 << j);
+    for (k, v) in list.iter().enumerate().filter(|(k, _)| *k != i && *k != j) {
+        let side = dot(*v, normal);
+        if side * side <= level * dot(*v, *v) {
+            free |= 1 << k;
+        } else {
+            across = add(across, scale(*v, sign(side)));
+        }
+    }
+    let ends = |a: V3, b: V3| {
+        let (to, fro) = (add(a, b), sub(a, b));
+        [add(across, to), sub(across, to), add(across, fro), sub(across, fro)].iter().map(|v| dot(*v, *v)).fold(0.0, f64::max)
+    };
+    if free.count_ones() == 2 {
+        return ends(list[i], list[j]);
+    }
+    // More of them lie in that plane: there it is as in `longest_flat`.
+    let in_plane = || (0..list.len()).filter(|k| free >> k & 1 == 1);
+    let with = |g: usize| {
+        let along = cross(normal, list[g]);
+        let rest = in_plane().filter(|k| *k != g).fold([0.0; 3], |s, k| add(s, scale(list[k], sign(dot(list[k], along)))));
+        ends(list[g], rest)
+    };
+    in_plane().map(with).fold(0.0, f64::max)
 }
 
 /// The same for vectors across Z: the corners of the polygon that all sums fill are those where the signs follow a
@@ -275,7 +327,24 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
+    /// By all patterns.
+    fn all_patterns(list: &[V3]) -> f64 {
+        let sum = |signs: u32| list.iter().enumerate().fold([0.0; 3], |s, (i, v)| add(s, scale(*v, if signs >> i & 1 == 1 { -1.0 } else { 1.0 })));
+        (0..1u32 << list.len()).map(|n| norm(sum(n))).fold(0.0, f64::max)
+    }
+
     proptest! {
+        /// No pattern of signs makes more, and one makes as much; whole numbers, so that many are parallel or in a plane.
+        #[test]
+        fn longest_of_all_patterns(
+            list in prop::collection::vec([-9.0..9.0f64, -9.0..9.0, -9.0..9.0], 1..10),
+            whole in prop::collection::vec([-2..3i32, -2..3i32, -2..3i32], 1..10),
+        ) {
+            prop_assert!((longest(&list) - all_patterns(&list)).abs() < 1e-9);
+            let whole: Vec<V3> = whole.into_iter().map(|v| v.map(f64::from)).filter(|v| *v != [0.0; 3]).collect();
+            prop_assert!((longest(&whole) - all_patterns(&whole)).abs() < 1e-9, "{} {}", longest(&whole), all_patterns(&whole));
+        }
+
         /// In a plane as in space: a little way out of the plane makes nearly no difference.
         #[test]
         fn flat_vectors_as_others(list in prop::collection::vec((-10.0..10.0f64, -10.0..10.0f64), 1..9)) {

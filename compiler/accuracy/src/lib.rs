@@ -9,6 +9,7 @@
 //! | `map` | a quantity over the work space |
 //! | `outline` | the border of what is within reach |
 //! | `picture` | maps and bar charts as PNG and SVG |
+//! | `clearance` | how far places are from what is out of reach |
 //! | `place` | where a part is best put |
 //! | `report` | errors along a program |
 //! | `words` | joints of machine tools from the words of a program |
@@ -17,6 +18,7 @@
 // `!(x <= limit)` is meant: a value that is not a number must fail the test.
 #![allow(clippy::neg_cmp_op_on_partial_ord)]
 
+mod clearance;
 pub mod compensate;
 pub mod error;
 pub mod grade;

@@ -170,6 +170,8 @@ pub struct Map {
     pub centred: bool,
     /// There is a deflection in it.
     pub elastic: bool,
+    /// Nodes within reach that have no value: a spring has no length left there.
+    pub lost: usize,
     /// Values.
     pub values: Vec<f32>,
 }
@@ -296,11 +298,16 @@ impl<'a> Probe<'a> {
     }
 
     /// Where the flange is when the tool point is there. A machine that only places its tool point takes it upright.
-    fn flange(&self, p: V3) -> Frame {
+    pub(crate) fn flange(&self, p: V3) -> Frame {
         match self.kinematics.control() {
             Control::Position => Frame::shift(sub(p, self.tool.position)),
             _ => Frame { turn: self.turn, position: p }.then(&self.tool.inverse()),
         }
+    }
+
+    /// Its machine.
+    pub(crate) fn machine(&self) -> &'a Machine {
+        self.machine
     }
 
     /// With the tool's axis pointing straight down (the flange's Z along −Z of the base).
@@ -493,6 +500,22 @@ impl<'a> Probe<'a> {
         Some(differential::evenness(&self.machine.joints, &columns, size))
     }
 
+    /// Whether every joint has a spring: where there is no deflection then, one of them has no length left.
+    fn springs(&self) -> bool {
+        let members = self.machine.cell.stiffness.as_ref().map_or(&[][..], |s| &s.members);
+        (0..self.machine.joints.len()).all(|i| members.iter().any(|m| m.joint == i))
+    }
+
+    /// How much a force moves the tool point, mm; 0 where the file has not all springs, no number where one has no length.
+    fn yields(&self, s: &Sensitivity, force: V3) -> f64 {
+        match s.deflection(force) {
+            Some(d) => norm(d),
+            None if force != [0.0; 3] && self.springs() => f64::NAN,
+            None => 0.0,
+        }
+    }
+
+    /// The quantity there; none out of reach, no number where it has no value.
     fn value(&self, p: V3, request: &Request, budget: &Budget) -> Option<f64> {
         if request.quantity == Quantity::Workspace {
             return self.reaches(p).then_some(1.0);
@@ -521,21 +544,21 @@ impl<'a> Probe<'a> {
                 None => um * worst(&s.geometry, budget.geometry.as_ref()?, part),
             },
             Quantity::Elastic(part) => {
-                let d = s.deflection(request.force)?;
+                let Some(d) = s.deflection(request.force) else { return Some(f64::NAN) };
                 um * if let Part::Axis(i) = part { d[i] } else { norm(d) }
             }
             Quantity::Total => {
-                let elastic = s.deflection(request.force).map_or(0.0, norm);
+                let elastic = self.yields(&s, request.force);
                 let of = |c: &[V3], b: &Option<Vec<f64>>| b.as_ref().map_or(0.0, |b| worst(c, b, Part::Length));
                 um * (of(&s.joints, &budget.joints) + of(&s.geometry, &budget.geometry) + elastic)
             }
             Quantity::TotalRss => {
-                let elastic = s.deflection(request.force).map_or(0.0, norm);
+                let elastic = self.yields(&s, request.force);
                 let of = |c: &[V3], b: &Option<Vec<f64>>| b.as_ref().map_or(0.0, |b| typical(c, b));
                 um * libm::hypot(libm::hypot(of(&s.joints, &budget.joints), of(&s.geometry, &budget.geometry)), elastic)
             }
             Quantity::Stiffness => {
-                let c = s.compliance()?;
+                let Some(c) = s.compliance() else { return Some(f64::NAN) };
                 let most = eigenvalues(c.iter().map(|r| r.to_vec()).collect()).into_iter().fold(0.0, f64::max);
                 1e-3 / most
             }
@@ -670,11 +693,12 @@ fn map_of(
             Quantity::Total | Quantity::TotalRss => request.force != [0.0; 3],
             _ => false,
         },
+        lost: 0,
         values: Vec::new(),
     };
     out.values = vec![f32::NAN; nx * ny];
     let step = out.step();
-    let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
+    let (next, done, lost) = (AtomicUsize::new(0), AtomicUsize::new(0), AtomicUsize::new(0));
     let rows: Vec<std::sync::Mutex<&mut [f32]>> = out.values.chunks_mut(nx.max(1)).map(std::sync::Mutex::new).collect();
     let work = || {
         loop {
@@ -688,6 +712,7 @@ fn map_of(
                 p[b] = window[1].0 + j as f64 * step[1];
                 if let Some(v) = probe.value(p, request, budget) {
                     *cell = v as f32;
+                    lost.fetch_add(usize::from(v.is_nan()), Ordering::Relaxed);
                 }
             }
             progress(done.fetch_add(1, Ordering::Relaxed) + 1, ny);
@@ -701,6 +726,7 @@ fn map_of(
         work();
     });
     drop(rows);
+    out.lost = lost.into_inner();
     out
 }
 

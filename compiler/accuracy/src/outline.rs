@@ -118,7 +118,7 @@ mod tests {
         let size = (rows[0].len(), rows.len());
         let values = rows.iter().rev().flat_map(|r| r.chars()).map(|c| if c == '#' { 1.0 } else { f32::NAN }).collect();
         let window = [(0.0, (size.0 - 1) as f64), (0.0, (size.1 - 1) as f64)];
-        Map { quantity: Quantity::Workspace, plane: Plane { axis: 2, at: 0.0 }, size, window, centred: false, elastic: false, values }
+        Map { quantity: Quantity::Workspace, plane: Plane { axis: 2, at: 0.0 }, size, window, centred: false, elastic: false, lost: 0, values }
     }
 
     fn area(line: &[[f64; 2]]) -> f64 {

@@ -1,16 +1,20 @@
 //! Where on the machine a part is best put.
 
+use crate::clearance::{Lattice, border};
 use crate::error::{Budget, Errors};
 use crate::map::Probe;
-use gr_machine::math::{V3, add, dot};
+use gr_machine::Chain;
+use gr_machine::math::{M3, V3, add, dot, sub};
 
 /// A place for the part and what it is worth.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Found {
     /// Origin of the part in the base, mm.
     pub position: V3,
-    /// How far the part may be moved any way along X, Y and Z and still be within reach, mm.
+    /// How far the part may be moved any way, mm: at every place up to there all its points are within reach.
     pub margin: f64,
+    /// The places that were looked at for the margin are so far apart, mm: a hole in the reach that is narrower is not seen.
+    pub apart: f64,
     /// The greatest error on the part (rule sum), mm; none = the machine file has no accuracy data.
     pub error: Option<f64>,
 }
@@ -33,54 +37,70 @@ pub struct Part<'a> {
 }
 
 impl Part<'_> {
-    fn fits(&self, points: &[V3], at: V3) -> bool {
-        points.iter().all(|p| self.probe.reaches(add(at, *p)))
+    fn fits(&self, at: V3) -> bool {
+        self.points.iter().all(|p| self.probe.reaches(add(at, *p)))
     }
 }
 
-/// Points of several tools.
-#[derive(Clone)]
-struct Points(Vec<Vec<V3>>);
+/// Paths that the flange makes in the same direction, whatever the tools' lengths: what is free about one is so for all.
+struct Group<'a> {
+    probe: &'a Probe<'a>,
+    /// From the tool point to the flange with the tool of that probe.
+    offset: V3,
+    /// Places of the flange, from the part's origin; first those that tell most.
+    points: Vec<V3>,
+    lattice: Lattice,
+    /// Distance of each node from what is out of reach, mm.
+    free: Vec<f32>,
+}
 
-impl Points {
-    fn len(&self) -> usize {
-        self.0.iter().map(Vec::len).sum()
+/// Nodes over the work space and about the path: so many as take about a second; a search at each of them takes longer.
+fn nodes(probe: &Probe<'_>) -> usize {
+    if matches!(probe.machine().chain, Chain::Serial(_)) { 8_000 } else { 150_000 }
+}
+
+impl Group<'_> {
+    fn of<'a>(parts: &'a [Part<'_>], progress: &dyn Fn(usize, usize)) -> Vec<Group<'a>> {
+        let mut turns: Vec<(M3, &'a Probe<'a>, V3, Vec<V3>)> = Vec::new();
+        for part in parts {
+            let flange = part.probe.flange([0.0; 3]);
+            let points = part.points.iter().map(|p| add(*p, flange.position));
+            match turns.iter_mut().find(|t| t.0 == flange.turn) {
+                Some(t) => t.3.extend(points),
+                None => turns.push((flange.turn, &part.probe, flange.position, points.collect())),
+            }
+        }
+        let count = turns.len();
+        let one = |(i, (_, probe, offset, points)): (usize, (M3, &'a Probe<'a>, V3, Vec<V3>))| {
+            let reaches = |f: V3| probe.reaches(sub(f, offset));
+            let lattice = Lattice::new(probe.extent(), nodes(probe), &reaches, &|done, of| progress(i * of + done, count * of));
+            let (mut first, free) = (telling(&points), lattice.free());
+            first.extend(points);
+            Group { probe, offset, points: first, lattice, free }
+        };
+        turns.into_iter().enumerate().map(one).collect()
+    }
+
+    /// How far the part may be moved any way from there, and how finely that was looked at, mm.
+    fn margin(&self, at: V3, about: f64) -> (f64, f64) {
+        let points: Vec<V3> = self.points.iter().map(|p| add(at, *p)).collect();
+        let most = about + 2.0 * self.lattice.step();
+        let most = self.probe.extent().map(|(low, high)| if high > low { most } else { 0.0 });
+        border(&points, most, nodes(self.probe), &|f| self.probe.reaches(sub(f, self.offset)))
     }
 }
 
 /// Whether all points are within reach when the part's origin is there.
-fn fits(parts: &[Part<'_>], points: &Points, at: V3) -> bool {
-    parts.iter().zip(&points.0).all(|(part, points)| part.fits(points, at))
+fn fits(parts: &[Part<'_>], at: V3) -> bool {
+    parts.iter().all(|part| part.fits(at))
 }
 
-/// The six ways along the axes.
-fn shifted(at: V3, way: usize, by: f64) -> V3 {
-    let mut out = at;
-    out[way / 2] += if way.is_multiple_of(2) { by } else { -by };
-    out
-}
-
-/// How far the part may be moved along all six directions, mm, to this fineness.
-fn margin(parts: &[Part<'_>], points: &Points, at: V3, most: f64) -> f64 {
-    let good = |d: f64| (0..6).all(|i| fits(parts, points, shifted(at, i, d)));
-    let (mut low, mut high) = (0.0, most);
-    for _ in 0..8 {
-        let mid = (low + high) / 2.0;
-        if good(mid) {
-            low = mid;
-        } else {
-            high = mid;
-        }
-    }
-    low
-}
-
-fn error(parts: &[Part<'_>], budget: &Budget, points: &Points, at: V3) -> Option<f64> {
+fn error<'a>(parts: &[Part<'_>], budget: &Budget, points: impl Iterator<Item = &'a [V3]>, at: V3) -> Option<f64> {
     if budget.joints.is_none() && budget.geometry.is_none() {
         return None;
     }
     let mut most = 0.0f64;
-    for (part, points) in parts.iter().zip(&points.0) {
+    for (part, points) in parts.iter().zip(points) {
         for p in points {
             let s = part.probe.sensitivity(add(at, *p), budget.geometry.is_some())?;
             most = most.max(Errors::new(&s, budget, None).sum());
@@ -89,51 +109,12 @@ fn error(parts: &[Part<'_>], budget: &Budget, points: &Points, at: V3) -> Option
     Some(most)
 }
 
-/// So many points of a part are looked for at first, and so many more each time some of the others are out of reach.
+/// So many points of a part are looked at first, and for the error along the search.
 const FIRST: usize = 60;
-const MORE: usize = 40;
-/// So often the search is done anew with the points that the one before had left out.
-const ROUNDS: usize = 40;
-
-/// The best place of a part: looked for on a grid of the work space, then refined. The search goes by few points; at
-/// what it finds every point is looked at, and those out of reach take part in the next search. None when the part fits
-/// nowhere on the grid.
-pub fn place(parts: &[Part<'_>], budget: &Budget, aim: Aim, progress: &dyn Fn(usize, usize)) -> Option<Found> {
-    let all = Points(parts.iter().map(|p| p.points.clone()).collect());
-    let mut few = Points(all.0.iter().map(|p| telling(p)).collect());
-    let mut best = None;
-    for _ in 0..ROUNDS {
-        let found = search(parts, budget, &few, aim, progress)?;
-        let more = |at: V3| Points(parts.iter().zip(&all.0).map(|(part, p)| spread(p, |p| !part.probe.reaches(add(at, *p)))).collect());
-        let mut missing = more(found.position);
-        if missing.len() == 0 {
-            let free = margin(parts, &all, found.position, found.margin.max(1e-3));
-            best = Some(Found { margin: free, error: error(parts, budget, &all, found.position), ..found });
-            // The margin that the search went by may be that of the few points only.
-            if free > 0.9 * found.margin {
-                break;
-            }
-            for i in 0..6 {
-                for (to, from) in missing.0.iter_mut().zip(more(shifted(found.position, i, found.margin * 0.95)).0) {
-                    to.extend(from);
-                }
-            }
-            if missing.len() == 0 {
-                break;
-            }
-        } else {
-            best = None;
-        }
-        for (to, from) in few.0.iter_mut().zip(missing.0) {
-            to.extend(from);
-        }
-    }
-    best
-}
 
 /// The points that stand out along the axes and across them, and some of the rest.
 fn telling(points: &[V3]) -> Vec<V3> {
-    let mut out = spread(points, |_| true);
+    let mut out: Vec<V3> = points.iter().step_by(points.len().div_ceil(FIRST).max(1)).copied().collect();
     for way in 0..27 {
         let u = [way % 3, way / 3 % 3, way / 9].map(|v| f64::from(v) - 1.0);
         out.extend(points.iter().max_by(|a, b| dot(**a, u).total_cmp(&dot(**b, u))));
@@ -141,56 +122,111 @@ fn telling(points: &[V3]) -> Vec<V3> {
     out
 }
 
-/// Up to so many of the points of a kind, evenly from first to last.
-fn spread(points: &[V3], of: impl Fn(&V3) -> bool) -> Vec<V3> {
-    let some: Vec<&V3> = points.iter().filter(|p| of(p)).collect();
-    let most = if some.len() == points.len() { FIRST } else { MORE };
-    let step = some.len().div_ceil(most).max(1);
-    some.into_iter().step_by(step).copied().collect()
+/// Places along each side of the search's grid.
+const GRID: usize = 24;
+
+/// The best place so far.
+#[derive(Clone, Copy)]
+struct Best {
+    worth: f64,
+    at: V3,
+    /// About how far it is free any way, mm.
+    free: f64,
 }
 
-fn search(parts: &[Part<'_>], budget: &Budget, points: &Points, aim: Aim, progress: &dyn Fn(usize, usize)) -> Option<Found> {
-    const GRID: usize = 24;
-    let probe = &parts.first()?.probe;
-    let extent = probe.extent();
-    let span = extent.map(|(a, b)| (b - a).max(1.0));
-    let low = [0, 1, 2].map(|i| points.0.iter().flatten().map(|p| p[i]).fold(f64::INFINITY, f64::min));
-    let mut best: Option<(f64, Found)> = None;
-    let consider = |best: &mut Option<(f64, Found)>, at: V3| {
-        if !fits(parts, points, at) {
-            return;
+struct Search<'a> {
+    parts: &'a [Part<'a>],
+    budget: &'a Budget,
+    groups: Vec<Group<'a>>,
+    /// Of each part, for its error; none = the margin counts.
+    few: Option<Vec<Vec<V3>>>,
+    /// The longest side of the reach, mm.
+    most: f64,
+    best: Option<Best>,
+}
+
+impl Search<'_> {
+    /// About how far the part is free there; none when that is no more than `least`.
+    fn free(&self, at: V3, least: f64) -> Option<f64> {
+        let mut out = self.most;
+        for group in &self.groups {
+            for p in &group.points {
+                out = out.min(group.lattice.between(&group.free, add(at, *p)));
+                if out <= least {
+                    return None;
+                }
+            }
         }
-        let error = if aim == Aim::Error { error(parts, budget, points, at) } else { None };
-        let most = span[0].min(span[1]).min(span[2]) / 2.0;
-        let freer = |d: f64| (0..6).all(|i| fits(parts, points, shifted(at, i, d)));
-        let worth = match (error, *best) {
-            (Some(e), _) => -e,
-            // A place that can't be moved as far as the best one is not better.
-            (None, Some((w, _))) if !freer(w + 1e-9) => return,
-            _ => margin(parts, points, at, most),
+        Some(out)
+    }
+
+    fn consider(&mut self, at: V3) {
+        let least = if self.few.is_some() { 0.0 } else { self.best.map_or(0.0, |b| b.worth) };
+        let Some(free) = self.free(at, least) else { return };
+        let worth = match &self.few {
+            None => free,
+            Some(few) => match error(self.parts, self.budget, few.iter().map(Vec::as_slice), at) {
+                Some(e) => -e,
+                None => return,
+            },
         };
-        if best.is_none_or(|(w, _)| worth > w + 1e-9) {
-            let margin = if error.is_some() { margin(parts, points, at, most) } else { worth };
-            *best = Some((worth, Found { position: at, margin, error }));
+        if self.best.is_none_or(|b| worth > b.worth + 1e-9) && fits(self.parts, at) {
+            self.best = Some(Best { worth, at, free });
         }
-    };
+    }
+
+    /// Places about the best one, nearer and nearer to it.
+    fn refine(&mut self, mut step: V3) {
+        for _ in 0..24 {
+            let Some(around) = self.best else { return };
+            for way in 0..27 {
+                let by = [way % 3, way / 3 % 3, way / 9].map(|v| f64::from(v) - 1.0);
+                self.consider([0, 1, 2].map(|i| around.at[i] + by[i] * step[i]));
+            }
+            if self.best.is_none_or(|b| b.at == around.at) {
+                step = step.map(|s| s / 2.0);
+            }
+        }
+    }
+}
+
+/// Where the part's origin may be so that its box is within that of the reach: least and greatest.
+fn room(parts: &[Part<'_>], groups: &[Group<'_>]) -> Option<[(f64, f64); 3]> {
+    let extent = parts.first()?.probe.extent();
+    Some([0, 1, 2].map(|i| {
+        let ends = groups.iter().flat_map(|g| &g.points).fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), p| (a.min(p[i]), b.max(p[i])));
+        let (low, high) = (extent[i].0 - ends.0, extent[i].1 - ends.1);
+        if low <= high { (low, high) } else { ((low + high) / 2.0, (low + high) / 2.0) }
+    }))
+}
+
+/// The best place of a part: looked for on a grid of the work space, by the distance of its points from what is out of
+/// reach, then refined; there every point is looked at. None when the part fits nowhere on the grid.
+pub fn place(parts: &[Part<'_>], budget: &Budget, aim: Aim, progress: &dyn Fn(usize, usize)) -> Option<Found> {
+    let groups = Group::of(parts, &|done, of| progress(done * GRID, of * GRID * 2));
+    let room = room(parts, &groups)?;
+    let by_error = aim == Aim::Error && (budget.joints.is_some() || budget.geometry.is_some());
+    let few = by_error.then(|| parts.iter().map(|p| telling(&p.points)).collect());
+    let most = parts.first()?.probe.extent().iter().map(|(low, high)| high - low).fold(0.0, f64::max);
+    let mut search = Search { parts, budget, groups, few, most, best: None };
+    let at = |n: [usize; 3]| [0, 1, 2].map(|i| room[i].0 + (room[i].1 - room[i].0) * (n[i] as f64 + 0.5) / GRID as f64);
     for n in 0..GRID {
-        for m in 0..GRID * GRID {
-            let at = [n, m / GRID, m % GRID];
-            let at = [0, 1, 2].map(|i| extent[i].0 + span[i] * (at[i] as f64 + 0.5) / GRID as f64 - low[i]);
-            consider(&mut best, at);
-        }
-        progress(n + 1, GRID);
+        (0..GRID * GRID).for_each(|m| search.consider(at([n, m / GRID, m % GRID])));
+        progress(GRID + n + 1, GRID * 2);
     }
-    let mut step = span.map(|s| s / GRID as f64 / 2.0);
-    for _ in 0..7 {
-        let Some((_, around)) = best else { break };
-        for i in 0..6 {
-            consider(&mut best, shifted(around.position, i, step[i / 2]));
-        }
-        step = step.map(|s| s / 2.0);
+    if search.best.is_none() {
+        // Where it only just fits, the lattice is too coarse.
+        let mut all = (0..GRID * GRID * GRID).map(|m| at([m / GRID / GRID, m / GRID % GRID, m % GRID]));
+        let worth = if by_error { f64::NEG_INFINITY } else { 0.0 };
+        search.best = all.find(|at| fits(parts, *at)).map(|at| Best { worth, at, free: 0.0 });
     }
-    best.map(|(_, f)| f)
+    search.refine(room.map(|(a, b)| (b - a) / GRID as f64 / 2.0));
+    let best = search.best?;
+    let margins: Vec<(f64, f64)> = search.groups.iter().map(|g| g.margin(best.at, best.free)).collect();
+    let (margin, apart) = margins.into_iter().fold((f64::INFINITY, 0.0f64), |(m, a), (margin, apart)| (m.min(margin), a.max(apart)));
+    // Never more than there is, the place being told to 0.001 mm too.
+    let margin = (libm::floor((margin - 1e-3) * 10.0) / 10.0).max(0.0);
+    Some(Found { position: best.at, margin, apart, error: error(parts, budget, parts.iter().map(|p| p.points.as_slice()), best.at) })
 }
 
 /// A rectangle of stock.

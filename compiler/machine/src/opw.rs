@@ -80,6 +80,16 @@ impl Opw {
         Frame { turn, position }
     }
 
+    /// Movement of the flange per mm of each length: it doesn't turn by them.
+    pub(crate) fn by_lengths(&self, joints: &[f64; 6]) -> [V3; 7] {
+        let q = |i: usize| libm::sincos(joints[i] * self.signs[i] - self.offsets[i]);
+        let ((s1, k1), (s2, k2), (s3, k3)) = (q(0), q(1), q(2));
+        let (s23, k23) = (s2 * k3 + k2 * s3, k2 * k3 - s2 * s3);
+        let at = |out: f64, up: f64| [k1 * out, s1 * out, up];
+        let upright = [0.0, 0.0, 1.0];
+        [at(1.0, 0.0), at(k23, -s23), [-s1, k1, 0.0], upright, at(s2, k2), at(s23, k23), self.flange(joints).axis(2)]
+    }
+
     /// Points from the base to the flange: foot, shoulder, elbow, end of the forearm's crank, wrist.
     pub(crate) fn figure(&self, joints: &[f64; 6], flange: &Frame) -> Vec<V3> {
         let [a1, a2, b, c1, c2, _, c4] = self.lengths;

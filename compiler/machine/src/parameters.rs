@@ -296,7 +296,10 @@ fn by_unit_lengths(chain: &Chain, joints: &[f64]) -> Option<Result<Vec<[f64; 6]>
     Some(match chain {
         Chain::Planar3r(_) => (0..3).map(|i| column(&Planar3r::new(one(i)))).collect(),
         Chain::Scara(_) => scara(joints, column),
-        Chain::Opw(k) => (0..7).map(|i| column(&Opw::new(one(i), k.offsets(), k.signs()))).collect(),
+        Chain::Opw(k) => {
+            let q = crate::kinematics::checked(joints, 6).and_then(|q| q.try_into().map_err(|_| KinematicsError::NotFinite));
+            q.map(|q| k.by_lengths(q).map(|[x, y, z]| [x, y, z, 0.0, 0.0, 0.0]).to_vec())
+        }
         Chain::ParallelWrist(_) => (0..6).map(|i| column(&ParallelWrist::new(one(i)))).collect(),
         _ => return None,
     })

@@ -155,6 +155,10 @@ fn area(global: &Global, args: &MapArgs, machine: &Machine, plane: Plane, budget
     });
     let mut left_out = if args.deviations.is_some() { Vec::new() } else { left_out(quantity, machine, budget, force) };
     left_out.extend(limitless(machine));
+    if map.lost > 0 {
+        let why = "a member of `[stiffness]` has no length left there: look at its `shorter_by` or `between`".to_string();
+        left_out.push([format!("the deflection at {} places within reach", map.lost), why]);
+    }
     let elastic = map.elastic && (!total || soft.is_empty());
     let map = Map { elastic, ..map };
     let mut what = quantity.words();

@@ -85,7 +85,7 @@ pub fn run(global: &Global, args: &PlaceArgs) -> Exit {
     let error = found.error.map(|e| e * 1e3);
     let printed = super::print(&match args.format {
         TableFormat::Json => {
-            format!("{:#}\n", json!({ "machine": machine.id, "position": [x, y, z], "margin": found.margin, "error_um": error, "error_of": parts_of_error, "whole_program": whole }))
+            format!("{:#}\n", json!({ "machine": machine.id, "position": [x, y, z], "margin": found.margin, "margin_looked_at_every": found.apart, "error_um": error, "error_of": parts_of_error, "whole_program": whole }))
         }
         TableFormat::Csv => {
             format!("x mm,y mm,z mm,margin mm,error um\n{x},{y},{z},{:.3},{}\n", found.margin, error.map_or(String::new(), |e| format!("{e:.3}")))
@@ -97,8 +97,8 @@ pub fn run(global: &Global, args: &PlaceArgs) -> Exit {
             };
             let whole = if whole { "every move of the program can be made there, rapids too\n" } else { "not every move of the program can be made there\n" };
             format!(
-                "part's origin at X {x} Y {y} Z {z} mm in the base of {} (--part {x},{y},{z})\nfree to move {:.1} mm any way along X, Y and Z\n{error}{whole}",
-                machine.id, found.margin
+                "part's origin at X {x} Y {y} Z {z} mm in the base of {} (--part {x},{y},{z})\nfree to move {:.1} mm any way: every point of the path stays within reach (looked at every {:.1} mm)\n{error}{whole}",
+                machine.id, found.margin, found.apart
             )
         }
     });
