@@ -122,9 +122,9 @@ fn statement_end(text: &[u8], start: usize, faults: &[u32]) -> usize {
     while at < text.len() {
         at = match text[at] {
             b';' => return at + 1,
-            b'\'' => match lex::string(text, at) {
-                Some(end) if crate::index::first_statement(&text[at + 1..end]).is_none() => end,
-                _ => return line_end(text, at),
+            b'\'' => match crate::index::string_end(text, at) {
+                Some(end) => end,
+                None => return line_end(text, at),
             },
             b'/' if text[at..].starts_with(b"/*") => skip_comment(text, at),
             b'\n' | b'\r' if fault_between(faults, start, at) && next_statement(text, at) => return at,

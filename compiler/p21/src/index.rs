@@ -71,6 +71,8 @@ pub(crate) fn skip_blank(text: &[u8], mut at: usize) -> usize {
                 Some(n) => at += n + 4,
                 None => return text.len(),
             },
+            // Print control: a new line, a new page.
+            b'\\' if matches!(text.get(at + 1..at + 3), Some(b"N\\" | b"F\\")) => at += 3,
             _ => break,
         }
     }
@@ -79,16 +81,28 @@ pub(crate) fn skip_blank(text: &[u8], mut at: usize) -> usize {
 
 /// One past the `;` that ends the statement around `at`.
 fn statement_end(text: &[u8], mut at: usize) -> usize {
+    // A doubled apostrophe is passed as the end of one string and the start of another: where the whole began.
+    let (mut string, mut closed) = (0, usize::MAX);
     loop {
         let Some(n) = memchr::memchr3(b';', b'\'', b'/', &text[at..]) else { return text.len() };
         at += n;
         match text[at] {
             b';' => return at + 1,
             b'\'' => match memchr(b'\'', &text[at + 1..]) {
-                // A string that swallows the start of another statement was never closed.
-                Some(m) if m < 5 || !swallows(&text[at + 1..at + 1 + m]) => at += m + 2,
+                Some(m) if m < 5 || first_statement(&text[at + 1..at + 1 + m]).is_none() => {
+                    if at != closed {
+                        string = at;
+                    }
+                    at += m + 2;
+                    closed = at;
+                }
                 _ => {
-                    at += 1;
+                    string = if at == closed { string } else { at };
+                    if let Some(end) = string_end(text, string) {
+                        at = end;
+                        continue;
+                    }
+                    at = string + 1;
                     match memchr2(b'\n', b'\r', &text[at..]) {
                         Some(m) => return at + m + 1,
                         None => return text.len(),
@@ -104,9 +118,16 @@ fn statement_end(text: &[u8], mut at: usize) -> usize {
     }
 }
 
-/// Whether the inside of a string holds `;` and then `#id=`: the start of another statement.
-pub(crate) fn swallows(inside: &[u8]) -> bool {
-    first_statement(inside).is_some()
+/// One past a string that opens at `start`. One that holds the start of another statement, and behind which no
+/// value may end, was never closed.
+pub(crate) fn string_end(text: &[u8], start: usize) -> Option<usize> {
+    let end = crate::lex::string(text, start)?;
+    (first_statement(&text[start + 1..end]).is_none() || ends_value(text, end)).then_some(end)
+}
+
+/// Whether what follows ends a value.
+pub(crate) fn ends_value(text: &[u8], at: usize) -> bool {
+    matches!(text.get(skip_blank(text, at)), None | Some(b',' | b')'))
 }
 
 /// Byte of the first `#id=` that follows a `;` or a line end in `inside`.
@@ -139,6 +160,13 @@ mod tests {
         assert_eq!(found[1].0, 2);
         assert_eq!(found[2].0, 99_999_999_999);
         assert_eq!(found.len(), 3);
+    }
+
+    #[test]
+    fn a_statement_in_a_string_is_none() {
+        let text = b"#1=A('a; #9=X(); b','it''s; #8=Y()','a '';\n#7=Z(); ''');\n#2=B();\n";
+        let ids: Vec<u64> = index(text).entries.iter().map(|e| e.id).collect();
+        assert_eq!(ids, [1, 2]);
     }
 
     #[test]

@@ -12,6 +12,7 @@
 //! Meaning (entities, types, units) is not here.
 
 mod format;
+mod header;
 mod index;
 mod lex;
 mod model;
@@ -19,6 +20,7 @@ mod parse;
 mod text;
 
 pub use format::{format, renumber};
+pub use header::check_header;
 pub use index::{Entry, Index, index};
 pub use model::{Exchange, Fault, Instance, Kind, Section, Value, members};
 pub use parse::{check_syntax, parse};

@@ -88,6 +88,26 @@ pub enum Kind {
     Bad,
 }
 
+impl Kind {
+    /// With its article, for messages.
+    pub fn describe(self) -> &'static str {
+        match self {
+            Kind::Unset => "`$`",
+            Kind::Derived => "`*`",
+            Kind::Integer => "an integer",
+            Kind::Real => "a real number",
+            Kind::String => "a string",
+            Kind::Enumeration => "an enumeration value",
+            Kind::Binary => "a binary value",
+            Kind::Reference => "a reference",
+            Kind::Resource => "a resource",
+            Kind::List => "a list",
+            Kind::Typed => "a typed value",
+            Kind::Bad => "nothing readable",
+        }
+    }
+}
+
 const KINDS: [Kind; 12] = [
     Kind::Unset,
     Kind::Derived,

@@ -4,7 +4,7 @@ use gr_spec::{Code, code};
 use gr_text::Span;
 use rustc_hash::FxHashMap;
 
-use crate::index::{first_statement, skip_blank};
+use crate::index::{ends_value, first_statement, skip_blank};
 use crate::lex::{self, DIGIT, LOWER, UPPER, is, peek, run};
 use crate::model::{Exchange, Fault, Ids, Instance, Kind, Section, Value};
 
@@ -71,6 +71,37 @@ struct Parser<'t, const KEEP: bool> {
     section: Option<usize>,
     /// Something was met that only exchange files have.
     exchange: bool,
+    stage: Stage,
+    /// It begins with `ISO-10303-21;`.
+    magic: bool,
+    /// Its HEADER was met, or its lack told.
+    headed: bool,
+    /// Instances may stand here.
+    instances: bool,
+    /// Statements outside of sections have had their message.
+    loose: bool,
+    /// A message says already that the end is missing.
+    cut: bool,
+    doubt: Option<Doubt>,
+}
+
+/// How far a file has come.
+#[derive(Clone, Copy, PartialEq)]
+enum Stage {
+    /// Nothing is read.
+    Start,
+    Inside,
+    /// `END-ISO-10303-21;` is read.
+    Ended,
+}
+
+/// The first string of a statement that runs over a line's end and the start of another statement: it may lack
+/// its apostrophe and have taken another's. What was there before it.
+struct Doubt {
+    start: usize,
+    values: usize,
+    faults: usize,
+    spoiled: bool,
 }
 
 /// The statement can't be read on.
@@ -90,6 +121,13 @@ impl<'t, const KEEP: bool> Parser<'t, KEEP> {
         spoiled: false,
         section: None,
         exchange: false,
+        stage: Stage::Start,
+        magic: false,
+        headed: false,
+        instances: false,
+        loose: false,
+        cut: false,
+        doubt: None,
         }
     }
 
@@ -149,7 +187,7 @@ impl<'t, const KEEP: bool> Parser<'t, KEEP> {
     }
 
     fn blank(&mut self) {
-        if self.at < self.text.len() && (self.text[self.at] <= b' ' || self.text[self.at] == b'/') {
+        if self.at < self.text.len() && (self.text[self.at] <= b' ' || matches!(self.text[self.at], b'/' | b'\\')) {
             self.blank_slow();
         }
     }
@@ -158,6 +196,7 @@ impl<'t, const KEEP: bool> Parser<'t, KEEP> {
     #[inline(never)]
     fn unclosed_comment(&mut self, at: usize) {
         self.fault(code::P21_UNTERMINATED_COMMENT, at, at + 2, vec![]);
+        self.cut = true;
     }
 
     fn blank_slow(&mut self) {
@@ -188,6 +227,7 @@ impl<'t, const KEEP: bool> Parser<'t, KEEP> {
         let at = self.at;
         if at >= self.text.len() {
             self.fault(code::P21_ENDS_EARLY, at, at, vec![expected.into()]);
+            self.cut = true;
         } else {
             let end = self.shown_end(at);
             let found = String::from_utf8_lossy(&self.text[at..end]).into_owned();
@@ -196,13 +236,95 @@ impl<'t, const KEEP: bool> Parser<'t, KEEP> {
         Lost
     }
 
+    /// Points also at where the open section begins.
+    #[cold]
+    fn point_at_section(&mut self) {
+        let Some(open) = self.section else { return };
+        let start = self.out.sections[open].span.start;
+        let end = start + self.out.sections[open].name.len() as u32;
+        if let Some(f) = self.out.faults.last_mut() {
+            f.related = Some((Span::new(start, end), "this section is still open"));
+        }
+    }
+
+    fn section_name(&self) -> Option<&'static str> {
+        self.section.map(|s| self.out.sections[s].name)
+    }
+
+    /// Whether `what` stands at `at`, ignored bytes left out.
+    fn reads(&self, mut at: usize, what: &[u8]) -> bool {
+        what.iter().all(|w| {
+            let (b, p) = peek(self.text, at);
+            at = p + 1;
+            b == *w
+        })
+    }
+
+    /// The first and the last statement of a file.
+    #[cold]
+    #[inline(never)]
+    fn border(&mut self) {
+        match self.stage {
+            Stage::Start => {
+                self.stage = Stage::Inside;
+                self.magic = self.reads(self.at, b"ISO-10303-21");
+                if !self.magic {
+                    self.unexpected("`ISO-10303-21;`");
+                    self.loose = true;
+                    self.instances = true;
+                }
+            }
+            Stage::Ended if self.section.is_none() && !self.reads(self.at, b"SIGNATURE") => {
+                // It belongs to no file: nothing of it is read.
+                self.unexpected("the end of the file");
+                self.at = self.text.len();
+                self.cut = true;
+            }
+            _ => {}
+        }
+    }
+
+    /// An instance where none may stand: told once.
+    #[cold]
+    #[inline(never)]
+    fn misplaced(&mut self) {
+        self.instances = true;
+        match self.section_name() {
+            Some(_) => drop(self.unexpected("a header entity, or `ENDSEC;`")),
+            None => {
+                self.unexpected("`DATA;`");
+                self.loose = true;
+            }
+        }
+    }
+
+    /// What the end of the text leaves open.
+    #[cold]
+    #[inline(never)]
+    fn ending(&mut self) {
+        if self.cut {
+            return;
+        }
+        if self.section.is_some() {
+            self.unexpected("`ENDSEC;`");
+            self.point_at_section();
+        } else if self.magic && self.stage == Stage::Inside {
+            self.unexpected("`END-ISO-10303-21;`");
+        }
+    }
+
     /// How much of what stands at `at` a message shows.
     fn shown_end(&self, at: usize) -> usize {
         let b = self.text[at];
-        if is(b, DIGIT | UPPER | LOWER) {
-            return run(self.text, at, DIGIT | UPPER | LOWER);
-        }
+        let class = match b {
+            b'#' => DIGIT,
+            _ if is(b, DIGIT | UPPER | LOWER) => DIGIT | UPPER | LOWER,
+            _ => 0,
+        };
         let mut end = at + 1;
+        while class > 0 && end < self.text.len() && is(self.text[end], class) {
+            end += 1;
+        }
         while end < self.text.len() && self.text[end] & 0xC0 == 0x80 {
             end += 1;
         }
@@ -210,18 +332,34 @@ impl<'t, const KEEP: bool> Parser<'t, KEEP> {
     }
 
     fn file(&mut self) {
+        if self.text.starts_with(b"\xEF\xBB\xBF") {
+            self.at = 3;
+        }
         loop {
             self.spoiled = false;
+            self.doubt = None;
             self.blank();
             if self.at >= self.text.len() {
-                return;
+                return self.ending();
             }
             let from = self.at;
+            if self.stage != Stage::Inside {
+                self.border();
+                if self.at >= self.text.len() {
+                    return;
+                }
+            }
             let lost = match self.byte() {
-                b'#' => self.instance().is_err(),
+                b'#' => {
+                    if !self.instances {
+                        self.misplaced();
+                    }
+                    self.instance().is_err()
+                }
                 b'@' | b'<' => self.anchor().is_err(),
                 b if is(b, UPPER | LOWER) || b == b'!' => self.word().is_err(),
                 b';' => {
+                    self.unexpected("a statement: the last one has its `;`");
                     self.at += 1;
                     false
                 }
@@ -232,6 +370,7 @@ impl<'t, const KEEP: bool> Parser<'t, KEEP> {
             };
             if lost {
                 self.recover(from);
+                self.cut |= self.at >= self.text.len();
             }
         }
     }
@@ -262,7 +401,8 @@ impl<'t, const KEEP: bool> Parser<'t, KEEP> {
             }
             b if is(b, UPPER | LOWER) => {
                 let word = &self.text[at..run(self.text, at, UPPER | LOWER | DIGIT)];
-                matches!(word, b"ENDSEC" | b"DATA" | b"HEADER" | b"END") || after_semicolon
+                // Among instances any other word is a part of the damaged statement.
+                matches!(word, b"ENDSEC" | b"DATA" | b"HEADER" | b"END") || after_semicolon && self.section_name() != Some("DATA")
             }
             b'@' | b'<' => after_semicolon,
             _ => false,
@@ -343,11 +483,14 @@ impl<'t, const KEEP: bool> Parser<'t, KEEP> {
         self.blank();
         if id <= self.last_id {
             self.sorted = false;
+            if id == 0 {
+                self.fault(code::P21_UNEXPECTED, start, end, vec!["#0".into(), "a number above 0".into()]);
+            }
         }
         self.last_id = id;
         self.exchange |= is(self.byte(), UPPER | LOWER) || matches!(self.byte(), b'(' | b'!');
         let n = self.begin(id, start);
-        let body = self.body(n);
+        let body = self.body(n).map_err(|lost| self.reopen(lost));
         self.end(n, body.is_err());
         body
     }
@@ -406,7 +549,7 @@ impl<'t, const KEEP: bool> Parser<'t, KEEP> {
                     self.at += 1;
                     break;
                 }
-                let (s, e) = self.name("a keyword of this complex instance, or `)`")?;
+                let (s, e) = self.name(if first { "a keyword" } else { "a keyword of this complex instance, or `)`" })?;
                 let k = self.keyword(s, e);
                 if first {
                     if KEEP {
@@ -463,6 +606,10 @@ impl<'t, const KEEP: bool> Parser<'t, KEEP> {
         end
     }
 
+    fn starts_header_entity(&self) -> bool {
+        self.section_name() == Some("HEADER") && is(self.byte(), UPPER) && self.text.get(skip_blank(self.text, run(self.text, self.at, UPPER))) == Some(&b'(')
+    }
+
     fn semicolon(&mut self) -> Result<(), Lost> {
         let after = self.at;
         self.blank();
@@ -474,9 +621,13 @@ impl<'t, const KEEP: bool> Parser<'t, KEEP> {
             b':' => {
                 self.fault(code::P21_MISSING_SEMICOLON, self.at, self.at + 1, vec!["`:` stands in its place".into()]);
                 self.at += 1;
+                self.blank();
+                if self.byte() == b';' {
+                    self.at += 1;
+                }
                 Ok(())
             }
-            _ if self.at < self.text.len() && self.starts_statement(self.at, false) => {
+            _ if self.at < self.text.len() && (self.starts_statement(self.at, false) || self.starts_header_entity()) => {
                 self.fault(code::P21_MISSING_SEMICOLON, after, after, vec!["the next statement begins".into()]);
                 Ok(())
             }
@@ -532,10 +683,10 @@ impl<'t, const KEEP: bool> Parser<'t, KEEP> {
                     let digits = peek(self.text, start + 1).1;
                     let end = run(self.text, digits, DIGIT);
                     if end == digits {
-                        self.at = digits;
-                        return Err(self.unexpected("the number of an instance"));
+                        self.constant(start)?;
+                    } else {
+                        self.push(Kind::Reference, start, end);
                     }
-                    self.push(Kind::Reference, start, end);
                 }
                 b'0'..=b'9' | b'+' | b'-' => match lex::number(self.text, start) {
                     Some((real, end)) if !self.text.get(end).is_some_and(|b| is(*b, UPPER | LOWER | DIGIT) || *b == b'.') => {
@@ -563,13 +714,17 @@ impl<'t, const KEEP: bool> Parser<'t, KEEP> {
                     self.push(Kind::Bad, start, start);
                 }
                 b if is(b, UPPER | LOWER) || b == b'!' => {
-                    let (s, e) = self.name("a value")?;
-                    self.blank();
-                    if self.byte() != b'(' {
-                        let word = String::from_utf8_lossy(&self.text[s..e]).into_owned();
-                        self.fault(code::P21_BARE_WORD, s, e, vec![word]);
-                        self.push(Kind::Bad, s, e);
+                    let word = run(self.text, start + 1, UPPER | LOWER | DIGIT);
+                    if self.text.get(skip_blank(self.text, word)) != Some(&b'(') {
+                        let written = String::from_utf8_lossy(&self.text[start..word]).into_owned();
+                        self.fault(code::P21_BARE_WORD, start, word, vec![written]);
+                        self.push(Kind::Bad, start, word);
                     } else {
+                        let (s, _) = self.name("a value")?;
+                        self.blank();
+                        if self.byte() != b'(' {
+                            return Err(self.unexpected("`(`"));
+                        }
                         self.open_list(Kind::Typed, s)?;
                         self.at += 1;
                         self.blank();
@@ -641,7 +796,7 @@ impl<'t, const KEEP: bool> Parser<'t, KEEP> {
     #[inline(always)]
     fn string(&mut self, start: usize) -> Result<(), Lost> {
         match lex::string(self.text, start) {
-            Some(end) if end - start < 7 || first_statement(&self.text[start + 1..end]).is_none() => {
+            Some(end) if end - start < 7 || first_statement(&self.text[start + 1..end]).is_none() || self.closes(start, end) => {
                 if let Err((at, what)) = crate::text::check(&self.text[start + 1..end - 1]) {
                     let from = start + 1 + at;
                     self.fault(code::P21_BAD_ESCAPE, from, (from + 1).min(end), vec![what.into()]);
@@ -655,6 +810,50 @@ impl<'t, const KEEP: bool> Parser<'t, KEEP> {
                 Err(Lost)
             }
         }
+    }
+
+    /// A string that holds the start of a statement is kept where a value may end behind it.
+    #[cold]
+    #[inline(never)]
+    fn closes(&mut self, start: usize, end: usize) -> bool {
+        if !ends_value(self.text, end) {
+            return false;
+        }
+        let lines = memchr::memchr2(b'\n', b'\r', &self.text[start..end]).is_some();
+        if lines && self.doubt.is_none() {
+            let (values, faults) = (self.out.values.len(), self.out.faults.len());
+            self.doubt = Some(Doubt { start, values, faults, spoiled: self.spoiled });
+        }
+        true
+    }
+
+    /// A statement that makes no sense with such a string closed: the string never was.
+    #[cold]
+    #[inline(never)]
+    fn reopen(&mut self, lost: Lost) -> Lost {
+        if let Some(d) = self.doubt.take() {
+            self.out.faults.truncate(d.faults);
+            self.out.values.truncate(d.values);
+            self.open.retain(|open| (*open as usize) < d.values);
+            self.spoiled = d.spoiled;
+            self.fault(code::P21_UNTERMINATED_STRING, d.start, d.start + 1, vec![]);
+            self.at = d.start + 1;
+        }
+        lost
+    }
+
+    /// `#NAME`: a constant of the schema, edition 3.
+    #[cold]
+    #[inline(never)]
+    fn constant(&mut self, start: usize) -> Result<(), Lost> {
+        let name = peek(self.text, start + 1).1;
+        if name < self.text.len() && is(self.text[name], UPPER) {
+            let end = run(self.text, name, UPPER | DIGIT);
+            self.push(Kind::Resource, start, end);
+            return Ok(());
+        }
+        self.at = name;
+        Err(self.unexpected("the number of an instance"))
     }
 
     #[inline(always)]
@@ -702,6 +901,13 @@ impl<'t, const KEEP: bool> Parser<'t, KEEP> {
         if self.text.get(at) == Some(&b'"') {
             self.fault(code::P21_BAD_BINARY, start, at + 1, vec![]);
             self.push(Kind::Bad, start, at + 1);
+            return Ok(());
+        }
+        let word = |b: &u8| b.is_ascii_alphanumeric() || matches!(b, b' ' | b'_' | b'-' | b'.');
+        let inside = self.text[start + 1..].iter().take_while(|b| word(b)).count();
+        if inside > 0 && self.text.get(start + 1 + inside) == Some(&b'"') {
+            self.fault(code::P21_BAD_BINARY, start, start + inside + 2, vec![]);
+            self.push(Kind::Bad, start, start + inside + 2);
             return Ok(());
         }
         // Two apostrophes read as one quotation mark, as scanned listings have it.
@@ -766,11 +972,36 @@ impl<'t, const KEEP: bool> Parser<'t, KEEP> {
             section.span.end = end as u32;
             section.instances.end = count;
         }
+        self.instances = self.loose;
+    }
+
+    /// A section keyword or `ENDSEC` in small letters.
+    fn capitals(&mut self, start: usize, end: usize) {
+        if self.text[start..end].iter().any(|b| is(*b, LOWER)) {
+            let word = String::from_utf8_lossy(&self.text[start..end]).into_owned();
+            self.fault(code::P21_LOWER_CASE, start, end, vec![word.clone(), word.to_ascii_uppercase()]);
+        }
+    }
+
+    /// Where a section or the file ends and another section is still open.
+    fn still_open(&mut self, start: usize, end: usize) {
+        let Some(what) = self.section_name() else { return };
+        self.fault(code::P21_MISSING_ENDSEC, start, end, vec![what.into()]);
+        self.point_at_section();
+        self.close_section(start);
+    }
+
+    /// One past a word outside of instances. A line's end is not part of it where the line is a section's keyword
+    /// that lacks its semicolon.
+    fn word_end(&self, start: usize) -> usize {
+        let line = start + self.text[start..].iter().position(|b| !is(*b, UPPER | LOWER | DIGIT)).unwrap_or(self.text.len() - start);
+        let known = matches!(&self.text[start..line], b"HEADER" | b"DATA" | b"ANCHOR" | b"REFERENCE" | b"SIGNATURE" | b"ENDSEC");
+        if known { line } else { run(self.text, start, UPPER | LOWER | DIGIT) }
     }
 
     fn word(&mut self) -> Result<(), Lost> {
         let start = self.at;
-        let end = run(self.text, start, UPPER | LOWER | DIGIT);
+        let end = self.word_end(start);
         let clean: Vec<u8> = self.text[start..end].iter().filter(|b| **b >= 0x20).map(u8::to_ascii_uppercase).collect();
         let name = match &clean[..] {
             b"HEADER" => "HEADER",
@@ -781,14 +1012,23 @@ impl<'t, const KEEP: bool> Parser<'t, KEEP> {
             b"ISO" | b"END" => {
                 let end = memchr::memchr(b';', &self.text[start..]).map_or(self.text.len(), |n| start + n).min(start + 64);
                 let line: Vec<u8> = self.text[start..end].iter().copied().filter(|b| *b > 0x20).collect();
-                if line.starts_with(b"ISO-10303-21") || line.starts_with(b"END-ISO-10303-21") {
+                let last = line.starts_with(b"END-ISO-10303-21");
+                if last || line.starts_with(b"ISO-10303-21") {
                     self.exchange = true;
+                    if last && self.stage == Stage::Inside {
+                        self.still_open(start, end);
+                        self.stage = Stage::Ended;
+                    }
                     self.at = start + self.text[start..end].iter().rposition(|b| *b == b'1').map_or(0, |n| n + 1);
                     return self.semicolon();
                 }
                 ""
             }
             b"ENDSEC" => {
+                if self.section.is_none() && !self.loose {
+                    self.unexpected("a section keyword or `END-ISO-10303-21;`");
+                }
+                self.capitals(start, end);
                 self.at = end;
                 let result = self.semicolon();
                 self.close_section(self.at);
@@ -797,32 +1037,35 @@ impl<'t, const KEEP: bool> Parser<'t, KEEP> {
             _ => "",
         };
         let (next, _) = peek(self.text, skip_blank(self.text, end));
-        if name.is_empty() || (name == "DATA" && next != b';' && next != b'(' && next != b':') {
+        if name.is_empty() || (name == "DATA" && !matches!(next, b';' | b'(' | b':' | b'#')) {
             return self.header_entity();
         }
-        if let Some(open) = self.section {
-            let opened = self.out.sections[open].span.start as usize;
-            let what = self.out.sections[open].name;
-            self.fault(code::P21_MISSING_ENDSEC, start, end, vec![what.into()]);
-            if let Some(f) = self.out.faults.last_mut() {
-                f.related = Some((Span::new(opened as u32, (opened + what.len()) as u32), "this section is still open"));
-            }
-            self.close_section(start);
+        if self.section.is_some() {
+            self.still_open(start, end);
             self.spoiled = false;
         }
+        if name != "HEADER" && name != "SIGNATURE" && !self.headed && self.magic {
+            self.unexpected("`HEADER;`");
+        }
+        if name == "HEADER" && self.headed && self.magic {
+            self.unexpected("`DATA;`: the file has a HEADER");
+        }
+        self.capitals(start, end);
+        self.headed = true;
+        self.instances = name != "HEADER";
         self.exchange = true;
         self.section = Some(self.out.sections.len());
         let count = self.out.instances.len() as u32;
         self.out.sections.push(Section { name, span: Span::new(start as u32, start as u32), instances: count..count });
         self.at = end;
-        self.blank();
-        if self.byte() == b'(' {
+        if next == b'(' {
+            self.blank();
             self.at += 1;
             let n = self.begin(0, start);
             if KEEP {
                 self.out.instances[n].keyword = self.keyword(start, end);
             }
-            let result = self.list();
+            let result = self.list().map_err(|lost| self.reopen(lost));
             self.end(n, result.is_err());
             result?;
         }
@@ -844,6 +1087,16 @@ impl<'t, const KEEP: bool> Parser<'t, KEEP> {
         if peek(self.text, skip_blank(self.text, word)).0 != b'(' {
             return Err(self.unexpected("an instance (#n=…;) or a section keyword"));
         }
+        match self.section_name() {
+            Some("HEADER") => {}
+            Some(_) => return Err(self.unexpected("an instance (#n=…;) or `ENDSEC;`")),
+            None if self.loose => {}
+            None if self.headed => return Err(self.unexpected("a section keyword or `END-ISO-10303-21;`")),
+            None => {
+                self.unexpected("`HEADER;`");
+                (self.headed, self.loose) = (true, true);
+            }
+        }
         let (s, e) = self.name("a section keyword or a header entity")?;
         self.blank();
         if self.byte() != b'(' {
@@ -855,7 +1108,7 @@ impl<'t, const KEEP: bool> Parser<'t, KEEP> {
             self.out.instances[n].keyword = self.keyword(s, e);
         }
         let body = self.list();
-        let body = body.and_then(|()| self.semicolon());
+        let body = body.and_then(|()| self.semicolon()).map_err(|lost| self.reopen(lost));
         self.end(n, body.is_err());
         body
     }

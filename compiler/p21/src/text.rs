@@ -119,6 +119,8 @@ fn escape(s: &[u8]) -> Result<(usize, String), &'static str> {
     let hex = |b: &[u8]| std::str::from_utf8(b).ok().and_then(|h| u32::from_str_radix(h, 16).ok());
     match s.get(1) {
         Some(b'\\') => Ok((2, "\\".into())),
+        // Print control says nothing.
+        Some(b'N' | b'F') if s.get(2) == Some(&b'\\') => Ok((3, String::new())),
         Some(b'S') if s.get(2) == Some(&b'\\') => match s.get(3) {
             Some(b) if (0x20..0x7F).contains(b) => Ok((4, char::from(b + 128).to_string())),
             _ => Err("\\S\\ is followed by one printable character"),

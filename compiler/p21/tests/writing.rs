@@ -46,11 +46,11 @@ fn statements_with_faults_stay_as_they_are() {
 
 #[test]
 fn numbers_in_order() {
-    let text = b"ANCHOR;\n<a>=#70;\nENDSEC;\nDATA;\n#70=A(#5,'#5',(#9)); /* #5 */\n#5=B(\"0F\");#9=C(#70,<x#5>);\nENDSEC;\n";
+    let text = b"ISO-10303-21;\nHEADER;\nENDSEC;\nANCHOR;\n<a>=#70;\nENDSEC;\nDATA;\n#70=A(#5,'#5',(#9)); /* #5 */\n#5=B(\"0F\");#9=C(#70,<x#5>);\nENDSEC;\nEND-ISO-10303-21;\n";
     let new = renumber(text).expect("no faults");
     assert_eq!(
         String::from_utf8_lossy(&new),
-        "ANCHOR;\n<a>=#1;\nENDSEC;\nDATA;\n#1=A(#2,'#5',(#3)); /* #5 */\n#2=B(\"0F\");#3=C(#1,<x#5>);\nENDSEC;\n"
+        "ISO-10303-21;\nHEADER;\nENDSEC;\nANCHOR;\n<a>=#1;\nENDSEC;\nDATA;\n#1=A(#2,'#5',(#3)); /* #5 */\n#2=B(\"0F\");#3=C(#1,<x#5>);\nENDSEC;\nEND-ISO-10303-21;\n"
     );
     assert!(renumber(b"DATA;\n#1=A(#2);\nENDSEC;\n").is_err());
     assert!(renumber(b"DATA;\n#1=A();\n#1=B();\nENDSEC;\n").is_err());

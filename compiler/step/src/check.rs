@@ -5,7 +5,53 @@ use gr_spec::{Code, code};
 use gr_text::Span;
 
 use crate::model::{Known, keyword_span, resolve, typed_keyword, value_span};
-use crate::schema::{Entity, Schema, Type, schema};
+use crate::schema::{Attribute, Entity, Schema, Type, schema};
+
+/// How the table writes an attribute that a subtype derives.
+const DERIVED: &str = "*derived*";
+
+/// What complex instances of exporters are made of (ISO 10303-41, -43) though ISO 14649 has no use for it, with the
+/// attributes of its own.
+static OTHER_PARTS: &[(&str, &[&str])] = &[
+    ("NAMED_UNIT", &["dimensions"]),
+    ("SI_UNIT", &["prefix", "name"]),
+    ("CONVERSION_BASED_UNIT", &["name", "conversion_factor"]),
+    ("CONTEXT_DEPENDENT_UNIT", &["name"]),
+    ("LENGTH_UNIT", &[]),
+    ("PLANE_ANGLE_UNIT", &[]),
+    ("SOLID_ANGLE_UNIT", &[]),
+    ("MASS_UNIT", &[]),
+    ("TIME_UNIT", &[]),
+    ("AREA_UNIT", &[]),
+    ("VOLUME_UNIT", &[]),
+    ("RATIO_UNIT", &[]),
+    ("THERMODYNAMIC_TEMPERATURE_UNIT", &[]),
+    ("GLOBAL_UNIT_ASSIGNED_CONTEXT", &["units"]),
+    ("GLOBAL_UNCERTAINTY_ASSIGNED_CONTEXT", &["uncertainty"]),
+    ("PARAMETRIC_REPRESENTATION_CONTEXT", &[]),
+    ("MEASURE_WITH_UNIT", &["value_component", "unit_component"]),
+    ("LENGTH_MEASURE_WITH_UNIT", &[]),
+    ("PLANE_ANGLE_MEASURE_WITH_UNIT", &[]),
+    ("UNCERTAINTY_MEASURE_WITH_UNIT", &["name", "description"]),
+    ("MEASURE_REPRESENTATION_ITEM", &[]),
+    ("REPRESENTATION_RELATIONSHIP", &["name", "description", "rep_1", "rep_2"]),
+    ("REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION", &["transformation_operator"]),
+    ("SHAPE_REPRESENTATION_RELATIONSHIP", &[]),
+];
+
+/// Kinds of which an instance may be several subtypes at once.
+static COMBINED: &[&str] = &["b_spline_curve", "b_spline_surface", "representation_context", "address"];
+
+/// One part of a complex instance.
+struct Part<'v> {
+    keyword: String,
+    /// Its keyword.
+    span: Span,
+    values: &'v [Value],
+    rows: Vec<u16>,
+    /// Attributes of a part that is not ISO 14649's.
+    other: Option<&'static [&'static str]>,
+}
 
 /// Checks every instance. Instances that Part 21 already calls damaged are left alone.
 pub fn check(text: &[u8], file: &Exchange) -> Vec<Fault> {
@@ -14,9 +60,10 @@ pub fn check(text: &[u8], file: &Exchange) -> Vec<Fault> {
     check.known = file.keywords.iter().map(|k| resolve(schema, k)).collect();
     for n in 0..file.instances.len() as u32 {
         let i = &file.instances[n as usize];
-        if !i.damaged && !i.complex && text.get(i.start as usize) == Some(&b'#') {
-            check.instance(n);
+        if i.damaged || text.get(i.start as usize) != Some(&b'#') {
+            continue;
         }
+        if i.complex { check.complex(n) } else { check.instance(n) }
     }
     check.faults
 }
@@ -78,10 +125,126 @@ impl Check<'_> {
                     let span = self.span(value[0]);
                     self.fault(code::STEP_MISSING_VALUE, span, vec![entity.keyword.into(), attribute.name.into(), attribute.written.into()]);
                 }
-            } else if kind != Kind::Derived && kind != Kind::Bad {
+            } else if kind == Kind::Derived || attribute.written == DERIVED {
+                self.derived(entity, attribute, value[0]);
+            } else if kind != Kind::Bad {
                 self.value(entity, attribute.name, attribute.written, &attribute.ty, value);
             }
         }
+    }
+
+    /// `*` where a value has to be written, or a value where `*` has to be.
+    #[cold]
+    fn derived(&mut self, entity: &Entity, attribute: &Attribute, v: Value) {
+        let takes = match (attribute.written == DERIVED, v.kind()) {
+            (true, Kind::Derived | Kind::Bad) => return,
+            (true, _) => "`*`, since it is derived",
+            (false, _) => attribute.written,
+        };
+        let args = vec![entity.keyword.into(), attribute.name.into(), takes.into(), v.kind().describe().into()];
+        let span = self.span(v);
+        self.fault(code::STEP_WRONG_TYPE, span, args);
+    }
+
+    /// `(A(…)B(…))`: known parts that go together, each with its own attributes. One message.
+    #[cold]
+    fn complex(&mut self, n: u32) {
+        let parts: Vec<Part<'_>> = gr_p21::members(self.file.values_of(n)).map(|v| self.part(v)).collect();
+        for p in &parts {
+            let unknown = p.rows.is_empty() && p.other.is_none() && !p.keyword.starts_with('!');
+            if unknown {
+                let hint = self.schema.suggest(&p.keyword).map_or(String::new(), |s| format!("; did you mean {s}?"));
+                self.fault(code::STEP_UNKNOWN_ENTITY, p.span, vec![p.keyword.clone(), hint]);
+                return;
+            }
+        }
+        if let Some((span, why)) = self.apart(&parts) {
+            self.fault(code::STEP_COMPLEX_PARTS, span, vec![why]);
+            return;
+        }
+        let before = self.faults.len();
+        for p in &parts {
+            self.own(p);
+            if self.faults.len() > before {
+                return;
+            }
+        }
+    }
+
+    fn part<'v>(&self, values: &'v [Value]) -> Part<'v> {
+        let keyword = typed_keyword(self.text, values[0]);
+        let rows = resolve(self.schema, &keyword).rows;
+        let other = OTHER_PARTS.iter().find(|(k, _)| *k == keyword).map(|(_, own)| *own);
+        Part { span: self.span(values[0]), values: &values[1..], keyword, rows, other }
+    }
+
+    /// Why parts don't go together, and the part that shows it.
+    fn apart(&self, parts: &[Part<'_>]) -> Option<(Span, String)> {
+        for (k, p) in parts.iter().enumerate() {
+            if parts[..k].iter().any(|q| q.keyword == p.keyword) {
+                return Some((p.span, format!("{} is written twice", p.keyword)));
+            }
+        }
+        let is_a = |p: &Part<'_>, kind: &str| self.schema.is_a(&p.keyword, kind);
+        let leaf = |p: &&Part<'_>| !p.rows.is_empty() && !parts.iter().any(|q| q.keyword != p.keyword && is_a(q, &p.keyword));
+        let leaves: Vec<&Part<'_>> = parts.iter().filter(leaf).collect();
+        for pair in leaves.windows(2) {
+            let joined = COMBINED.iter().any(|kind| is_a(pair[0], kind) && is_a(pair[1], kind));
+            if !joined {
+                return Some((pair[1].span, format!("nothing is both {} and {}", pair[0].keyword, pair[1].keyword)));
+            }
+        }
+        for p in parts {
+            let Some(row) = p.rows.first() else { continue };
+            let supertypes = &self.schema.entities[*row as usize].supertypes;
+            if let Some(up) = supertypes.iter().find(|up| !parts.iter().any(|q| q.keyword.eq_ignore_ascii_case(up))) {
+                return Some((p.span, format!("{} is there without {}", p.keyword, up.to_ascii_uppercase())));
+            }
+        }
+        None
+    }
+
+    /// A part has only the attributes that its supertypes don't have.
+    fn own(&mut self, p: &Part<'_>) {
+        let count = gr_p21::members(p.values).count();
+        let schema = self.schema;
+        let Some(entity) = p.rows.first().map(|r| &schema.entities[*r as usize]) else {
+            self.own_count(p, &p.keyword, p.other.unwrap_or(&[]), count);
+            return;
+        };
+        let inherited: Vec<&str> = (entity.supertypes.iter())
+            .filter_map(|up| schema.find(&up.to_ascii_uppercase()).first())
+            .flat_map(|up| schema.entity(*up).attributes.iter().map(|a| a.name))
+            .collect();
+        let own: Vec<&Attribute> = entity.attributes.iter().filter(|a| !inherited.contains(&a.name)).collect();
+        let names: Vec<&str> = own.iter().map(|a| a.name).collect();
+        if self.own_count(p, entity.keyword, &names, count) {
+            return;
+        }
+        for (attribute, value) in own.into_iter().zip(gr_p21::members(p.values)) {
+            match value[0].kind() {
+                // Another part may derive it.
+                Kind::Derived | Kind::Bad => {}
+                Kind::Unset if attribute.optional => {}
+                Kind::Unset => {
+                    let span = self.span(value[0]);
+                    self.fault(code::STEP_MISSING_VALUE, span, vec![entity.keyword.into(), attribute.name.into(), attribute.written.into()]);
+                }
+                _ => self.value(entity, attribute.name, attribute.written, &attribute.ty, value),
+            }
+        }
+    }
+
+    /// Tells when a part has not as many values as attributes of its own.
+    fn own_count(&mut self, p: &Part<'_>, keyword: &str, names: &[&str], count: usize) -> bool {
+        // User-defined parts are their user's.
+        if names.len() == count || p.keyword.starts_with('!') {
+            return false;
+        }
+        let listed = if names.is_empty() { "none of its own".to_string() } else { names.join(", ") };
+        let args = vec![format!("{keyword} as a part"), names.len().to_string(), count.to_string(), listed];
+        self.fault(code::STEP_ATTRIBUTE_COUNT, p.span, args);
+        true
     }
 
     /// Whether the tools are those of the first edition: a tool has a body.
@@ -164,6 +327,7 @@ impl Check<'_> {
             },
             Type::Aggregate { low, high, of, .. } => {
                 if v.kind() == Kind::List {
+                    let before = self.faults.len();
                     let mut count = 0;
                     for member in gr_p21::members(&value[1..]) {
                         count += 1;
@@ -171,7 +335,7 @@ impl Check<'_> {
                             self.value(entity, name, written, of, member);
                         }
                     }
-                    if count < *low || count > *high {
+                    if (count < *low || count > *high) && self.faults.len() == before {
                         let span = self.span(v);
                         self.fault(code::STEP_LIST_SIZE, span, vec![entity.keyword.into(), name.into(), written.into(), count.to_string()]);
                     }
@@ -182,7 +346,7 @@ impl Check<'_> {
         };
         if !good {
             let span = self.span(v);
-            self.fault(code::STEP_WRONG_TYPE, span, vec![entity.keyword.into(), name.into(), written.into(), describe(v.kind()).into()]);
+            self.fault(code::STEP_WRONG_TYPE, span, vec![entity.keyword.into(), name.into(), written.into(), v.kind().describe().into()]);
         }
     }
 
@@ -223,33 +387,20 @@ impl Check<'_> {
             return;
         };
         let t = &self.file.instances[target as usize];
-        if t.complex || t.damaged {
+        if t.damaged {
             return;
         }
         let known = &self.known[t.keyword as usize];
-        let fits = known.rows.is_empty()
-            || known.rows.iter().any(|r| self.schema.entities[*r as usize].is_a.iter().any(|n| names.contains(n)));
+        let is = |rows: &[u16]| rows.is_empty() || rows.iter().any(|r| self.schema.entities[*r as usize].is_a.iter().any(|n| names.contains(n)));
+        let fits = if t.complex {
+            gr_p21::members(self.file.values_of(target)).any(|v| is(&self.part(v).rows))
+        } else {
+            is(&known.rows)
+        };
         if !fits {
             let span = self.span(v);
             let args = vec![entity.keyword.into(), name.into(), written.into(), id.to_string(), self.file.keyword(target).into()];
             self.fault(code::STEP_WRONG_REFERENCE, span, args);
         }
-    }
-}
-
-fn describe(kind: Kind) -> &'static str {
-    match kind {
-        Kind::Unset => "`$`",
-        Kind::Derived => "`*`",
-        Kind::Integer => "an integer",
-        Kind::Real => "a real number",
-        Kind::String => "a string",
-        Kind::Enumeration => "an enumeration value",
-        Kind::Binary => "a binary value",
-        Kind::Reference => "a reference",
-        Kind::Resource => "a resource",
-        Kind::List => "a list",
-        Kind::Typed => "a typed value",
-        Kind::Bad => "nothing readable",
     }
 }

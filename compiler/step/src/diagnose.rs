@@ -26,6 +26,9 @@ pub fn diagnostics_of(text: &[u8], exchange: &Exchange, file: FileId) -> Vec<Dia
         return out.list;
     }
     let kind = dialect(&model);
+    for f in gr_p21::check_header(text, exchange) {
+        out.fault(&f);
+    }
     out.schema(&model, kind);
     if understood(&model, kind) {
         out.layers(&model, kind);
@@ -105,16 +108,37 @@ impl Out<'_> {
 
     fn schema(&mut self, model: &Model<'_>, kind: Dialect) {
         let header = model.header("FILE_SCHEMA").map(|h| h.span());
-        let span = header.unwrap_or(Span::new(0, self.text.len().min(12) as u32));
+        let section = self.exchange.sections.iter().find(|s| s.name == "HEADER");
+        let start = section.map_or(0, |s| s.span.start);
+        let span = header.unwrap_or(Span::new(start, (self.text.len() as u32).min(start + 6)));
         let names = schema_names(model).join(", ");
         let row = match kind {
             Dialect::Ap238 => (code::STEP_AP238, vec![names]),
             Dialect::Product(what) => (code::STEP_NO_PROCESS, vec![what.to_string(), names]),
             Dialect::Unknown => (code::STEP_UNKNOWN_SCHEMA, vec![names]),
-            Dialect::Missing if !self.exchange.instances.is_empty() && header.is_none() => (code::STEP_NO_SCHEMA, vec![]),
+            Dialect::Missing if !self.exchange.instances.is_empty() && !self.schema_hurt(model) => (code::STEP_NO_SCHEMA, vec![]),
             _ => return,
         };
-        self.list.push(Diagnostic::new(row.0, self.file, span, &row.1));
+        let mut d = Diagnostic::new(row.0, self.file, span, &row.1);
+        if matches!(kind, Dialect::Ap238 | Dialect::Product(_)) {
+            d.notes = crate::product::structure(model);
+        }
+        self.list.push(d);
+    }
+
+    /// Whether the lack of schema names has had its message: a damaged FILE_SCHEMA, or no HEADER at all.
+    fn schema_hurt(&self, model: &Model<'_>) -> bool {
+        match model.header("FILE_SCHEMA") {
+            Some(header) => self.faulty[header.index() as usize],
+            None => match self.exchange.sections.iter().find(|s| s.name == "HEADER") {
+                Some(h) => {
+                    let inside = |d: &Diagnostic| (h.span.start..=h.span.end).contains(&d.primary().1.start);
+                    let hurt = |d: &Diagnostic| d.code.def().slug.starts_with("p21/") && d.code != code::P21_HEADER_MISSING && inside(d);
+                    self.list.iter().any(hurt)
+                }
+                None => !self.list.is_empty(),
+            },
+        }
     }
 
     fn dangling(&mut self) {

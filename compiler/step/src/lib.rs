@@ -10,6 +10,7 @@ mod diagnose;
 mod dialect;
 mod lint;
 mod model;
+mod product;
 mod rules;
 mod schema;
 

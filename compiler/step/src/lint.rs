@@ -380,6 +380,19 @@ impl<'m> Lints<'m, '_> {
                 self.once(code::STEP_FACEMILL_PLUNGE, body, body.keyword_span(), vec![op.id().to_string()]);
             }
         }
+        let unused: Vec<Node<'m>> = self.model.all("milling_technology").filter(|t| !seen.contains(&t.index())).collect();
+        for t in unused {
+            self.both_speeds(t, None);
+        }
+    }
+
+    fn both_speeds(&mut self, t: Node<'m>, d: Option<f64>) -> bool {
+        let (Some(v), Some(n), Some(vc)) = (t.attr("spindle"), t.real("spindle"), t.real("cutspeed")) else { return false };
+        let fresh = self.once(code::STEP_BOTH_SPEEDS, t, v.span(), vec![short(vc), short(n)]);
+        if let Some(finding) = fresh {
+            finding.notes.extend(readings(n, vc, t.real("feedrate"), d));
+        }
+        true
     }
 
     fn technology(&mut self, t: Node<'m>, tool: Option<Node<'m>>, d: Option<f64>) {
@@ -387,11 +400,8 @@ impl<'m> Lints<'m, '_> {
         let left = hand.and_then(Val::choice).as_deref() == Some("LEFT");
         let (spindle, cutspeed, feed) = (t.attr("spindle"), t.attr("cutspeed"), t.attr("feedrate"));
         let (n, vc, f) = (spindle.and_then(Val::real), cutspeed.and_then(Val::real), feed.and_then(Val::real));
-        if let (Some(n), Some(vc), Some(v)) = (n, vc, spindle) {
-            let fresh = self.once(code::STEP_BOTH_SPEEDS, t, v.span(), vec![short(vc), short(n)]);
-            if let Some(finding) = fresh {
-                finding.notes.extend(readings(n, vc, f, d));
-            }
+        if self.both_speeds(t, d) {
+            // Which of the two is meant decides about the rest.
         } else if let (Some(n), Some(v)) = (n, spindle)
             && n.abs() > 500.0
         {

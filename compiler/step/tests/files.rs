@@ -149,6 +149,25 @@ fn other_schemas_get_one_message() {
 }
 
 #[test]
+fn products_of_other_schemas_are_named() {
+    let head = "ISO-10303-21;\nHEADER;\nFILE_DESCRIPTION((''),'2;1');\nFILE_NAME('','',(''),(''),'','','');\nFILE_SCHEMA(('AUTOMOTIVE_DESIGN'));\nENDSEC;\nDATA;\n";
+    let mut text = head.to_string();
+    for (n, name) in ["frame", "bolt", "plate", "", "jig"].iter().enumerate() {
+        let n = 10 * (n + 1);
+        text += &format!("#{n}=PRODUCT('p{n}','{name}','',());\n#{}=PRODUCT_DEFINITION_FORMATION('','',#{n});\n", n + 1);
+        text += &format!("#{}=PRODUCT_DEFINITION('','',#{},#99);\n", n + 2, n + 1);
+    }
+    text += "#99=PRODUCT_DEFINITION_CONTEXT('',$,'');\n";
+    for (n, (whole, part)) in [(12, 22), (12, 32), (12, 22), (32, 42), (32, 100)].iter().enumerate() {
+        text += &format!("#{}=NEXT_ASSEMBLY_USAGE_OCCURRENCE('','','',#{whole},#{part},$);\n", 101 + n);
+    }
+    text += "#100=PRODUCT_DEFINITION('','',$,#99);\nENDSEC;\nEND-ISO-10303-21;\n";
+    let said = diagnostics(&text);
+    assert_eq!(said.len(), 1, "{said:#?}");
+    assert_eq!(said[0].notes, ["assembly 'frame' (p10) of 2 × 'bolt' (p20), 'plate' (p30)", "assembly 'plate' (p30) of 'p40'", "product 'jig' (p50)"]);
+}
+
+#[test]
 fn a_circle_of_plans_is_found_and_left() {
     let text = examples::file("#2=WORKPLAN('a',(#10,#100),$,$,$);\n#100=WORKPLAN('b',(#101),$,$,$);\n#101=WORKPLAN('c',(#2),$,$,$);");
     let found = diagnostics(&text);
