@@ -717,7 +717,9 @@ impl<'t, const KEEP: bool> Parser<'t, KEEP> {
                     let word = run(self.text, start + 1, UPPER | LOWER | DIGIT);
                     if self.text.get(skip_blank(self.text, word)) != Some(&b'(') {
                         let written = String::from_utf8_lossy(&self.text[start..word]).into_owned();
-                        self.fault(code::P21_BARE_WORD, start, word, vec![written]);
+                        let number = ["NAN", "INF", "INFINITY"].iter().any(|n| written.eq_ignore_ascii_case(n));
+                        let code = if number { code::P21_BAD_NUMBER } else { code::P21_BARE_WORD };
+                        self.fault(code, start, word, vec![written]);
                         self.push(Kind::Bad, start, word);
                     } else {
                         let (s, _) = self.name("a value")?;
