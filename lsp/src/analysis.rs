@@ -34,6 +34,8 @@ pub enum Message {
     Client { columns: Columns, watching: bool },
     /// Settings.
     Settings(Box<Settings>),
+    /// Settings of folders, where there are several.
+    FolderSettings(Vec<(PathBuf, Settings)>),
     /// Folders.
     Folders { added: Vec<PathBuf>, removed: Vec<PathBuf> },
     /// A question about a document; `None` when it is not open.
@@ -104,6 +106,7 @@ pub struct Analysis {
     /// When files on disk were looked at last, for clients that do not watch them.
     looked: Option<std::time::Instant>,
     settings: Arc<Settings>,
+    of_folders: Vec<(PathBuf, Arc<Settings>)>,
     workspace: Arc<Workspace>,
     host: Arc<dyn Host>,
     /// Files of stations whose findings were published.
@@ -130,6 +133,7 @@ impl Analysis {
             watching: false,
             looked: None,
             settings: Arc::default(),
+            of_folders: Vec::new(),
             workspace: Arc::default(),
             host,
             told: BTreeMap::new(),
@@ -169,6 +173,15 @@ impl Analysis {
                 if *settings != *self.settings {
                     self.said.clear();
                     self.settings = Arc::new(*settings);
+                    self.reload(publish);
+                    publish(Event::Refresh);
+                }
+            }
+            Message::FolderSettings(new) => {
+                let same = new.len() == self.of_folders.len() && new.iter().zip(&self.of_folders).all(|(a, b)| a.0 == b.0 && a.1 == *b.1);
+                if !same {
+                    self.of_folders = new.into_iter().map(|(folder, settings)| (folder, Arc::new(settings))).collect();
+                    self.said.clear();
                     self.reload(publish);
                     publish(Event::Refresh);
                 }
@@ -220,6 +233,12 @@ impl Analysis {
         all
     }
 
+    /// Settings for a file: those of its folder come before the general ones.
+    fn settings_of(&self, path: &Path) -> &Arc<Settings> {
+        let holds = self.of_folders.iter().filter(|(folder, _)| path.starts_with(folder));
+        holds.max_by_key(|(folder, _)| folder.as_os_str().len()).map_or(&self.settings, |f| &f.1)
+    }
+
     /// What a request about a document works on.
     fn view(&self, uri: &lsp::Uri) -> Option<View> {
         self.documents.get(uri).map(|d| self.view_of(d))
@@ -264,7 +283,7 @@ impl Analysis {
     fn view_of(&self, document: &Document) -> View {
         let session = matches!(document.kind, Kind::Gcode(..)).then(|| self.session.snapshot());
         let others = self.open_files().into_iter().filter(|o| o.uri != document.uri).collect();
-        let (settings, host, workspace) = (self.settings.clone(), self.host.clone(), self.workspace.clone());
+        let (settings, host, workspace) = (self.settings_of(&document.path).clone(), self.host.clone(), self.workspace.clone());
         View::new(document, self.columns, settings, host, workspace, Arc::new(others), session)
     }
 
@@ -274,7 +293,7 @@ impl Analysis {
         if let Some(known) = self.stations.get(&folder) {
             return known.clone();
         }
-        let station = Arc::new(self.host.station(path, &self.settings));
+        let station = Arc::new(self.host.station(path, self.settings_of(path)));
         self.stations.insert(folder.clone(), station.clone());
         self.tell_station(&folder, &station, publish);
         station
@@ -308,7 +327,7 @@ impl Analysis {
     /// Has a program that is not open looked at, when nothing else is to be done.
     fn look_at_closed(&mut self, path: PathBuf, publish: &impl Fn(Event)) {
         let station = self.station(&path, publish);
-        let (columns, settings, host, workspace) = (self.columns, self.settings.clone(), self.host.clone(), self.workspace.clone());
+        let (columns, settings, host, workspace) = (self.columns, self.settings_of(&path).clone(), self.host.clone(), self.workspace.clone());
         let own = self.own.clone();
         let job = move || {
             let found = crate::closed::look(&path, columns, settings, host, workspace, station);
@@ -558,7 +577,7 @@ impl Analysis {
         let place = |(file, span): (gr_text::FileId, Span)| {
             if file == own { Some(lsp::Location { uri: uri.clone(), range: text.range(span, columns) }) } else { other(file, span) }
         };
-        let shown = document.found.iter().filter_map(|d| protocol::in_document(d, own)).take(self.settings.most_problems);
+        let shown = document.found.iter().filter_map(|d| protocol::in_document(d, own)).take(self.settings_of(&document.path).most_problems);
         let diagnostics = shown.map(|d| protocol::diagnostic(&d, text, columns, &place)).collect();
         publish(Event::Diagnostics { uri: uri.clone(), version: Some(document.version), diagnostics, open: true });
     }

@@ -48,6 +48,8 @@ struct Backend {
     mistakes: Arc<Mutex<Vec<String>>>,
     /// The client said `shutdown`.
     goodbye: Arc<AtomicBool>,
+    /// Folders that are open.
+    folders: Arc<Mutex<Vec<lsp::Uri>>>,
 }
 
 /// The text of an answer that was overtaken.
@@ -81,7 +83,7 @@ impl Backend {
         });
         let abilities: Arc<Mutex<Abilities>> = Arc::default();
         tokio::spawn(speak(client.clone(), abilities.clone(), outbox));
-        Backend { queue, client, abilities, mistakes: Arc::default(), goodbye }
+        Backend { queue, client, abilities, mistakes: Arc::default(), goodbye, folders: Arc::default() }
     }
 
     fn tell(&self, message: Message) {
@@ -127,17 +129,23 @@ impl Backend {
         Err(overtaken())
     }
 
-    /// Settings of the client, if it lets itself be asked.
+    /// Settings of the client, if it lets itself be asked: those of each folder where there are several.
     async fn pull_settings(&self) {
         if !self.abilities().configuration {
             return;
         }
-        let item = lsp::ConfigurationItem { scope_uri: None, section: Some("gccRobot".into()) };
-        if let Ok(values) = self.client.configuration(vec![item]).await
-            && let Some(value) = values.into_iter().next().filter(|v| !v.is_null())
-        {
+        let folders = self.folders.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let several = if folders.len() > 1 { folders } else { Vec::new() };
+        let scopes = std::iter::once(None).chain(several.iter().cloned().map(Some));
+        let items = scopes.map(|scope_uri| lsp::ConfigurationItem { scope_uri, section: Some("gccRobot".into()) }).collect();
+        let Ok(values) = self.client.configuration(items).await else { return };
+        let mut values = values.into_iter();
+        if let Some(value) = values.next().filter(|v| !v.is_null()) {
             self.settings(&value).await;
         }
+        let of_folders = several.iter().zip(values).filter(|(_, v)| !v.is_null());
+        let of_folders = of_folders.filter_map(|(uri, value)| Some((folder(uri)?, Settings::read(&value).settings))).collect();
+        self.tell(Message::FolderSettings(of_folders));
     }
 
     async fn settings(&self, value: &Value) {
@@ -332,6 +340,7 @@ impl LanguageServer for Backend {
             snippets: can("/textDocument/completion/completionItem/snippetSupport"),
         };
         let folders = params.workspace_folders.unwrap_or_default();
+        *self.folders.lock().unwrap_or_else(PoisonError::into_inner) = folders.iter().map(|f| f.uri.clone()).collect();
         let mut added: Vec<PathBuf> = folders.iter().filter_map(|f| folder(&f.uri)).collect();
         #[allow(deprecated, reason = "clients that know no folders send this")]
         if added.is_empty() {
@@ -387,6 +396,12 @@ impl LanguageServer for Backend {
     async fn did_change_workspace_folders(&self, p: lsp::DidChangeWorkspaceFoldersParams) {
         let paths = |list: &[lsp::WorkspaceFolder]| list.iter().filter_map(|f| folder(&f.uri)).collect();
         self.tell(Message::Folders { added: paths(&p.event.added), removed: paths(&p.event.removed) });
+        let mut folders = self.folders.lock().unwrap_or_else(PoisonError::into_inner);
+        folders.retain(|f| p.event.removed.iter().all(|r| r.uri != *f));
+        folders.extend(p.event.added.iter().map(|f| f.uri.clone()));
+        drop(folders);
+        let own = self.clone();
+        tokio::spawn(async move { own.pull_settings().await });
     }
 
     async fn hover(&self, p: lsp::HoverParams) -> Result<Option<lsp::Hover>> {

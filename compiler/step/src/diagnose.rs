@@ -201,8 +201,34 @@ impl Out<'_> {
         }
     }
 
+    /// The value in each unit that may have been meant: a finding about a unit chooses none.
+    fn readings(&self, f: &Finding) -> Vec<Fix> {
+        let c = f.code;
+        let meant: &[(usize, &str)] = if c == code::STEP_FEED_UNIT {
+            &[(2, "m/min was meant"), (3, "mm/min was meant")]
+        } else if c == code::STEP_SPINDLE_UNIT {
+            &[(2, "rpm was meant")]
+        } else if c == code::STEP_CUTSPEED_UNIT {
+            &[(2, "m/min was meant")]
+        } else if c == code::STEP_SPINDLE_SIGN {
+            &[(1, "clockwise, M3")]
+        } else if c == code::STEP_OVERLAP {
+            &[(1, "millimeters were meant"), (2, "percent was meant")]
+        } else {
+            &[]
+        };
+        let fix = |(n, why): &(usize, &str)| {
+            // A ratio of a tool that is not known is no number.
+            let value = f.args.get(*n).filter(|v| v.parse::<f64>().is_ok())?;
+            let real = if value.contains('.') { value.clone() } else { format!("{value}.") };
+            Some(Fix { title: format!("write {real} ({why})"), edits: vec![(self.file, f.span, real)] })
+        };
+        meant.iter().filter_map(fix).collect()
+    }
+
     fn finding(&mut self, f: Finding, kind: Dialect) {
         let mut d = Diagnostic::new(f.code, self.file, f.span, &f.args);
+        d.fixes = self.readings(&f);
         d.notes = f.notes;
         for (span, text) in f.labels {
             d = d.label(self.file, span, text);

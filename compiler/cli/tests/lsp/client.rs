@@ -22,6 +22,8 @@ pub struct Client {
     versions: BTreeMap<String, i64>,
     texts: BTreeMap<String, String>,
     pub settings: Value,
+    /// Settings of folders.
+    pub scoped: BTreeMap<String, Value>,
     /// Diagnostics that came in, by document: version and list.
     pub found: BTreeMap<String, (i64, Value)>,
     /// Requests of the server that came in.
@@ -86,6 +88,7 @@ impl Client {
             versions: BTreeMap::new(),
             texts: BTreeMap::new(),
             settings,
+            scoped: BTreeMap::new(),
             found: BTreeMap::new(),
             asked: Vec::new(),
             said: Vec::new(),
@@ -167,7 +170,9 @@ impl Client {
         } else if method == "window/showMessage" {
             self.said.push(m["params"]["message"].as_str().unwrap_or("").to_string());
         } else if !m["id"].is_null() {
-            let result = if method == "workspace/configuration" { json!([self.settings]) } else { Value::Null };
+            let of = |item: &Value| item["scopeUri"].as_str().and_then(|s| self.scoped.get(s)).unwrap_or(&self.settings).clone();
+            let items = m["params"]["items"].as_array().map(|l| l.iter().map(of).collect::<Vec<_>>());
+            let result = if method == "workspace/configuration" { json!(items) } else { Value::Null };
             self.send(json!({ "id": m["id"], "result": result }));
         }
         self.asked.push(method);

@@ -638,3 +638,17 @@ fn values_in_hints_are_values() {
     assert!(h.contains("G93: every feed move takes 1/F minutes") && !h.contains("now "), "{h}");
     c.shut_down();
 }
+
+#[test]
+fn what_the_chosen_robot_cannot_do() {
+    let cell = include_str!("../../../../docs/examples/irb2400-cell.toml");
+    let mut c = Client::new(&[("cell.toml", cell)], json!({ "machine": "cell.toml" }));
+    // Reach, limits of joints, one configuration for a cut, the spindle's speed, tools.
+    for (n, (block, wanted)) in [("X60", ""), ("X2500", "E0504"), ("X-900", "E0507"), ("X-800 Y100 Z500", "E0520"), ("S90000 M3", "E0532"), ("T7 M6\nX5", "E0521")].iter().enumerate() {
+        let text = format!("G21 G90 G17 F600\nT1 M6\nG43 H1\nS10000 M3\nG0 X0 Y0 Z20\nG1 Z5\n{block}\nG0 Z20\nM5\nM2\n");
+        let uri = c.open(&format!("{n}.ngc"), Some(&text));
+        let found: Vec<String> = c.diagnostics(&uri).iter().filter(|d| d["severity"] == 1).map(|d| d["code"].as_str().unwrap_or("").to_string()).collect();
+        assert!(if wanted.is_empty() { found.is_empty() } else { found.iter().any(|f| f == wanted) }, "{block}: {found:?}");
+    }
+    c.shut_down();
+}

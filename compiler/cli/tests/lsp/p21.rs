@@ -219,3 +219,23 @@ fn dialect_fixes_are_offered() {
     assert_eq!(c.edited(&uri, &fix["edit"]), PLAN);
     c.shut_down();
 }
+
+#[test]
+fn units_are_put_right() {
+    let text = include_str!("../../../../docs/examples/stepnc/mistakes.p21");
+    let mut c = Client::new(&[("a.p21", text)], json!({}));
+    let uri = c.open("a.p21", None);
+    let found = c.diagnostics(&uri);
+    let mut fixed = Vec::new();
+    for d in found.iter().filter(|d| ["E0423", "E0424", "E0425", "E0426", "E0428"].contains(&d["code"].as_str().unwrap_or(""))) {
+        let params = json!({ "textDocument": { "uri": uri }, "range": d["range"], "context": { "diagnostics": [d], "only": ["quickfix"] } });
+        let actions = c.request("textDocument/codeAction", params);
+        for a in actions.as_array().expect("a list").iter().filter(|a| a["diagnostics"][0]["code"] == d["code"]) {
+            let new = c.edited(&uri, &a["edit"]);
+            let line = d["range"]["start"]["line"].as_u64().expect("a line") as usize;
+            fixed.push(format!("{} {}: {}", d["code"].as_str().unwrap_or(""), a["title"].as_str().unwrap_or(""), new.lines().nth(line).unwrap_or("")));
+        }
+    }
+    insta::assert_snapshot!(fixed.join("\n"));
+    c.shut_down();
+}

@@ -385,3 +385,41 @@ fn clients_without_snippets_get_text() {
     assert!(actions.as_array().is_some_and(|a| !a.is_empty() && a.iter().all(|a| a["edit"].is_object())), "{actions}");
     c.shut_down();
 }
+
+#[test]
+fn clients_that_do_not_watch_files() {
+    let mut c = Client::bare(&[("m.ngc", "G21 F100\no<p> call\nM2\n"), ("p.ngc", "o<p> sub\nG1 X1\no<p> endsub\nM2\n"), ("gcc-robot.toml", "schema = 1\n[project]\nsubs = [\".\"]\n")]);
+    let m = c.open("m.ngc", None);
+    assert_eq!(c.diagnostics(&m), Vec::<Value>::new());
+    // Another program writes it, and nobody says so.
+    std::fs::write(c.path("p.ngc"), "o<p> sub\nG1 XO\no<p> endsub\nM2\n").expect("written");
+    std::thread::sleep(std::time::Duration::from_millis(1_100));
+    c.edit(&m, "F100", "F101");
+    let found = c.diagnostics(&m);
+    assert!(found.iter().any(|d| d["severity"] == 1 && d["range"]["start"]["line"] == 1), "{found:?}");
+    c.shut_down();
+}
+
+#[test]
+fn folders_have_settings_of_their_own() {
+    let other = tempfile::tempdir().expect("a folder");
+    let mut c = Client::new(&[("a.nc", "G21\nM2\n")], json!({}));
+    let folder = format!("file://{}", other.path().display());
+    c.scoped.insert(folder.clone(), json!({ "dialect": "grbl" }));
+    c.notify("workspace/didChangeWorkspaceFolders", json!({ "event": { "added": [{ "uri": folder, "name": "other" }], "removed": [] } }));
+    let a = c.open("a.nc", None);
+    let b = format!("{folder}/b.nc");
+    c.notify("textDocument/didOpen", json!({ "textDocument": { "uri": b, "languageId": "gcode", "version": 1, "text": "G21\nM2\n" } }));
+    let hover = |c: &mut Client, uri: &str| {
+        let h = c.request("textDocument/hover", json!({ "textDocument": { "uri": uri }, "position": { "line": 0, "character": 1 } }));
+        h["contents"]["value"].as_str().unwrap_or("").to_lowercase()
+    };
+    for _ in 0..500 {
+        if hover(&mut c, &b).contains("grbl") {
+            break;
+        }
+        std::thread::sleep(std::time::Duration::from_millis(10));
+    }
+    assert!(hover(&mut c, &b).contains("grbl") && !hover(&mut c, &a).contains("grbl"));
+    c.shut_down();
+}

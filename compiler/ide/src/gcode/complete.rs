@@ -46,6 +46,14 @@ pub fn complete(doc: Doc<'_>, offset: u32, around: Around<'_>) -> Vec<Completion
     if depth(before) > 0 {
         return functions(typed, replace);
     }
+    // Behind `#1 =` comes a value, not a word.
+    if before[..word].trim_end().ends_with('=') {
+        let mut found = functions(typed, replace);
+        if typed.is_empty() {
+            found.extend(parameters(doc, "#", replace, &around, &line));
+        }
+        return found;
+    }
     let mut letters = typed.chars();
     match (letters.next().map(|c| c.to_ascii_uppercase()), letters.as_str()) {
         (Some(letter @ ('T' | 'H' | 'D')), digits) if digits.bytes().all(|b| b.is_ascii_digit()) => tools(letter, digits, replace, &around),
@@ -97,9 +105,9 @@ fn open_parameter(before: &str) -> Option<usize> {
 
 fn parameters(doc: Doc<'_>, typed: &str, replace: Span, around: &Around<'_>, line: &LineOf<'_>) -> Vec<Completion> {
     let lower = typed.to_lowercase();
-    // A bracket that the editor closed by itself is replaced too.
+    // What stands behind of the name is replaced too, with the bracket that the editor closed by itself.
     let behind = line.slice(Span::new(replace.end, line.span().end));
-    let replace = if behind.starts_with('>') { Span::new(replace.start, replace.end + 1) } else { replace };
+    let replace = Span::new(replace.start, replace.end + rest_of_name(behind, typed.starts_with("#<")));
     let item = |label: String, detail: &str, documentation: &str, rank: u8| Completion {
         insert: label.clone(),
         label,
@@ -135,6 +143,16 @@ fn parameters(doc: Doc<'_>, typed: &str, replace: Span, around: &Around<'_>, lin
     found
 }
 
+/// Bytes behind the cursor that belong to the name in which it stands.
+fn rest_of_name(behind: &str, named: bool) -> u32 {
+    let letters = if named {
+        behind.bytes().take_while(|b| b.is_ascii_alphanumeric() || matches!(b, b'_' | b'.' | b'-')).count()
+    } else {
+        behind.bytes().take_while(u8::is_ascii_digit).count()
+    };
+    letters as u32 + u32::from(named && behind[letters..].starts_with('>'))
+}
+
 /// Parameters that the file sets or reads, each once, in order of names.
 fn names_of(doc: Doc<'_>) -> Vec<(Parameter, bool)> {
     let mut all: Vec<Parameter> = Vec::new();
@@ -163,7 +181,14 @@ fn label(doc: Doc<'_>, line: &LineOf<'_>, before: &str, offset: u32, around: &Ar
         (digits > 0 && rest.len() > digits).then_some(digits)
     };
     let Some(end) = complete_label else {
-        let replace = Span::new(start + from as u32 - 1, offset);
+        // The rest of the label, and the keyword that stands there already.
+        let behind = line.slice(Span::new(offset, line.span().end));
+        let mut end = offset + rest_of_name(behind, rest.starts_with('<'));
+        let after = line.slice(Span::new(end, line.span().end));
+        if after.trim_start().get(..4).is_some_and(|k| k.eq_ignore_ascii_case("call")) {
+            end += (after.len() - after.trim_start().len()) as u32 + 4;
+        }
+        let replace = Span::new(start + from as u32 - 1, end);
         let local: Vec<(String, String)> = names::subs(doc)
             .iter()
             .filter(|s| s.first != line.line)

@@ -236,8 +236,7 @@ pub fn block(run: &Run) -> String {
         let what = match (run.cycle, m.totals.moves, m.arc) {
             (true, n, _) => format!("{} in {n} moves", code_name(b'g', f64::from(a.motion) / 10.0)),
             (_, 1, Some(arc)) => format!("{} arc", if arc.sweep < 0.0 { "clockwise" } else { "counter-clockwise" }),
-            (_, 1, None) if m.totals.rapid_nm > 0 || m.totals.feed_nm == 0 => "rapid".into(),
-            (_, 1, None) => "straight feed".into(),
+            (_, 1, None) => one_move(&run.program).into(),
             (_, n, _) => format!("{n} moves"),
         };
         let radius = if b.lathe_diameter != 0 || a.lathe_diameter != 0 { ", X as a radius" } else { "" };
@@ -264,6 +263,18 @@ pub fn block(run: &Run) -> String {
     }
     lines.push(format!("modes: {}", codes(a).join(" ")));
     lines.join("  \n")
+}
+
+/// What a single move is called.
+fn one_move(program: &gr_ir::Program) -> &'static str {
+    use gr_ir::Op;
+    match program.steps().find(|s| s.op.moves()).map(|s| s.op) {
+        Some(Op::Rapid) => "rapid",
+        Some(Op::Nurbs { .. }) => "spline",
+        Some(Op::Probe(_)) => "probe",
+        Some(Op::RigidTap { .. }) => "rigid tapping",
+        _ => "straight feed",
+    }
 }
 
 fn arc_text(arc: &super::modes::ArcFacts, unit: &str) -> String {

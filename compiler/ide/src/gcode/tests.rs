@@ -99,3 +99,29 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn completions_replace_the_whole_name() {
+    let accepted = |marked: &str, label: &str| {
+        let offset = marked.find('|').expect("a mark");
+        let text = format!("o<hole> sub\no<hole> endsub\n#<depth> = 1\n{}\n", marked.replace('|', ""));
+        let f = file(&text);
+        let at = (text.len() - marked.len() + offset) as u32;
+        let found = complete(doc(&f), at, Around::default());
+        let c = found.iter().find(|c| c.label == label).unwrap_or_else(|| panic!("{label} is not offered at {marked}"));
+        let mut line = text.clone();
+        line.replace_range(c.replace.range(), &c.insert);
+        line.lines().nth(3).unwrap_or("").to_string()
+    };
+    for (marked, label, becomes) in [
+        ("o<ho|>", "o<hole> call", "o<hole> call"),
+        ("o<ho|", "o<hole> call", "o<hole> call"),
+        ("o<ho|> call [1]", "o<hole> call", "o<hole> call [1]"),
+        ("o<ho|le> call [1]", "o<hole> call", "o<hole> call [1]"),
+        ("G1 X#<de|pth> Y1", "#<depth>", "G1 X#<depth> Y1"),
+        ("G1 X#<d|> Y1", "#<depth>", "G1 X#<depth> Y1"),
+        ("#1 = |", "#<depth>", "#1 = #<depth>"),
+    ] {
+        assert_eq!(accepted(marked, label), becomes, "{marked}");
+    }
+}
