@@ -7,7 +7,7 @@
 //! (JᵀJ + D²)⁻¹Jᵀe, the tests look at the greatest component instead of the norm, and D² holds the squares of λ.
 
 use gr_machine::math::{Frame, M3, norm, product, rot_x, rot_y, rot_z, rotate, rotation_vector, solve, transpose};
-use gr_machine::{KinematicsError, Machine, differential};
+use gr_machine::{Chain, KinematicsError, Machine, differential};
 
 /// Constants of the solver.
 #[derive(Clone, PartialEq, Debug)]
@@ -133,7 +133,11 @@ fn search(machine: &Machine, aim: &Frame, start: Vec<f64>, limits: &[(f64, f64)]
 
 /// Equations 17 to 19.
 fn step(machine: &Machine, q: &[f64], e: &[f64; 6], limits: &[(f64, f64)], settings: &Damped) -> Result<Vec<f64>, KinematicsError> {
-    let columns = differential::velocity(machine, q)?;
+    // By differences where the arm is no wrist arm: with the exact columns one of the published points ends a step earlier.
+    let columns = match machine.chain {
+        Chain::Opw(_) | Chain::Serial(_) => differential::velocity(machine, q)?,
+        _ => differential::jacobian(&*machine.kinematics(), q)?,
+    };
     let dot = |a: &[f64; 6], b: &[f64; 6]| -> f64 { a.iter().zip(b).map(|(p, q)| p * q).sum() };
     let n = columns.len();
     let mut a: Vec<Vec<f64>> = columns.iter().map(|c| columns.iter().map(|d| dot(c, d)).collect()).collect();
