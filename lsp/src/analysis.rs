@@ -23,7 +23,7 @@ use crate::workspace::Workspace;
 /// What the thread is asked to do.
 pub enum Message {
     /// A document was opened.
-    Open { uri: lsp::Uri, language: String, version: i32, text: String },
+    Open { uri: lsp::Uri, language: String, version: i32, text: gr_text::Text },
     /// … edited.
     Change { uri: lsp::Uri, version: i32, changes: Vec<lsp::TextDocumentContentChangeEvent> },
     /// … closed.
@@ -336,7 +336,7 @@ impl Analysis {
         let _ = self.background.send(Box::new(job));
     }
 
-    fn open(&mut self, uri: lsp::Uri, language: String, version: i32, text: &str, publish: &(impl Fn(Event) + Clone + Send + 'static)) {
+    fn open(&mut self, uri: lsp::Uri, language: String, version: i32, text: &gr_text::Text, publish: &(impl Fn(Event) + Clone + Send + 'static)) {
         // A client that opens a document twice means the second text.
         self.forget(&uri);
         self.forget_unopened(|d| d.uri == uri);

@@ -1,10 +1,15 @@
 //! Takes messages that are none out of the client's stream: the server behind ends at the first one it can't read.
 //! After nonsense, reading goes on at the next `Content-Length`. Text that is no Unicode is mended, not dropped: an
 //! edit that is lost would leave the server with another text than the client.
+//!
+//! The text of a big document is put aside here, and the handler of the message fetches it: on its way through the
+//! protocol library it would be copied and parsed several times more.
 
 use std::borrow::Cow;
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, PoisonError};
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use tokio::io::{AsyncRead, AsyncReadExt as _, AsyncWrite, AsyncWriteExt as _};
 
@@ -14,10 +19,55 @@ const MOST_HEADER: usize = 4096;
 const MOST_BODY: usize = 1 << 31;
 const MARK: &[u8] = b"Content-Length:";
 
+/// Messages of this length are big.
+const BIG: usize = 1 << 16;
+/// The method stands among the first bytes of a message.
+const HEAD: usize = 1024;
+const OPENS: &str = "textDocument/didOpen";
+/// No text of a document begins like this.
+const TICKET: &str = "\0big text ";
+
+/// Texts of big documents on their way, in order.
+#[derive(Default)]
+pub struct BigTexts(Mutex<(u64, BTreeMap<u64, String>)>);
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Opening {
+    jsonrpc: String,
+    method: String,
+    params: tower_lsp::ls_types::DidOpenTextDocumentParams,
+}
+
+impl BigTexts {
+    /// The text that `ticket` stands for; none: it stands for itself.
+    pub fn take(&self, ticket: &str) -> Option<String> {
+        let number = ticket.strip_prefix(TICKET)?.parse().ok()?;
+        let mut held = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let text = held.1.remove(&number)?;
+        // What came before and was never fetched never will be.
+        held.1 = held.1.split_off(&number);
+        Some(text)
+    }
+    /// A message that opens a big document, with a ticket in place of the text. None: another message, or one that has
+    /// to be mended.
+    fn put_aside(&self, body: &[u8]) -> Option<Vec<u8>> {
+        memchr::memmem::find(body.get(..HEAD.min(body.len()))?, OPENS.as_bytes())?;
+        let mut message: Opening = serde_json::from_slice(body).ok().filter(|m: &Opening| m.method == OPENS && m.jsonrpc == "2.0")?;
+        let mut held = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let number = held.0 + 1;
+        let text = std::mem::replace(&mut message.params.text_document.text, format!("{TICKET}{number}"));
+        let small = serde_json::to_vec(&message).ok()?;
+        held.0 = number;
+        held.1.insert(number, text);
+        Some(small)
+    }
+}
+
 /// Passes good messages on until one side is gone.
-pub async fn filter(mut from: impl AsyncRead + Unpin, mut to: impl AsyncWrite + Unpin) {
+pub async fn filter(mut from: impl AsyncRead + Unpin, mut to: impl AsyncWrite + Unpin, texts: Arc<BigTexts>) {
     let mut held: Vec<u8> = Vec::new();
-    let mut buffer = vec![0; 1 << 16];
+    let mut buffer = vec![0; 1 << 18];
     loop {
         loop {
             match next(&held) {
@@ -26,7 +76,9 @@ pub async fn filter(mut from: impl AsyncRead + Unpin, mut to: impl AsyncWrite + 
                     held.drain(..count);
                 }
                 Next::Message(header, length) => {
-                    let message = readable(&held[header..header + length]);
+                    let body = &held[header..header + length];
+                    let small = if length > BIG { texts.put_aside(body) } else { None };
+                    let message = small.map(Cow::Owned).or_else(|| readable(body));
                     if let Some(body) = &message {
                         let head = format!("Content-Length: {}\r\n\r\n", body.len());
                         if to.write_all(head.as_bytes()).await.is_err() || to.write_all(body).await.is_err() {
@@ -36,6 +88,9 @@ pub async fn filter(mut from: impl AsyncRead + Unpin, mut to: impl AsyncWrite + 
                     // A wrong length may have swallowed the head of the next message.
                     let swallowed = if message.is_some() { None } else { memchr::memmem::find(&held[header..header + length], MARK) };
                     held.drain(..swallowed.map_or(header + length, |at| header + at));
+                    if length > BIG {
+                        held.shrink_to(BIG);
+                    }
                 }
             }
         }
@@ -131,17 +186,40 @@ fn next(held: &[u8]) -> Next {
 
 #[cfg(test)]
 mod tests {
-    use super::filter;
+    use super::*;
 
     fn through(bytes: &[u8]) -> String {
+        filtered(bytes, Arc::default())
+    }
+
+    fn filtered(bytes: &[u8], texts: Arc<BigTexts>) -> String {
         let runtime = tokio::runtime::Builder::new_current_thread().build().expect("a runtime");
         let mut out = Vec::new();
-        runtime.block_on(filter(bytes, &mut out));
+        runtime.block_on(filter(bytes, &mut out, texts));
         String::from_utf8(out).expect("text")
     }
 
     fn framed(body: &str) -> String {
         format!("Content-Length: {}\r\n\r\n{body}", body.len())
+    }
+
+    #[test]
+    fn big_texts_take_a_way_of_their_own() {
+        let texts: Arc<BigTexts> = Arc::default();
+        let message = |method: &str, text: &str| {
+            let document = json!({ "uri": "file:///a.ngc", "languageId": "gcode", "version": 1, "text": text });
+            framed(&json!({ "jsonrpc": "2.0", "method": method, "params": { "textDocument": document } }).to_string())
+        };
+        let (small, big) = ("G1 X1\n".to_string(), "G1 X\"é\n".repeat(BIG));
+        let other = message("textDocument/other", &big);
+        let all = [message(OPENS, &small), message(OPENS, &big), message(OPENS, &big), other.clone()].concat();
+        let passed = filtered(all.as_bytes(), texts.clone());
+        assert!(passed.starts_with(&message(OPENS, &small)) && passed.ends_with(&other));
+        assert!(passed.len() < other.len() + 2000);
+        assert_eq!((texts.take("G1 X1\n"), texts.take(&format!("{TICKET}9"))), (None, None));
+        // The first one was never asked for.
+        assert_eq!(texts.take(&format!("{TICKET}2")), Some(big));
+        assert_eq!(texts.take(&format!("{TICKET}1")), None);
     }
 
     #[test]

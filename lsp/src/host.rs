@@ -99,7 +99,7 @@ pub struct OutputJob<'a> {
     /// Path of the program.
     pub path: &'a Path,
     /// Its text.
-    pub text: Arc<str>,
+    pub text: gr_text::Text,
     /// Settings of the client.
     pub settings: &'a Settings,
     /// What it is run with.

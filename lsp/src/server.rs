@@ -18,6 +18,7 @@ use tower_lsp::{Client, LanguageServer, LspService, Server};
 use crate::analysis::{Analysis, Event, Message};
 use crate::documents::{Kind, OpenFile, View};
 use crate::features::{self, Answer, Failure};
+use crate::frames::BigTexts;
 use crate::host::Host;
 use crate::protocol::custom;
 use crate::settings::Settings;
@@ -50,6 +51,8 @@ struct Backend {
     goodbye: Arc<AtomicBool>,
     /// Folders that are open.
     folders: Arc<Mutex<Vec<lsp::Uri>>>,
+    /// Texts of big documents on their way here.
+    texts: Arc<BigTexts>,
 }
 
 /// The text of an answer that was overtaken.
@@ -72,7 +75,7 @@ impl Drop for Waiting {
 }
 
 impl Backend {
-    fn new(client: Client, host: Arc<dyn Host>, goodbye: Arc<AtomicBool>) -> Backend {
+    fn new(client: Client, host: Arc<dyn Host>, goodbye: Arc<AtomicBool>, texts: Arc<BigTexts>) -> Backend {
         let (queue, inbox) = channel();
         let (publish, outbox) = mpsc::unbounded_channel::<Event>();
         let own = queue.clone();
@@ -83,7 +86,7 @@ impl Backend {
         });
         let abilities: Arc<Mutex<Abilities>> = Arc::default();
         tokio::spawn(speak(client.clone(), abilities.clone(), outbox));
-        Backend { queue, client, abilities, mistakes: Arc::default(), goodbye, folders: Arc::default() }
+        Backend { queue, client, abilities, mistakes: Arc::default(), goodbye, folders: Arc::default(), texts }
     }
 
     fn tell(&self, message: Message) {
@@ -371,7 +374,8 @@ impl LanguageServer for Backend {
 
     async fn did_open(&self, p: lsp::DidOpenTextDocumentParams) {
         let d = p.text_document;
-        self.tell(Message::Open { uri: d.uri, language: d.language_id, version: d.version, text: d.text });
+        let text = self.texts.take(&d.text).unwrap_or(d.text).into();
+        self.tell(Message::Open { uri: d.uri, language: d.language_id, version: d.version, text });
     }
     async fn did_change(&self, p: lsp::DidChangeTextDocumentParams) {
         self.tell(Message::Change { uri: p.text_document.uri, version: p.text_document.version, changes: p.content_changes });
@@ -580,11 +584,12 @@ const GRACE: std::time::Duration = std::time::Duration::from_secs(2);
 /// Serves one client on any pair of streams. Whether it said goodbye (`shutdown`) before it left.
 pub async fn serve(input: impl AsyncRead + Unpin + Send + 'static, output: impl AsyncWrite, host: Arc<dyn Host>) -> bool {
     let (clean, input_of_server) = tokio::io::duplex(1 << 20);
-    let reading = tokio::spawn(crate::frames::filter(input, clean));
+    let texts: Arc<BigTexts> = Arc::default();
+    let reading = tokio::spawn(crate::frames::filter(input, clean, texts.clone()));
     let input = input_of_server;
     let goodbye: Arc<AtomicBool> = Arc::default();
     let said = goodbye.clone();
-    let (service, socket) = LspService::build(move |client| Backend::new(client, host, said))
+    let (service, socket) = LspService::build(move |client| Backend::new(client, host, said, texts))
         .custom_method("gccRobot/preview", Backend::preview)
         .custom_method("gccRobot/output", Backend::output)
         .custom_method("gccRobot/state", Backend::state)

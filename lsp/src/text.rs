@@ -23,7 +23,7 @@ const PIECE: usize = 16 * 1024;
 
 #[derive(Debug)]
 struct Piece {
-    text: Box<str>,
+    text: gr_text::Text,
     /// Line ends.
     lines: u32,
     /// Of an exchange file: ids and bytes of the instances that begin here, ascending; made when first asked for.
@@ -46,22 +46,23 @@ fn line_ends(text: &str) -> u32 {
 }
 
 /// Cuts behind line feeds.
-fn split(text: &str) -> Vec<Arc<Piece>> {
+fn split(text: &gr_text::Text) -> Vec<Arc<Piece>> {
     let mut pieces = Vec::with_capacity(text.len() / PIECE + 1);
-    let mut rest = text;
-    while !rest.is_empty() {
-        let cut = if rest.len() <= PIECE { None } else { memchr::memchr(b'\n', &rest.as_bytes()[PIECE..]).map(|n| PIECE + n + 1) };
-        let (head, tail) = rest.split_at(cut.unwrap_or(rest.len()));
-        pieces.push(Arc::new(Piece { text: head.into(), lines: line_ends(head), instances: OnceLock::new() }));
-        rest = tail;
+    let mut start = 0;
+    while start < text.len() {
+        let next = text.as_bytes().get(start + PIECE..).and_then(|rest| memchr::memchr(b'\n', rest));
+        let end = next.map_or(text.len(), |n| start + PIECE + n + 1);
+        let part = text.part(start..end);
+        pieces.push(Arc::new(Piece { lines: line_ends(&part), text: part, instances: OnceLock::new() }));
+        start = end;
     }
     pieces
 }
 
 impl Text {
-    /// A text.
-    pub fn new(text: &str) -> Text {
-        let mut out = Text { pieces: split(text), starts: Vec::new() };
+    /// A text, whose bytes it shares.
+    pub fn new(text: impl Into<gr_text::Text>) -> Text {
+        let mut out = Text { pieces: split(&text.into()), starts: Vec::new() };
         out.sum();
         out
     }
@@ -108,7 +109,7 @@ impl Text {
             last += 1;
             text.push_str(&self.pieces[last].text);
         }
-        self.pieces.splice(first..=last, split(&text));
+        self.pieces.splice(first..=last, split(&text.into()));
         self.sum();
     }
     /// First byte of a line; past the end, the length.

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use gr_interp::{ToolTable, read_tools};
 use gr_planner::reference::{ufsc2016, unb2013};
 use gr_planner::{Loaded, Process, Tool, Units, table};
-use gr_text::{Diagnostic, FileId, LineIndex, Severity, code};
+use gr_text::{Diagnostic, FileId, LineIndex, Severity, Text, code};
 
 use crate::commands::check::Checked;
 use crate::pipeline::{Motion, Unit};
@@ -65,7 +65,7 @@ pub fn not_one(text: &str) -> Option<Diagnostic> {
 }
 
 /// Everything there is to say about a file.
-pub fn check(name: &str, text: &str, path: &Path, station: &Station) -> Checked {
+pub fn check(name: &str, text: &Text, path: &Path, station: &Station) -> Checked {
     let unit = Unit::new(path, text.into(), gr_text::Encoding::Utf8, station);
     let (_, found) = plan(&unit);
     with_source(name, &unit, found)
@@ -74,7 +74,7 @@ pub fn check(name: &str, text: &str, path: &Path, station: &Station) -> Checked 
 fn with_source(name: &str, unit: &Unit, found: Vec<Diagnostic>) -> Checked {
     let mut sources = Sources::default();
     sources.add(name, unit.text.clone());
-    Checked { sources, found, more: 0, unreadable: false }
+    Checked { sources, found, ..Checked::nothing() }
 }
 
 /// Lints as options and project want them.

@@ -1,16 +1,15 @@
 //! From a source file to motion: read, run and check, in one go where nothing is wrong.
 
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 use gr_canon::Sink;
-use gr_driver::{Loaded, Options, Rules, Session};
+use gr_driver::{Loaded, Options, Rules};
 use gr_interp::Setup;
 use gr_ir::Program;
 use gr_spec::Family;
-use gr_text::{Diagnostic, Encoding, FileId, Severity, code};
+use gr_text::{Diagnostic, Encoding, FileId, Severity, Text, code};
 
-use crate::commands::check::{Checked, byte_order_mark, is_marked, session_sources, unreadable};
+use crate::commands::check::{Checked, byte_order_mark, is_marked, unreadable};
 use crate::exchange::Plan;
 use crate::setup::{Levels, Station, is_for_a_printer};
 use crate::sources::{Sources, read_program};
@@ -20,7 +19,7 @@ pub struct Unit {
     /// As the user named it.
     pub path: PathBuf,
     /// Its text.
-    pub text: Arc<str>,
+    pub text: Text,
     /// How it was spelled.
     pub encoding: Encoding,
     /// What it is run with.
@@ -39,7 +38,7 @@ pub struct Unit {
 
 impl Unit {
     /// A text, as the options and the project want it run.
-    pub fn new(path: &Path, text: Arc<str>, encoding: Encoding, station: &Station) -> Unit {
+    pub fn new(path: &Path, text: Text, encoding: Encoding, station: &Station) -> Unit {
         Unit {
             setup: station.setup_for(path, &text),
             exchange: crate::exchange::is_exchange(path, &text),
@@ -70,13 +69,8 @@ impl Unit {
     }
     /// Everything that is to be said about it. `Err` when there are errors.
     fn check(&self) -> Result<Checked, Checked> {
-        let mut session = Session::new();
-        let file = session.open(&self.name(), &self.text, self.options());
-        let check = session.check(file);
-        let mut found = check.diagnostics;
-        found.iter_mut().for_each(|d| self.lints.harden(d));
-        let bad = found.iter().any(|d| d.severity == Severity::Error);
-        let checked = Checked { sources: session_sources(&session, &found), found, more: check.more, unreadable: false };
+        let checked = Checked::of(&self.name(), &self.text, self.options(), &self.lints);
+        let bad = checked.more.errors > 0 || checked.found.iter().any(|d| d.severity == Severity::Error);
         if bad { Err(checked) } else { Ok(checked) }
     }
 }
@@ -95,7 +89,7 @@ pub fn load(path: &Path, station: &Station) -> Result<Unit, Checked> {
     if is_marked(unit.encoding) && !unit.exchange {
         // As `check` has it.
         let mut checked = Checked::nothing();
-        byte_order_mark(&mut checked, (&name, path), unit.text.to_string(), station);
+        byte_order_mark(&mut checked, (&name, path), &unit.text, station);
         if checked.found.iter().any(|d| d.severity == Severity::Error) {
             return Err(checked);
         }

@@ -10,6 +10,7 @@ use gr_text::Diagnostic;
 use gr_text::figures::{duration, number};
 
 use crate::emit::{Artifact, Goal};
+use crate::commands::check::Checked;
 use crate::pipeline::Motion;
 
 /// Options of robot programs.
@@ -288,7 +289,7 @@ fn short(v: f64) -> String {
 }
 
 /// Adds to the findings of a program what the robot has to say, when the program itself is good.
-pub fn ask(name: &str, text: &str, machine: &Machine, setup: &gr_interp::Setup, checked: &mut crate::commands::check::Checked) {
+pub fn ask(name: &str, text: &str, machine: &Machine, setup: &gr_interp::Setup, checked: &mut Checked) {
     let bad = checked.found.iter().any(|d| d.severity == gr_text::Severity::Error);
     if bad || !gr_robot::along::is_planned(machine) {
         return;
@@ -413,7 +414,7 @@ fn corners_kept(program: &gr_robot::RobotProgram, texts: &dyn Sources) -> Option
 }
 
 /// How exactly the joint values of a program put the tool where it should be.
-pub fn verify(unit: &crate::pipeline::Unit, machine: &Machine, args: &crate::options::VerifyArgs) -> Result<Result<gr_robot::verify::Report, String>, crate::commands::check::Checked> {
+pub fn verify(unit: &crate::pipeline::Unit, machine: &Machine, args: &crate::options::VerifyArgs) -> Result<Result<gr_robot::verify::Report, String>, Checked> {
     use crate::emit::Reference;
     let name = crate::emit::stem(&unit.path);
     if args.options.reference == Some(Reference::Ufsc2016) {
@@ -428,7 +429,7 @@ pub fn verify(unit: &crate::pipeline::Unit, machine: &Machine, args: &crate::opt
         Ok(Ok((planned, _))) => Ok(Ok(gr_robot::verify::Report::of(&planned))),
         Ok(Err(found)) => {
             drop(texts);
-            Err(crate::commands::check::Checked { sources: motion.sources, found, more: 0, unreadable: false })
+            Err(Checked { sources: motion.sources, found, ..Checked::nothing() })
         }
     }
 }

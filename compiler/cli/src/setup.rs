@@ -11,7 +11,7 @@ use gr_text::{Code, Diagnostic, FileId, Severity, Span, code};
 use crate::commands::complain;
 use crate::options::{LintArgs, SetupArgs, UnitArg};
 use crate::project::{Project, Step, lint, place};
-use crate::render::Renderer;
+use crate::render::{Renderer, Tally};
 use crate::sources::{Sources, read};
 
 /// Everything a run needs that does not depend on the program.
@@ -58,9 +58,16 @@ impl Levels {
     }
     /// The severity that a finding has in the end.
     pub fn harden(&self, d: &mut Diagnostic) {
-        if self.strict && d.severity == Severity::Warning {
-            d.severity = Severity::Error;
-        }
+        d.severity = self.severity(d.severity);
+    }
+    fn severity(&self, severity: Severity) -> Severity {
+        if self.strict && severity == Severity::Warning { Severity::Error } else { severity }
+    }
+    /// Findings that are only counted.
+    pub fn tally(&self, unlisted: &gr_driver::Unlisted) -> Tally {
+        let mut tally = Tally::default();
+        unlisted.iter().for_each(|((_, severity), n)| tally.add(self.severity(*severity), *n));
+        tally
     }
 }
 

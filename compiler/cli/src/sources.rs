@@ -2,9 +2,8 @@
 
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
-use gr_text::{Decoded, Diagnostic, Encoding, FileId, LineIndex, Span, code, decode};
+use gr_text::{Decoded, Diagnostic, Encoding, FileId, LineMarks, Span, Text, code, decode};
 
 /// A program has fewer bytes than this.
 const MAX_BYTES: u64 = i32::MAX as u64;
@@ -15,7 +14,7 @@ pub struct SourceFile {
     /// As the user named it.
     pub name: String,
     /// Decoded text; empty when the file could not be read.
-    pub text: Arc<str>,
+    pub text: Text,
 }
 
 /// All files that diagnostics of a run may point into.
@@ -26,7 +25,7 @@ pub struct Sources {
 
 impl Sources {
     /// Adds a file.
-    pub fn add(&mut self, name: impl Into<String>, text: impl Into<Arc<str>>) -> FileId {
+    pub fn add(&mut self, name: impl Into<String>, text: impl Into<Text>) -> FileId {
         self.files.push(SourceFile { name: name.into(), text: text.into() });
         FileId(self.files.len() as u32 - 1)
     }
@@ -44,27 +43,30 @@ impl Sources {
     }
 }
 
-/// Line index of the file that was asked for last: findings come in order of files.
+/// Lines of the file that was asked for last: findings come in order of files.
 #[derive(Default)]
 pub struct Positions {
-    last: Option<(FileId, LineIndex)>,
+    last: Option<(FileId, LineMarks)>,
 }
 
 impl Positions {
     /// Line and column (in characters) of an offset, both from 1.
     pub fn of(&mut self, sources: &Sources, file: FileId, offset: u32) -> (u32, u32) {
         let Some(source) = sources.get(file) else { return (1, 1) };
-        let index = self.index(source, file);
-        let (line, _) = index.position(offset.min(source.text.len() as u32));
-        let start = index.start(line as usize) as usize;
+        let at = offset.min(source.text.len() as u32);
+        let (line, column) = self.marks(source, file).position(source.text.as_bytes(), at);
+        let start = (at - column) as usize;
         let end = floor(&source.text, (offset as usize).min(source.text.len()));
         let column = source.text.get(start..end).map_or(0, |s| s.chars().count());
         (line + 1, column as u32 + 1)
     }
-    /// The index of a file's lines.
-    pub fn index(&mut self, source: &SourceFile, file: FileId) -> &LineIndex {
+    /// First byte of a line.
+    pub fn start(&mut self, source: &SourceFile, file: FileId, line: u32) -> usize {
+        self.marks(source, file).start(source.text.as_bytes(), line as usize) as usize
+    }
+    fn marks(&mut self, source: &SourceFile, file: FileId) -> &LineMarks {
         if self.last.as_ref().is_none_or(|(f, _)| *f != file) {
-            self.last = Some((file, LineIndex::new(source.text.as_bytes())));
+            self.last = Some((file, LineMarks::new(source.text.as_bytes())));
         }
         &self.last.as_ref().expect("just set").1
     }

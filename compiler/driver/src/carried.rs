@@ -14,7 +14,7 @@ use crate::layout::Starts;
 use crate::library::Came;
 use crate::lints::{Found, Summary, Where};
 
-/// What control flow has left behind. Labels of the main file are on lines of their chunks.
+/// What control flow has left behind. Labels of the main file stand in their chunks.
 ///
 /// A program may have as many labels as lines, and most stretches add few: labels stand in layers that are shared, each
 /// more than twice as big as the next.
@@ -34,9 +34,19 @@ struct Layer {
 
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 struct Label {
+    /// In the main file: as if it were on line 0.
     at: LabelAt,
-    /// The chunk, when it is a label of the main file; its line is one of the chunk then.
-    home: Option<ChunkText>,
+    /// Where it is in the main file.
+    home: Option<Home>,
+}
+
+/// A place in the main file that edits of other lines leave as it is.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+pub(crate) enum Home {
+    /// The chunk and its statement.
+    Statement(ChunkText, u32),
+    /// The chunk and its line.
+    Line(ChunkText, u32),
 }
 
 impl PartialEq for Layer {
@@ -68,15 +78,14 @@ impl Layer {
 
 impl Carried {
     /// What a run that began with this leaves behind. Lines of `met` are those of the file.
-    pub(crate) fn after(&self, carry: Carry, met: Met, main: FileId, starts: &Starts) -> Carried {
+    pub(crate) fn after(&self, carry: Carry, met: Met, main: FileId, place: &dyn Fn(u32) -> Option<Home>) -> Carried {
         let before = if met.forgot { Carried::default() } else { self.clone() };
         let Carried { mut layers, files, .. } = before;
         let mut files = files.into_vec();
         let mut added = FxHashMap::default();
         for (name, at) in met.labels {
-            let home = if at.file() == main { starts.holding(at.line()) } else { None };
-            let at = home.map_or(at, |(_, first)| at.on_line(at.line() - first));
-            added.insert(name, Label { at, home: home.map(|(chunk, _)| chunk) });
+            let home = if at.file() == main { place(at.line()) } else { None };
+            added.insert(name, Label { at: home.map_or(at, |_| at.on_line(0)), home });
             if let Err(place) = files.binary_search(&at.file()) {
                 files.insert(place, at.file());
             }
@@ -91,8 +100,8 @@ impl Carried {
         }
         Carried { carry, layers, files: files.into() }
     }
-    /// Where a label is: its line, and the chunk that the line counts from.
-    pub(crate) fn label(&self, name: &LabelName) -> Option<(LabelAt, Option<ChunkText>)> {
+    /// Where a label is.
+    pub(crate) fn label(&self, name: &LabelName) -> Option<(LabelAt, Option<Home>)> {
         let label = self.layers.iter().rev().find_map(|layer| layer.labels.get(name))?;
         Some((label.at, label.home))
     }

@@ -16,33 +16,79 @@ use crate::layout::{Layout, bytes, layout};
 use crate::library::sub_file;
 use crate::engine::End;
 use crate::lints::Found;
-use crate::timeline::{Group, Timeline, timeline, timeline_to};
+use crate::timeline::{Group, Story, timeline, timeline_to, told_once};
 
 /// What a check gives.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Check {
     /// In file order.
     pub diagnostics: Vec<Diagnostic>,
-    /// Diagnostics beyond the limit of [`MOST_OF_A_KIND`] for each code, not listed.
-    pub more: usize,
+    /// Those that are not listed: beyond the limit of [`MOST_OF_A_KIND`] for each code.
+    pub unlisted: Unlisted,
 }
 
+/// Number of diagnostics of each kind that are not listed.
+pub type Unlisted = BTreeMap<(Code, Severity), usize>;
+
 impl Check {
-    /// Number of diagnostics of a severity.
+    /// Number of diagnostics of a severity, listed or not.
     pub fn count(&self, severity: Severity) -> usize {
-        self.diagnostics.iter().filter(|d| d.severity == severity).count()
+        let unlisted: usize = self.unlisted.iter().filter(|((_, s), _)| *s == severity).map(|(_, n)| n).sum();
+        unlisted + self.diagnostics.iter().filter(|d| d.severity == severity).count()
     }
 }
 
 /// Diagnostics of one code that are listed.
 pub const MOST_OF_A_KIND: usize = 1000;
 
+/// Chunks of a file that is worth more than one thread.
+const MANY: usize = 64;
+
+/// Scans a file that was not looked at yet in two threads: nothing else of a check can be done beside anything.
+fn scan_all(db: &Database, document: Document) {
+    let (chunks, run) = (document.chunks(db), document.run(db));
+    let new = db.present().get(document.id(db)).is_empty();
+    if !new || chunks.len() < MANY || db.recent().is_some() {
+        return;
+    }
+    let (front, back) = chunks.split_at(chunks.len() / 2);
+    let other = db.clone();
+    std::thread::scope(|scope| {
+        scope.spawn(move || {
+            let work = std::panic::AssertUnwindSafe(|| back.iter().for_each(|c| _ = shape(&other, *c, run)));
+            // Cancelled: this thread's caller is going to be, too.
+            let _ = salsa::Cancelled::catch(work);
+        });
+        front.iter().for_each(|c| _ = shape(db, *c, run));
+    });
+}
+
 /// Everything that is to be said about a file.
 pub(crate) fn check(db: &Database, document: Document) -> Check {
+    scan_all(db, document);
     if let Some(diagnostics) = crate::ufmg::check(db, document) {
-        return Check { diagnostics, more: 0 };
+        return Check { diagnostics, unlisted: Unlisted::new() };
     }
-    Assembly::new(db, document, timeline(db, document)).finish(None)
+    Assembly::new(db, document, &timeline(db, document).story).finish(None)
+}
+
+/// The same for a document that is looked at once.
+pub(crate) fn check_once(db: &Database, document: Document) -> Check {
+    if db.recent().is_none() || crate::ufmg::speaks(db, document) {
+        return check(db, document);
+    }
+    Assembly::new(db, document, &told_once(db, document)).finish(None)
+}
+
+/// What tells one diagnostic from another: the same finding in every pass of a loop is one.
+pub(crate) type Key = (FileId, u32, Code, Option<u8>, Option<(u32, u32)>);
+
+/// The key of a finding of a group.
+pub(crate) fn key(found: &Found, group: &Group, main: FileId) -> Key {
+    let own = group.frames.is_none() || found.place.file == main;
+    let file = if own { main } else { found.place.file };
+    let line = found.place.line.wrapping_add(group.first_line);
+    (file, line, found.code, found.letter, found.span.map(|s| (s.start, s.end)))
 }
 
 /// What is to be said about some lines, as far as the blocks up to their end tell it.
@@ -52,8 +98,9 @@ pub(crate) fn check_range(db: &Database, document: Document, lines: Range<u32>) 
         found.retain(|d| lines.contains(&line(d.primary().1)));
         return found;
     }
+    scan_all(db, document);
     let last = lines.end.saturating_sub(1).max(lines.start);
-    Assembly::new(db, document, timeline_to(db, document, last)).finish(Some(lines)).diagnostics
+    Assembly::new(db, document, &timeline_to(db, document, last).story).finish(Some(lines)).diagnostics
 }
 
 /// The line of a byte of a file.
@@ -72,19 +119,18 @@ struct Assembly<'a> {
     layout: &'a Layout,
     /// First byte of each chunk.
     bytes: OnceCell<Vec<u32>>,
-    timeline: &'a Timeline<'a>,
-    /// The same finding in every pass of a loop is one diagnostic.
-    seen: BTreeMap<(FileId, u32, Code, Option<u8>, Option<(u32, u32)>), usize>,
+    story: &'a Story,
+    seen: BTreeMap<Key, usize>,
     /// Lines of this file with a diagnostic.
     told: BTreeSet<u32>,
     per_code: BTreeMap<Code, usize>,
     out: Vec<Diagnostic>,
     passes: Vec<usize>,
-    more: usize,
+    unlisted: Unlisted,
 }
 
 impl<'a> Assembly<'a> {
-    fn new(db: &'a dyn Db, document: Document, timeline: &'a Timeline<'a>) -> Self {
+    fn new(db: &'a dyn Db, document: Document, story: &'a Story) -> Self {
         let id = FileId(document.id(db));
         Assembly {
             db,
@@ -92,19 +138,19 @@ impl<'a> Assembly<'a> {
             id,
             layout: layout(db, document),
             bytes: OnceCell::new(),
-            timeline,
+            story,
             seen: BTreeMap::new(),
             told: BTreeSet::new(),
             per_code: BTreeMap::new(),
             out: Vec::new(),
             passes: Vec::new(),
-            more: 0,
+            unlisted: story.unlisted.clone(),
         }
     }
 
     fn finish(mut self, lines: Option<Range<u32>>) -> Check {
-        let timeline = self.timeline;
-        for group in &timeline.groups {
+        let story = self.story;
+        for group in &story.groups {
             for found in group.found.iter() {
                 self.add(found, group, lines.as_ref());
             }
@@ -116,27 +162,23 @@ impl<'a> Assembly<'a> {
             }
         }
         self.out.sort_by_key(|d| (d.primary().0, d.primary().1.start, d.severity, d.code));
-        Check { diagnostics: self.out, more: self.more }
+        Check { diagnostics: self.out, unlisted: self.unlisted }
     }
 
     fn add(&mut self, found: &Found, group: &Group, lines: Option<&Range<u32>>) {
-        let line = found.place.line.wrapping_add(group.first_line);
-        let own = group.frames.is_none() || found.place.file == self.id;
-        let file = if own { self.id } else { found.place.file };
+        let key = key(found, group, self.id);
+        let (file, line) = (key.0, key.1);
+        let own = file == self.id;
         if let Some(lines) = lines
             && (!own || !lines.contains(&line))
         {
             return;
         }
-        let key = (file, line, found.code, found.letter, found.span.map(|s| (s.start, s.end)));
         if let Some(at) = self.seen.get(&key) {
             self.passes[*at] += 1;
             return;
         }
-        let count = self.per_code.entry(found.code).or_default();
-        *count += 1;
-        if *count > MOST_OF_A_KIND {
-            self.more += 1;
+        if self.is_full(found.code, found.severity) {
             return;
         }
         let mut d = match self.source(file, line) {
@@ -153,6 +195,17 @@ impl<'a> Assembly<'a> {
         self.seen.insert(key, self.out.len());
         self.out.push(d);
         self.passes.push(1);
+    }
+
+    /// Counts a diagnostic; true: there is no room for it in the list.
+    fn is_full(&mut self, code: Code, severity: Severity) -> bool {
+        let count = self.per_code.entry(code).or_default();
+        *count += 1;
+        let full = *count > MOST_OF_A_KIND;
+        if full {
+            *self.unlisted.entry((code, severity)).or_default() += 1;
+        }
+        full
     }
 
     fn first_byte(&self, chunk: usize) -> u32 {
@@ -191,7 +244,7 @@ impl<'a> Assembly<'a> {
 
     /// Damaged lines that execution never came to: hints, when the program ran to its end.
     fn never_run(&mut self, lines: Option<&Range<u32>>) {
-        if !self.timeline.complete || matches!(self.timeline.end, Some(End { stopped: true, .. })) {
+        if !self.story.complete || matches!(self.story.end, Some(End { stopped: true, .. })) {
             return;
         }
         let run = self.document.run(self.db);
@@ -212,6 +265,10 @@ impl<'a> Assembly<'a> {
                     continue;
                 }
                 last = line;
+                let severity = code::LINE_NEVER_RUN.def().severity;
+                if self.is_full(code::LINE_NEVER_RUN, severity) {
+                    continue;
+                }
                 let d = Diagnostic::new(code::LINE_NEVER_RUN, self.id, fault.span.shifted(start), &[]);
                 self.out.push(d.note(gr_spec::fill(fault.code.def().message, &fault.args)));
                 self.passes.push(1);

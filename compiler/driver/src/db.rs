@@ -1,11 +1,11 @@
 //! The salsa database: inputs and the queries about one chunk that need no interpretation.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 use std::path::PathBuf;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use gr_gcode::{Form, Keyword, LineKind, Node, OLabel, Scan};
+use gr_gcode::{Form, Keyword, LineKind, Node, OLabel, Parameter, Scan};
 
 /// Which query ran: for the tests and benchmarks that count re-executed queries.
 #[derive(Clone, Copy, Debug)]
@@ -49,6 +49,8 @@ pub(crate) trait Db: salsa::Database {
     fn disk(&self) -> &crate::disk::Disk;
     /// Where chunks begin at present.
     fn present(&self) -> &crate::layout::Present;
+    /// The program is looked at once, and what is not needed any more is forgotten.
+    fn recent(&self) -> Option<&Recent>;
 }
 
 /// The database.
@@ -59,6 +61,7 @@ pub(crate) struct Database {
     counters: Arc<Counters>,
     disk: Arc<crate::disk::Disk>,
     present: Arc<crate::layout::Present>,
+    recent: Option<Arc<Recent>>,
 }
 
 #[salsa::db]
@@ -75,19 +78,27 @@ impl Db for Database {
     fn present(&self) -> &crate::layout::Present {
         &self.present
     }
+    fn recent(&self) -> Option<&Recent> {
+        self.recent.as_deref()
+    }
 }
 
 impl Database {
+    /// For files that are looked at once and never edited.
+    pub(crate) fn once() -> Database {
+        Database { recent: Some(Arc::default()), ..Database::default() }
+    }
     pub(crate) fn executed(&self) -> Executed {
         self.counters.get()
     }
 }
 
-/// A chunk's text.
+/// A chunk's text. Most chunks are never edited: they begin with high durability, and what depends on such chunks alone
+/// is known to hold without a look at each of them.
 #[salsa::input(debug)]
 pub(crate) struct ChunkText {
     #[returns(ref)]
-    pub(crate) text: Arc<str>,
+    pub(crate) text: gr_text::Text,
 }
 
 /// An open file.
@@ -123,10 +134,45 @@ pub(crate) struct RunOptions {
 }
 
 /// Tables of a chunk.
-#[salsa::tracked(returns(clone), no_eq)]
 pub(crate) fn scanned(db: &dyn Db, chunk: ChunkText, run: RunOptions) -> Arc<Scan> {
+    match db.recent() {
+        Some(recent) => recent.scan(chunk, || scan(db, chunk, run)),
+        None => remembered_scan(db, chunk, run),
+    }
+}
+
+#[salsa::tracked(returns(clone), no_eq)]
+fn remembered_scan(db: &dyn Db, chunk: ChunkText, run: RunOptions) -> Arc<Scan> {
+    scan(db, chunk, run)
+}
+
+fn scan(db: &dyn Db, chunk: ChunkText, run: RunOptions) -> Arc<Scan> {
     db.count(Counted::Scan);
     Arc::new(gr_gcode::scan(chunk.text(db), run.options(db).setup.dialect))
+}
+
+/// Tables that were made last, in a session that looks at a program once: the tables of a whole program need several
+/// times as much memory as its text.
+#[derive(Default)]
+pub(crate) struct Recent(Mutex<VecDeque<(ChunkText, Arc<Scan>)>>);
+
+/// Chunks whose tables are kept in such a session, at any place.
+pub(crate) const MOST_RECENT: usize = 64;
+
+impl Recent {
+    fn scan(&self, chunk: ChunkText, make: impl FnOnce() -> Arc<Scan>) -> Arc<Scan> {
+        let lock = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, scan)) = lock().iter().rev().find(|(c, _)| *c == chunk) {
+            return scan.clone();
+        }
+        let scan = make();
+        let mut kept = lock();
+        if kept.len() == MOST_RECENT {
+            kept.pop_front();
+        }
+        kept.push_back((chunk, scan.clone()));
+        scan
+    }
 }
 
 /// What a chunk holds that matters to more than itself.
@@ -164,6 +210,25 @@ pub(crate) struct Shape {
     pub(crate) first_control: Option<u32>,
     /// The first line that ends with a carriage return alone.
     pub(crate) lone_return: Option<u32>,
+    /// Parameters by their names; none: only a run can tell which are read.
+    pub(crate) parameters: Option<Parameters>,
+}
+
+/// Parameters of a chunk, ascending, each once.
+#[derive(Clone, PartialEq, Eq, Debug, Default)]
+pub(crate) struct Parameters {
+    pub(crate) reads: Box<[Parameter]>,
+    pub(crate) writes: Box<[Parameter]>,
+}
+
+impl Parameters {
+    fn of(text: &str, scan: &Scan) -> Option<Parameters> {
+        let symbols = gr_gcode::symbols(text, scan);
+        let mut writes: Vec<Parameter> = symbols.writes.iter().map(|s| s.what.clone()).collect();
+        writes.sort();
+        writes.dedup();
+        (!symbols.reads_dynamic).then(|| Parameters { reads: symbols.parameters_read().into(), writes: writes.into() })
+    }
 }
 
 /// What a stretch of a chunk is.
@@ -306,6 +371,8 @@ pub(crate) fn shape_of(scan: &Scan, text: &str, setup: &gr_interp::Setup) -> Sha
             }
         }
     }
+    let named = shape.environment || shape.control;
+    shape.parameters = if named { Parameters::of(text, scan) } else { Some(Parameters::default()) };
     shape.labels = labels.into();
     shape.outline = outline.into();
     crate::layout::line_shapes(&mut shape, scan, text);

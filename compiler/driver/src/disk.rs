@@ -6,6 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use gr_canon::FileId;
 use gr_gcode::{Chunk, File};
 use gr_spec::Dialect;
+use gr_text::Text;
 
 /// Every file of a session by number: open ones and those found on disk.
 #[derive(Debug, Default)]
@@ -57,7 +58,7 @@ impl Disk {
         if !path.is_file() {
             return None;
         }
-        let text = read_as(std::fs::read(path).ok()?, dialect);
+        let text = read_as(std::fs::read(path).ok()?, dialect).into();
         let file = Arc::new(file_of(&name, &text, CHUNK, dialect));
         // Another query may have read the file meanwhile.
         let mut files = self.lock();
@@ -83,10 +84,10 @@ pub(crate) fn read_as(bytes: Vec<u8>, dialect: &Dialect) -> String {
 }
 
 /// Scans a whole text.
-pub(crate) fn file_of(path: &str, text: &str, lines_per_chunk: usize, dialect: &'static Dialect) -> File {
+pub(crate) fn file_of(path: &str, text: &Text, lines_per_chunk: usize, dialect: &'static Dialect) -> File {
     let chunks = crate::store::split(text, lines_per_chunk)
         .into_iter()
-        .map(|part| Chunk { text: part.into(), scan: Arc::new(gr_gcode::scan(part, dialect)) })
+        .map(|part| Chunk { scan: Arc::new(gr_gcode::scan(&part, dialect)), text: part })
         .collect();
     File::new(path, chunks)
 }

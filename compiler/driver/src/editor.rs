@@ -13,7 +13,7 @@ use gr_ir::{Lowering, Pose, Program};
 use crate::db::{Database, Document, shape};
 use crate::layout::layout;
 use crate::library::whole;
-use crate::timeline::{nearest, timeline_to};
+use crate::timeline::{nearest, timeline_to, timeline_with_all_to};
 
 /// A block as execution comes to it for the first time.
 #[derive(Clone, Debug)]
@@ -45,7 +45,11 @@ pub(crate) fn trace(db: &Database, document: Document, lines: &Range<u32>, wante
 }
 
 fn run(db: &Database, document: Document, lines: &Range<u32>, wanted: &[Parameter], budget: u32) -> Option<Vec<Traced>> {
-    let timeline = timeline_to(db, document, lines.end.saturating_sub(1));
+    let last = lines.end.saturating_sub(1);
+    // The state between chunks may lack what nothing reads but who asks.
+    let unread = crate::layout::unread(db, document);
+    let lacking = wanted.iter().any(|p| unread.contains(p));
+    let timeline = if lacking { timeline_with_all_to(db, document, last) } else { timeline_to(db, document, last) };
     let starts = &layout(db, document).starts;
     let count = *starts.last()?;
     if lines.start >= count || lines.is_empty() {

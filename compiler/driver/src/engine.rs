@@ -9,9 +9,9 @@ use gr_interp::{Files, Finding, Interp, Modal, Params, State, run_lines};
 use gr_spec::code;
 
 use crate::Options;
-use crate::carried::Carried;
-use crate::db::{ChunkText, Db, Document};
-use crate::layout::{Layout, first_percent};
+use crate::carried::{Carried, Home};
+use crate::db::{ChunkText, Db, Document, shape};
+use crate::layout::{Layout, Starts, first_percent};
 use crate::library::{Came, Library};
 use crate::lints::{Flags, Found, From, Lints, Seen, Summary, Where, left_on};
 
@@ -80,6 +80,15 @@ impl Hash for Boundary {
 #[derive(Clone, Debug)]
 pub(crate) struct Environment {
     params: Params,
+}
+
+impl Environment {
+    /// The same without some parameters.
+    pub(crate) fn without(&self, parameters: &[gr_gcode::Parameter]) -> Environment {
+        let mut params = self.params.clone();
+        parameters.iter().for_each(|p| params.forget(p));
+        Environment { params }
+    }
 }
 
 impl PartialEq for Environment {
@@ -161,7 +170,7 @@ impl<S: Sink> Sink for LastLine<S> {
 /// State before the first block of a program that begins with `%` or not.
 pub(crate) fn start(options: &Options, percent: bool) -> (Boundary, Environment) {
     let text = if percent { "%\n" } else { "(x)\n" };
-    let mut files = Single::new(crate::disk::file_of("", text, 1, options.setup.dialect));
+    let mut files = Single::new(crate::disk::file_of("", &text.into(), 1, options.setup.dialect));
     let mut interp = Interp::new(&mut files, &options.setup, Discard);
     interp.init();
     // It can't fail: the text has a line.
@@ -300,6 +309,13 @@ pub(crate) struct Stretch<'a> {
 }
 
 impl<'a> Stretch<'a> {
+    /// Where a line of the main file is, as labels are remembered.
+    fn place_of(&self, starts: &Starts, line: u32) -> Option<Home> {
+        let (chunk, first) = starts.holding(line)?;
+        let statements = &shape(self.db, chunk, self.document.run(self.db)).statements;
+        let statement = statements.binary_search_by_key(&(line - first), |s| s.line).ok();
+        Some(statement.map_or(Home::Line(chunk, line - first), |n| Home::Statement(chunk, n as u32)))
+    }
     /// The files it may need.
     pub(crate) fn library(&self) -> Library<'a> {
         let starts = self.db.present().get(self.document.id(self.db));
@@ -373,7 +389,7 @@ pub(crate) fn flow(stretch: &Stretch<'_>) -> FlowOutcome {
     let why = interp.run_until(&|l| l > line && starts.begins(l));
     let next = if why.is_none() { Some(interp.next_line()) } else { None };
     let (mut state, environment) = (interp.state(), Environment { params: interp.params().clone() });
-    let carried = stretch.carried.after(interp.carry(), interp.met(), main, &starts);
+    let carried = stretch.carried.after(interp.carry(), interp.met(), main, &|line| stretch.place_of(&starts, line));
     let main_line = interp.main_line();
     let mut findings = interp.take_findings();
     let others: Vec<FileId> = interp.opened_files().iter().copied().filter(|f| *f != main).collect();

@@ -3,13 +3,14 @@
 //! ([`follows`], [`next_stop`]) is remembered one by one, so that they are run again only when their own answers
 //! change.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Deref;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use gr_canon::FileId;
-use gr_gcode::LineKind;
-use rustc_hash::FxHashMap;
+use gr_gcode::{LineKind, Parameter};
+use gr_spec::Family;
+use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::db::{ChunkText, Db, Document, Outline, Shape, shape};
 use crate::engine;
@@ -53,17 +54,30 @@ pub(crate) struct Layout {
 }
 
 /// First line of each chunk, and after the last one the number of lines.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, PartialEq, Debug, Default)]
 pub(crate) struct Starts {
     lines: Box<[u32]>,
-    chunks: Box<[ChunkText]>,
+    order: Arc<Order>,
+}
+
+/// How the chunks follow each other.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Order {
+    chunks: Arc<[ChunkText]>,
     index: FxHashMap<ChunkText, u32>,
 }
 
-impl PartialEq for Starts {
-    fn eq(&self, other: &Starts) -> bool {
-        self.lines == other.lines && self.chunks == other.chunks
+impl PartialEq for Order {
+    fn eq(&self, other: &Order) -> bool {
+        self.chunks == other.chunks
     }
+}
+
+/// The order of a file's chunks: most edits leave it as it is.
+#[salsa::tracked(returns(ref))]
+fn order(db: &dyn Db, document: Document) -> Arc<Order> {
+    let chunks = document.chunks(db).clone();
+    Arc::new(Order { index: chunks.iter().zip(0..).map(|(c, i)| (*c, i)).collect(), chunks })
 }
 
 impl Deref for Starts {
@@ -74,12 +88,9 @@ impl Deref for Starts {
 }
 
 impl Starts {
-    fn new(lines: Vec<u32>, chunks: &[ChunkText]) -> Starts {
-        Starts { lines: lines.into(), chunks: chunks.into(), index: chunks.iter().zip(0..).map(|(c, i)| (*c, i)).collect() }
-    }
     /// Number of a chunk.
     pub(crate) fn index_of(&self, chunk: ChunkText) -> Option<usize> {
-        self.index.get(&chunk).map(|i| *i as usize)
+        self.order.index.get(&chunk).map(|i| *i as usize)
     }
     /// First line of a chunk.
     pub(crate) fn of(&self, chunk: ChunkText) -> Option<u32> {
@@ -91,7 +102,7 @@ impl Starts {
             return None;
         }
         let at = self.lines.partition_point(|s| *s <= line).checked_sub(1)?;
-        Some((*self.chunks.get(at)?, self.lines[at]))
+        Some((*self.order.chunks.get(at)?, self.lines[at]))
     }
     /// A chunk begins on this line, or the file ends before it.
     pub(crate) fn begins(&self, line: u32) -> bool {
@@ -144,7 +155,7 @@ pub(crate) fn layout(db: &dyn Db, document: Document) -> Layout {
     let mut labels = Vec::new();
     crate::lints::labels(&shapes, &starts, options, &mut labels);
     labels.iter_mut().for_each(|f| f.place.file = main);
-    let starts = Arc::new(Starts::new(starts, chunks));
+    let starts = Arc::new(Starts { lines: starts.into(), order: order(db, document).clone() });
     db.present().set(main.0, starts.clone());
     Layout {
         parts: parts.into(),
@@ -177,8 +188,8 @@ pub(crate) fn bytes(db: &dyn Db, document: Document) -> Vec<u32> {
 /// The chunk behind a chunk.
 #[salsa::tracked(returns(copy))]
 pub(crate) fn follows(db: &dyn Db, document: Document, chunk: ChunkText) -> Option<ChunkText> {
-    let layout = layout(db, document);
-    layout.parts.get(layout.starts.index_of(chunk)? + 1).map(|p| p.chunk)
+    let order = order(db, document);
+    order.chunks.get(*order.index.get(&chunk)? as usize + 1).copied()
 }
 
 /// First line of a chunk.
@@ -195,6 +206,34 @@ pub(crate) fn next_stop(db: &dyn Db, document: Document, chunk: ChunkText) -> Op
     let line = *stops.get(stops.partition_point(|l| *l < behind))?;
     let (chunk, first_line) = starts.holding(line)?;
     Some((chunk, line - first_line))
+}
+
+/// Parameters that are set and that nothing in the file reads: the state between chunks may leave them out. Files that
+/// it calls may read them.
+#[salsa::tracked(returns(ref))]
+pub(crate) fn unread(db: &dyn Db, document: Document) -> Box<[Parameter]> {
+    let run = document.run(db);
+    let setup = &run.options(db).setup;
+    // Other controls have variables with a meaning of their own, and a remapped code reads what its words have set.
+    if setup.dialect.family != Family::Linuxcnc || !setup.ini.all("rs274ngc", "remap").is_empty() {
+        return Box::default();
+    }
+    let (mut reads, mut writes) = (FxHashSet::default(), BTreeSet::new());
+    for chunk in document.chunks(db).iter() {
+        let Some(parameters) = &shape(db, *chunk, run).parameters else { return Box::default() };
+        reads.extend(&parameters.reads);
+        writes.extend(&parameters.writes);
+    }
+    // A number is rounded when it is used, and may be written with decimals.
+    let read = |p: &Parameter| match p {
+        Parameter::Number(n) => (n.saturating_sub(1)..=n + 1).any(|n| reads.contains(&Parameter::Number(n))),
+        Parameter::Named(_) => reads.contains(p),
+    };
+    let own = |p: &Parameter| match p {
+        Parameter::Number(n) => (31..5000).contains(n),
+        Parameter::Named(name) => !name.starts_with("_"),
+    };
+    writes.into_iter().filter(|p| own(p) && !read(p)).cloned().collect()
 }
 
 /// Line of the first `%`.

@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 use gr_gcode::{Chunk, File};
 use gr_spec::Dialect;
+use gr_text::Text;
 
 /// Lines in a chunk; the tables of more would leave the processor's cache and fault in new pages.
 const CHUNK: usize = 1024;
@@ -14,7 +15,7 @@ const CHUNK: usize = 1024;
 /// A text that is scanned as it is read.
 pub struct Lazy {
     path: Box<str>,
-    text: Arc<str>,
+    text: Text,
     dialect: &'static Dialect,
     reading: RefCell<Reading>,
     whole: OnceCell<File>,
@@ -32,11 +33,11 @@ struct Reading {
 
 impl Lazy {
     /// Nothing is scanned yet.
-    pub fn new(path: &str, text: Arc<str>, dialect: &'static Dialect) -> Lazy {
+    pub fn new(path: &str, text: Text, dialect: &'static Dialect) -> Lazy {
         Lazy { path: path.into(), text, dialect, reading: RefCell::default(), whole: OnceCell::new() }
     }
     /// The text.
-    pub fn text(&self) -> &Arc<str> {
+    pub fn text(&self) -> &Text {
         &self.text
     }
     /// Its name.
@@ -86,7 +87,7 @@ impl Lazy {
             let scan = gr_gcode::scan(&rest[..end], self.dialect);
             reading.structured |= !scan.controls.is_empty() || !scan.faults.is_empty();
             reading.next = (from + end, first + scan.lines.len() as u32);
-            reading.last = Some((Chunk { text: rest[..end].into(), scan: Arc::new(scan) }, first));
+            reading.last = Some((Chunk { text: self.text.part(from..from + end), scan: Arc::new(scan) }, first));
         }
     }
 }
@@ -99,7 +100,7 @@ mod tests {
     fn lines_are_those_of_the_whole_file() {
         let text: String = (0..10_000).map(|i| format!("G1 X{i}\r\nY1\rZ2\n")).collect();
         let lazy = Lazy::new("a", text.as_str().into(), Dialect::linuxcnc());
-        let whole = crate::disk::file_of("a", &text, 77, Dialect::linuxcnc());
+        let whole = crate::disk::file_of("a", &text.as_str().into(), 77, Dialect::linuxcnc());
         let span = |(chunk, l, _): (Chunk, u32, u32)| chunk.text[chunk.scan.line_span(&chunk.text, l).range()].to_string();
         for line in (0..whole.line_count()).step_by(997) {
             let expected = text[whole.line_span(line).range()].to_string();

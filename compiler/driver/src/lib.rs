@@ -24,12 +24,12 @@ mod stream;
 mod timeline;
 mod ufmg;
 
-pub use check::{Check, MOST_OF_A_KIND};
+pub use check::{Check, MOST_OF_A_KIND, Unlisted};
 pub use db::Executed;
 pub use editor::Traced;
 pub use hover::StateAt;
 pub use lazy::Lazy;
 pub use lints::{Level, Rules};
 pub use rates::rates;
-pub use session::{Canceller, Cancelled, Options, Session, Snapshot};
+pub use session::{Cancelled, Canceller, Once, Options, Session, Snapshot, check_once};
 pub use stream::{Loaded, Motion, Streamed, lower, scan_file, stream};

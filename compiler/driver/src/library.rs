@@ -12,8 +12,8 @@ use gr_interp::{Files, LabelAt, LabelName};
 use rustc_hash::FxHashSet;
 
 use crate::Options;
-use crate::carried::Carried;
-use crate::db::{ChunkText, Db, Document, OpenFiles, RunOptions, scanned};
+use crate::carried::{Carried, Home};
+use crate::db::{ChunkText, Db, Document, MOST_RECENT, OpenFiles, RunOptions, scanned, shape};
 use crate::layout::{Starts, first_line, follows, layout, next_stop};
 
 /// The files a run may need: the main one, and others as they are called.
@@ -43,17 +43,13 @@ pub(crate) struct Library<'a> {
 /// A chunk of the main file that execution came to.
 struct Visited {
     input: ChunkText,
-    chunk: Chunk,
+    /// None: forgotten, see [`Library::make_room`].
+    chunk: Option<Chunk>,
+    lines: u32,
     /// What follows the chunk was asked for.
     left: bool,
     /// Lines of the file in it that skipping must look at.
     stops: Vec<u32>,
-}
-
-impl Visited {
-    fn lines(&self) -> u32 {
-        self.chunk.scan.lines.len() as u32
-    }
 }
 
 /// A chunk that a run came to, where it was then.
@@ -114,7 +110,7 @@ impl<'a> Library<'a> {
 
     /// The chunks of the main file that the run came to, in the order of their lines.
     pub(crate) fn came_to(&self) -> Box<[Came]> {
-        self.visited.borrow().iter().map(|(first, v)| Came { chunk: v.input, first: *first, lines: v.lines() }).collect()
+        self.visited.borrow().iter().map(|(first, v)| Came { chunk: v.input, first: *first, lines: v.lines }).collect()
     }
 
     fn keep(&mut self, id: FileId, file: Arc<File>) {
@@ -129,7 +125,7 @@ impl<'a> Library<'a> {
         let behind = self.leave(&mut visited, line);
         let known = |visited: &BTreeMap<u32, Visited>| {
             let (first, v) = visited.range(..=line).next_back()?;
-            (line - first < v.lines()).then_some(*first)
+            (line - first < v.lines).then_some(*first)
         };
         let first = match known(&visited) {
             Some(first) => first,
@@ -138,6 +134,7 @@ impl<'a> Library<'a> {
                     Some(next) => (next?, line),
                     None => self.holding(line)?,
                 };
+                self.make_room(&mut visited);
                 visited.insert(first, self.read(input, first));
                 first
             }
@@ -145,12 +142,23 @@ impl<'a> Library<'a> {
         visited.get(&first).map(|v| f(v, first))
     }
 
+    /// In a session that looks at a program once, not all of its tables are kept.
+    fn make_room(&self, visited: &mut BTreeMap<u32, Visited>) {
+        if self.db.recent().is_some() && visited.len() % MOST_RECENT == 0 {
+            visited.values_mut().for_each(|v| v.chunk = None);
+        }
+    }
+
+    fn tables(&self, input: ChunkText) -> Chunk {
+        Chunk { text: input.text(self.db).clone(), scan: scanned(self.db, input, self.run) }
+    }
+
     /// When a line is the first one behind a chunk that the run came to: what follows that chunk. The outer `None`: it
     /// is not, or was asked before.
     #[expect(clippy::option_option, reason = "nothing follows and not behind a chunk are two things")]
     fn leave(&self, visited: &mut BTreeMap<u32, Visited>, line: u32) -> Option<Option<ChunkText>> {
         let (first, before) = visited.range_mut(..line).next_back()?;
-        if before.left || line - first != before.lines() {
+        if before.left || line - first != before.lines {
             return None;
         }
         before.left = true;
@@ -165,13 +173,14 @@ impl<'a> Library<'a> {
     }
 
     fn read(&self, input: ChunkText, first: u32) -> Visited {
-        let scan = scanned(self.db, input, self.run);
+        let chunk = self.tables(input);
+        let scan = &chunk.scan;
         if self.remaps || scan.names.iter().any(|n| &**n == "_line") {
             // Its lines are more to the program than places.
             let _ = first_line(self.db, self.document, input);
         }
-        let stops = (0..scan.lines.len() as u32).filter(|l| gr_interp::is_stop(&scan, *l)).map(|l| l + first).collect();
-        Visited { input, chunk: Chunk { text: input.text(self.db).clone(), scan }, left: false, stops }
+        let stops = (0..scan.lines.len() as u32).filter(|l| gr_interp::is_stop(scan, *l)).map(|l| l + first).collect();
+        Visited { input, lines: scan.lines.len() as u32, chunk: Some(chunk), left: false, stops }
     }
 
     /// The first line behind a chunk that skipping must look at.
@@ -185,9 +194,13 @@ impl<'a> Library<'a> {
 impl Files for Library<'_> {
     fn earlier_label(&self, name: &LabelName) -> Option<LabelAt> {
         let (at, home) = self.carried?.label(name)?;
-        let Some(chunk) = home else { return Some(at) };
+        let (chunk, line) = match home {
+            None => return Some(at),
+            Some(Home::Line(chunk, line)) => (chunk, line),
+            Some(Home::Statement(chunk, n)) => (chunk, shape(self.db, chunk, self.run).statements.get(n as usize)?.line),
+        };
         self.granted.borrow_mut().insert(chunk);
-        Some(at.on_line(self.starts.of(chunk)? + at.line()))
+        Some(at.on_line(self.starts.of(chunk)? + line))
     }
     fn file(&self, id: FileId) -> &File {
         if id == self.main {
@@ -209,7 +222,7 @@ impl Files for Library<'_> {
     }
     fn chunk(&self, id: FileId, line: u32) -> Option<(Chunk, u32, u32)> {
         if id == self.main {
-            return self.visit(line, |v, first| (v.chunk.clone(), line - first, first));
+            return self.visit(line, |v, first| (v.chunk.clone().unwrap_or_else(|| self.tables(v.input)), line - first, first));
         }
         let file = self.file(id);
         let (c, l) = file.locate(line)?;

@@ -8,8 +8,8 @@ use gr_gcode::{Parameter, Symbols};
 use gr_interp::Setup;
 use gr_ir::Program;
 use gr_ir::measure::Report;
-use gr_text::{Diagnostic, FileId};
-use salsa::Setter as _;
+use gr_text::{Diagnostic, FileId, Text};
+use salsa::{Durability, Setter as _};
 
 use crate::check::{self, Check};
 use crate::db::{ChunkText, Database, Db as _, Document, Executed, OpenFiles, RunOptions};
@@ -53,22 +53,51 @@ pub struct Session {
 }
 
 impl Texts<ChunkText> for Database {
-    fn get(&self, input: ChunkText) -> Arc<str> {
+    fn get(&self, input: ChunkText) -> Text {
         input.text(self).clone()
     }
-    fn set(&mut self, input: ChunkText, text: Arc<str>) {
-        input.set_text(self).to(text);
+    fn set(&mut self, input: ChunkText, text: Text) {
+        // It is being edited, and will be again.
+        input.set_text(self).with_durability(Durability::LOW).to(text);
     }
-    fn create(&mut self, text: Arc<str>) -> ChunkText {
-        ChunkText::new(self, text)
+    fn create(&mut self, text: Text) -> ChunkText {
+        ChunkText::builder(text).durability(Durability::HIGH).new(self)
     }
 }
 
 impl Default for Session {
     fn default() -> Session {
-        let db = Database::default();
-        OpenFiles::new(&db, Arc::default());
-        Session { db, files: Vec::new() }
+        Session::of(Database::default())
+    }
+}
+
+/// A program that was looked at once: see [`check_once`].
+pub struct Once {
+    session: Session,
+    file: FileId,
+    text: Text,
+    /// Everything that is to be said about it.
+    pub check: Check,
+}
+
+/// Checks a program that nobody is going to edit: the same findings as those of [`Session::check`], in little more
+/// memory than the text needs, because what was found out about a part of the program is not kept for another time.
+pub fn check_once(path: &str, text: impl Into<Text>, options: Options) -> Once {
+    let text = text.into();
+    let mut session = Session::of(Database::once());
+    let file = session.open(path, &text, options);
+    let check = session.document(file).map_or_else(Check::default, |d| check::check_once(&session.db, d));
+    Once { session, file, text, check }
+}
+
+impl Once {
+    /// Path of any file that a diagnostic names.
+    pub fn path(&self, file: FileId) -> Option<Box<str>> {
+        self.session.path(file)
+    }
+    /// Text of any file that a diagnostic names.
+    pub fn text(&self, file: FileId) -> Option<Text> {
+        if file == self.file { Some(self.text.clone()) } else { self.session.any_text(file).map(Text::from) }
     }
 }
 
@@ -76,6 +105,11 @@ impl Session {
     /// No files.
     pub fn new() -> Session {
         Session::default()
+    }
+
+    fn of(db: Database) -> Session {
+        let _ = OpenFiles::builder(Arc::default()).durability(Durability::HIGH).new(&db);
+        Session { db, files: Vec::new() }
     }
 
     /// Programs that call subroutines find open files before those on disk.
@@ -89,19 +123,20 @@ impl Session {
     }
 
     /// Opens a text under a name, or gives an open file a new text and new options.
-    pub fn open(&mut self, path: &str, text: &str, options: Options) -> FileId {
+    pub fn open(&mut self, path: &str, text: impl Into<Text>, options: Options) -> FileId {
+        let text = text.into();
         let id = self.db.disk().register(path);
         let lines = memchr::memchr_iter(b'\n', text.as_bytes()).count();
         let k = options.chunk_lines.unwrap_or_else(|| chunk_lines(lines)).max(1);
         self.close(id);
-        let store = Store::new(text, k, &mut self.db);
+        let store = Store::new(&text, k, &mut self.db);
         let chunks: Arc<[ChunkText]> = store.pieces.iter().map(|p| p.input).collect();
         let index = id.0 as usize;
         if self.files.len() <= index {
             self.files.resize(index + 1, None);
         }
-        let run = RunOptions::new(&self.db, Arc::new(options), 0);
-        let document = Document::new(&self.db, chunks, run, id.0);
+        let run = RunOptions::builder(Arc::new(options), 0).durability(Durability::HIGH).new(&self.db);
+        let document = Document::builder(chunks, run, id.0).durability(Durability::HIGH).new(&self.db);
         self.files[index] = Some(Open { document, run, store });
         self.list_open_files();
         id
@@ -110,14 +145,14 @@ impl Session {
     /// Reads a file from disk and opens it.
     pub fn open_path(&mut self, path: &Path, options: Options) -> std::io::Result<FileId> {
         let text = gr_text::decode(std::fs::read(path)?).text;
-        Ok(self.open(&path.to_string_lossy(), &text, options))
+        Ok(self.open(&path.to_string_lossy(), text, options))
     }
 
     /// Forgets a file's text.
     pub fn close(&mut self, file: FileId) {
         if let Some(open) = self.files.get_mut(file.0 as usize).and_then(Option::take) {
             for piece in &open.store.pieces {
-                self.db.set(piece.input, "".into());
+                self.db.set(piece.input, Text::default());
             }
             open.document.set_chunks(&mut self.db).to(Arc::from([]));
             self.list_open_files();
@@ -136,7 +171,8 @@ impl Session {
     /// New options for an open file.
     pub fn set_options(&mut self, file: FileId, options: Options) {
         if let Some(Some(open)) = self.files.get(file.0 as usize) {
-            open.run.set_options(&mut self.db).to(Arc::new(options));
+            // What is interned under inputs of high durability stays in memory for good.
+            open.run.set_options(&mut self.db).with_durability(Durability::LOW).to(Arc::new(options));
         }
     }
 

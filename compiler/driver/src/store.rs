@@ -5,7 +5,8 @@
 //! word or a comment: G-code has no token that spans lines.
 
 use std::ops::Range;
-use std::sync::Arc;
+
+use gr_text::Text;
 
 /// Chunk size in lines for a file with this many lines.
 pub(crate) fn chunk_lines(lines: usize) -> usize {
@@ -37,19 +38,20 @@ pub(crate) struct Store<T> {
 /// What the store needs from the owner of the texts.
 pub(crate) trait Texts<T> {
     /// Text of an input.
-    fn get(&self, input: T) -> Arc<str>;
+    fn get(&self, input: T) -> Text;
     /// New text for an input.
-    fn set(&mut self, input: T, text: Arc<str>);
+    fn set(&mut self, input: T, text: Text);
     /// A new input.
-    fn create(&mut self, text: Arc<str>) -> T;
+    fn create(&mut self, text: Text) -> T;
 }
 
 impl<T: Copy> Store<T> {
     /// Splits `text` into chunks of about `k` lines.
-    pub(crate) fn new(text: &str, k: usize, texts: &mut impl Texts<T>) -> Store<T> {
+    pub(crate) fn new(text: &Text, k: usize, texts: &mut impl Texts<T>) -> Store<T> {
         let mut pieces = Vec::new();
         for part in split(text, k) {
-            pieces.push(Piece { input: texts.create(part.into()), len: part.len() as u32, feeds: feeds(part) });
+            let (len, feeds) = (part.len() as u32, feeds(&part));
+            pieces.push(Piece { input: texts.create(part), len, feeds });
         }
         Store { pieces, free: Vec::new(), k }
     }
@@ -86,7 +88,7 @@ impl<T: Copy> Store<T> {
         text.push_str(new);
         text.push_str(&tail[resume..]);
         self.absorb(&mut text, &mut first, &mut last, texts);
-        self.replace(first..last + 1, &text, texts)
+        self.replace(first..last + 1, &text.into(), texts)
     }
 
     /// Takes in neighbours while the text is too small or its last line is open.
@@ -107,8 +109,8 @@ impl<T: Copy> Store<T> {
     }
 
     /// Puts `text` in place of some chunks, re-using their inputs.
-    fn replace(&mut self, old: Range<usize>, text: &str, texts: &mut impl Texts<T>) -> bool {
-        let parts: Vec<&str> = if (feeds(text) as usize) > 2 * self.k { split(text, self.k) } else { vec![text] };
+    fn replace(&mut self, old: Range<usize>, text: &Text, texts: &mut impl Texts<T>) -> bool {
+        let parts = if (feeds(text) as usize) > 2 * self.k { split(text, self.k) } else { vec![text.clone()] };
         let same_count = parts.len() == old.len();
         let mut spare: Vec<T> = self.pieces[old.clone()].iter().map(|p| p.input).collect();
         spare.reverse();
@@ -116,17 +118,17 @@ impl<T: Copy> Store<T> {
         for part in parts {
             let input = match spare.pop().or_else(|| self.free.pop()) {
                 Some(input) => {
-                    if *texts.get(input) != *part {
-                        texts.set(input, part.into());
+                    if texts.get(input) != part {
+                        texts.set(input, part.clone());
                     }
                     input
                 }
-                None => texts.create(part.into()),
+                None => texts.create(part.clone()),
             };
-            fresh.push(Piece { input, len: part.len() as u32, feeds: feeds(part) });
+            fresh.push(Piece { input, len: part.len() as u32, feeds: feeds(&part) });
         }
         for input in spare {
-            texts.set(input, "".into());
+            texts.set(input, Text::default());
             self.free.push(input);
         }
         self.pieces.splice(old, fresh);
@@ -148,17 +150,17 @@ fn feeds(text: &str) -> u32 {
 }
 
 /// Cuts after every `k`-th line feed; at least one part.
-pub(crate) fn split(text: &str, k: usize) -> Vec<&str> {
+pub(crate) fn split(text: &Text, k: usize) -> Vec<Text> {
     let mut parts = Vec::new();
     let mut start = 0;
     for (n, at) in memchr::memchr_iter(b'\n', text.as_bytes()).enumerate() {
         if (n + 1) % k.max(1) == 0 {
-            parts.push(&text[start..=at]);
+            parts.push(text.part(start..at + 1));
             start = at + 1;
         }
     }
     if start < text.len() || parts.is_empty() {
-        parts.push(&text[start..]);
+        parts.push(text.part(start..text.len()));
     }
     parts
 }
@@ -185,16 +187,16 @@ mod tests {
     use proptest::prelude::*;
 
     #[derive(Default)]
-    struct Plain(Vec<Arc<str>>);
+    struct Plain(Vec<Text>);
 
     impl Texts<usize> for Plain {
-        fn get(&self, input: usize) -> Arc<str> {
+        fn get(&self, input: usize) -> Text {
             self.0[input].clone()
         }
-        fn set(&mut self, input: usize, text: Arc<str>) {
+        fn set(&mut self, input: usize, text: Text) {
             self.0[input] = text;
         }
-        fn create(&mut self, text: Arc<str>) -> usize {
+        fn create(&mut self, text: Text) -> usize {
             self.0.push(text);
             self.0.len() - 1
         }
@@ -219,7 +221,7 @@ mod tests {
             edits in proptest::collection::vec((0u32..80, 0u32..20, "[b\r\nü]{0,20}"), 0..12),
         ) {
             let mut texts = Plain::default();
-            let mut store = Store::new(&start, k, &mut texts);
+            let mut store = Store::new(&Text::from(&start), k, &mut texts);
             let mut expected = start;
             assert_shape(&store, &texts);
             for (at, len, new) in edits {
@@ -236,7 +238,7 @@ mod tests {
     #[test]
     fn inputs_are_reused() {
         let mut texts = Plain::default();
-        let mut store = Store::new(&"G1\n".repeat(64), 4, &mut texts);
+        let mut store = Store::new(&"G1\n".repeat(64).into(), 4, &mut texts);
         for _ in 0..50 {
             let len = store.len();
             store.edit(0..len, "", &mut texts);
@@ -248,7 +250,7 @@ mod tests {
     #[test]
     fn a_keystroke_touches_one_chunk() {
         let mut texts = Plain::default();
-        let mut store = Store::new(&"G1X1\n".repeat(64), 16, &mut texts);
+        let mut store = Store::new(&"G1X1\n".repeat(64).into(), 16, &mut texts);
         let before = texts.0.clone();
         assert!(!store.edit(103..104, "2", &mut texts));
         let changed = before.iter().zip(&texts.0).filter(|(a, b)| a != b).count();

@@ -2,17 +2,17 @@
 //!
 //! The program is scanned as it is read, so that a big file needs little more memory than its text. On request
 //! the lints watch the same run; when neither they nor the interpreter have anything to say the program is
-//! *clean*, and need not be checked again. Otherwise [`crate::Session::check`] says what there is to say: there is
+//! *clean*, and need not be checked again. Otherwise [`crate::check_once`] says what there is to say: there is
 //! one wording of findings, and it is there.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
-use std::sync::Arc;
 
 use gr_canon::{At, Call, CallFrame, FileId, FrameId, Mark, Sink};
 use gr_gcode::{Chunk, File};
 use gr_interp::{End, Files, Interp, Outcome, Setup};
 use gr_ir::{Lowering, Program};
+use gr_text::Text;
 
 use crate::db::{Shape, shape_of};
 use crate::lazy::Lazy;
@@ -30,7 +30,7 @@ pub struct Loaded {
 
 impl Loaded {
     /// The program and what it will be run with. Nothing is scanned yet.
-    pub fn new(path: &str, text: Arc<str>, setup: &Setup) -> Loaded {
+    pub fn new(path: &str, text: Text, setup: &Setup) -> Loaded {
         Loaded { main: Lazy::new(path, text, setup.dialect), subs: Vec::new(), known: BTreeMap::new(), setup: setup.clone() }
     }
     /// Subroutine files that were pulled in, in the order of their names.
@@ -38,7 +38,7 @@ impl Loaded {
         self.known.keys()
     }
     /// Names and texts of all files, under the numbers that the stream uses.
-    pub fn texts(&self) -> Vec<(Box<str>, Arc<str>)> {
+    pub fn texts(&self) -> Vec<(Box<str>, Text)> {
         let text = |f: &File| f.chunks.iter().map(|c| &*c.text).collect::<String>().into();
         let main = (self.main.path().into(), self.main.text().clone());
         std::iter::once(main).chain(self.subs.iter().map(|f| (f.path.clone(), text(f)))).collect()
@@ -58,7 +58,7 @@ impl Files for Loaded {
                 return Some(*id);
             }
             let Ok(bytes) = std::fs::read(&path) else { continue };
-            let text = crate::disk::read_as(bytes, self.setup.dialect);
+            let text = crate::disk::read_as(bytes, self.setup.dialect).into();
             self.subs.push(crate::disk::file_of(&path.to_string_lossy(), &text, crate::disk::CHUNK, self.setup.dialect));
             let id = FileId(self.subs.len() as u32);
             self.known.insert(path, id);
@@ -92,7 +92,7 @@ pub struct Streamed<S> {
 }
 
 /// Runs a program into a sink. With `rules`, the lints watch.
-pub fn stream<S: Sink>(path: &str, text: Arc<str>, setup: &Setup, rules: Option<&Rules>, sink: S) -> Streamed<S> {
+pub fn stream<S: Sink>(path: &str, text: Text, setup: &Setup, rules: Option<&Rules>, sink: S) -> Streamed<S> {
     let mut files = Loaded::new(path, text, setup);
     let tee = Tee { sink, lints: None, doubt: false };
     let mut run = Interp::new(&mut files, setup, tee);
@@ -177,8 +177,8 @@ impl<S: Sink> Sink for Tee<'_, S> {
 }
 
 /// A text with all its tables.
-pub fn scan_file(path: &str, text: &str, dialect: &'static gr_spec::Dialect) -> File {
-    crate::disk::file_of(path, text, crate::disk::CHUNK, dialect)
+pub fn scan_file(path: &str, text: impl Into<Text>, dialect: &'static gr_spec::Dialect) -> File {
+    crate::disk::file_of(path, &text.into(), crate::disk::CHUNK, dialect)
 }
 
 /// Motion of a program, and where it comes from.
@@ -186,7 +186,7 @@ pub struct Motion {
     /// The motion.
     pub program: Program,
     /// Names and texts of files under the numbers that the motion uses.
-    pub texts: Vec<(Box<str>, Arc<str>)>,
+    pub texts: Vec<(Box<str>, Text)>,
     /// Subroutine files that were pulled in.
     pub subs: Vec<PathBuf>,
     /// Lints were asked for, and a check of this program would say nothing at all.
@@ -194,7 +194,7 @@ pub struct Motion {
 }
 
 /// Runs a program and lowers it to motion.
-pub fn lower(path: &str, text: Arc<str>, setup: &Setup, rules: Option<&Rules>) -> Motion {
+pub fn lower(path: &str, text: Text, setup: &Setup, rules: Option<&Rules>) -> Motion {
     let Streamed { sink, files, clean, .. } = stream(path, text, setup, rules, Mute(Lowering::new()));
     let mut lowering = sink.0;
     let texts = files.texts();

@@ -4,17 +4,24 @@
 //! chunk, the state it is entered in and, if it touches them, the parameters. From a chunk with control flow on the
 //! program is run ([`flow`]) until it is outside of calls and loops at the start of a chunk again; that is remembered
 //! for the chunk, the state, the parameters and what control flow has left behind, and depends on the chunks that
-//! execution came to, not on where they stand. Most edits leave the state after the chunk as it was, and then nothing below is done again.
+//! execution came to, not on where they stand. Parameters that nothing in the file reads are left out. Most edits leave
+//! the state after the chunk as it was, and then nothing below is done again.
+//!
+//! For a check that nobody will ask for again the same run goes through the file and remembers nothing ([`told_once`]).
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use gr_canon::{CallFrame, FileId, FrameId};
-use gr_spec::{Severity, code};
+use gr_gcode::Parameter;
+use gr_interp::Modal;
+use gr_spec::{Code, Severity, code};
 
 use crate::carried::{Carried, Moved};
+use crate::check::{Key, MOST_OF_A_KIND, Unlisted, key};
 use crate::db::{ChunkText, Counted, Db, Document, RunOptions, scanned};
 use crate::engine::{self, Boundary, End, Environment, Stretch};
-use crate::layout::{Layout, Part, layout};
+use crate::layout::{Layout, Part, layout, unread};
 use crate::library::Came;
 use crate::lints::{Cuts, Found, From, Summary, Where};
 
@@ -175,26 +182,72 @@ pub(crate) struct Group {
 pub(crate) struct Timeline<'db> {
     /// State in which a chunk is entered; none = not known (inside control flow, after the end, not computed).
     pub(crate) entries: Vec<Option<Known<'db>>>,
-    #[salsa_value(unsafe(prove(Vec<Group>: 'static)))]
+    #[salsa_value(unsafe(prove(Story: 'static)))]
+    pub(crate) story: Story,
+}
+
+/// What was found in a file.
+#[derive(Clone, PartialEq, Debug, Default)]
+pub(crate) struct Story {
     pub(crate) groups: Vec<Group>,
     /// How and on which line the program ended.
-    #[salsa_value(unsafe(prove(Option<End>: 'static)))]
     pub(crate) end: Option<End>,
     /// Whether every chunk was looked at.
     pub(crate) complete: bool,
+    /// Findings that are in no group, because nobody could list them all.
+    pub(crate) unlisted: Unlisted,
 }
 
 /// The whole file.
 #[salsa::tracked(returns(ref), no_eq)]
 pub(crate) fn timeline<'db>(db: &'db dyn Db, document: Document) -> Timeline<'db> {
     db.count(Counted::Timeline);
-    fold(db, document, u32::MAX)
+    remembered(db, document, u32::MAX)
 }
 
 /// The file up to the chunk that holds a line.
 #[salsa::tracked(returns(ref), no_eq, lru = 8)]
 pub(crate) fn timeline_to<'db>(db: &'db dyn Db, document: Document, line: u32) -> Timeline<'db> {
-    fold(db, document, line)
+    remembered(db, document, line)
+}
+
+fn remembered<'db>(db: &'db dyn Db, document: Document, last_line: u32) -> Timeline<'db> {
+    put_together(db, document, last_line, unread(db, document))
+}
+
+/// `unread`: parameters that don't matter from chunk to chunk.
+fn put_together<'db>(db: &'db dyn Db, document: Document, last_line: u32, unread: &'db [Parameter]) -> Timeline<'db> {
+    let file = Whole::new(db, document);
+    let known = start(db, document.run(db), file.layout.percent);
+    let entries = vec![None; file.layout.parts.len()];
+    let mut run = Remembered { file, known, entries, unread, calls_others: false };
+    let story = told(&mut run, file, Fold::default(), last_line);
+    if run.calls_others && !unread.is_empty() {
+        // What the file itself doesn't read, others may.
+        return put_together(db, document, last_line, &[]);
+    }
+    Timeline { entries: run.entries, story }
+}
+
+/// Parameters between two chunks without those that nothing reads: setting one of these changes nothing below.
+#[salsa::tracked(returns(copy))]
+fn that_matters<'db>(db: &'db dyn Db, document: Document, env: Env<'db>) -> Env<'db> {
+    Env::new(db, env.environment(db).without(unread(db, document)))
+}
+
+/// The whole file, and nothing is remembered but what can be listed.
+pub(crate) fn told_once(db: &dyn Db, document: Document) -> Story {
+    db.count(Counted::Timeline);
+    let file = Whole::new(db, document);
+    let (boundary, env) = engine::start(file.options, file.layout.percent);
+    let mut run = Passing { file, boundary, env, carried: Carried::default() };
+    told(&mut run, file, Fold { listed: Some(Listed::default()), ..Fold::default() }, u32::MAX)
+}
+
+/// The same with all parameters, also those that nothing in the file reads.
+#[salsa::tracked(returns(ref), no_eq, lru = 2)]
+pub(crate) fn timeline_with_all_to<'db>(db: &'db dyn Db, document: Document, line: u32) -> Timeline<'db> {
+    put_together(db, document, line, &[])
 }
 
 /// The run that goes on from the nearest known state before a chunk.
@@ -214,6 +267,17 @@ pub(crate) struct Late {
 impl Late {
     /// Takes what a stretch has left. `base`: a chunk was run alone, and these are its file and first line.
     pub(crate) fn take(&mut self, summary: &Summary, base: Option<(FileId, u32)>, rules: &crate::Rules) {
+        self.take_some(summary, base, rules, |_| true);
+    }
+
+    /// The same, but only the rapids that are `wanted`.
+    fn take_some(
+        &mut self,
+        summary: &Summary,
+        base: Option<(FileId, u32)>,
+        rules: &crate::Rules,
+        mut wanted: impl FnMut(&Found) -> bool,
+    ) {
         let real = |place: Where| match base {
             Some((file, first)) => Where { file, line: place.line.wrapping_add(first), ..place },
             None => place,
@@ -221,7 +285,9 @@ impl Late {
         for dive in &summary.dives {
             if let Some(mut found) = dive.judge(&self.cuts, rules) {
                 found.place = real(found.place);
-                self.found.push(found);
+                if wanted(&found) {
+                    self.found.push(found);
+                }
             }
         }
         self.cuts = if summary.new_frame { summary.cuts } else { self.cuts.join(&summary.cuts) };
@@ -239,30 +305,19 @@ impl Late {
 /// Findings of the interpreter after which it gives up, as the controller does when it is told to go on.
 const GIVE_UP: usize = 100;
 
-/// Cuts everything behind the fault at which the interpreter gives up, and says on which line that is. The
+/// Where in a list of findings the interpreter gives up, when there were `before` of its findings before them. The
 /// interpreter counts within the stretch that it runs; here the whole file counts.
-fn too_many(groups: &mut Vec<Group>) -> Option<u32> {
-    let mut count = 0;
-    for g in 0..groups.len() {
-        for (at, found) in groups[g].found.iter().enumerate() {
-            count += usize::from(found.from != From::Lint);
-            if count >= GIVE_UP && found.from == From::Fault {
-                let line = found.place.line.wrapping_add(groups[g].first_line);
-                // Lints of a stretch with control flow come behind its findings.
-                let keep = |(i, f): &(usize, &Found)| *i <= at || (f.from == From::Lint && f.place.line <= found.place.line);
-                let kept: Vec<Found> = groups[g].found.iter().enumerate().filter(keep).map(|(_, f)| f.clone()).collect();
-                groups[g].found = kept.into();
-                groups.truncate(g + 1);
-                return Some(line);
-            }
-        }
-    }
-    None
+fn gives_up(found: &[Found], before: usize) -> Option<usize> {
+    let mut count = before;
+    found.iter().position(|f| {
+        count += usize::from(f.from != From::Lint);
+        count >= GIVE_UP && f.from == From::Fault
+    })
 }
 
 /// The main file's statements of control flow make faults of these kinds over and over once an error has made the
 /// controller forget all labels: the rest of a loop or branch is then without its beginning.
-const CONSEQUENCES: [gr_spec::Code; 2] = [code::FLOW_LABEL, code::FLOW_UNCLOSED];
+const CONSEQUENCES: [Code; 2] = [code::FLOW_LABEL, code::FLOW_UNCLOSED];
 
 /// Whether a finding in the main file or another one is an error after which labels are forgotten that were there.
 fn forgets(found: &Found, line: u32, own: bool, first_control: u32) -> bool {
@@ -303,51 +358,153 @@ fn unreached_end(layout: &Layout, groups: &[Group], unclosed: &[Found], main: Fi
     layout.ends.iter().copied().find(|line| open(*line) || faulty(*line))
 }
 
-/// A file while it is being put together.
-struct Fold<'db> {
+/// A file and what it is run with.
+#[derive(Clone, Copy)]
+struct Whole<'a> {
+    db: &'a dyn Db,
+    document: Document,
+    main: FileId,
+    options: &'a crate::Options,
+    layout: &'a Layout,
+}
+
+impl<'a> Whole<'a> {
+    fn new(db: &'a dyn Db, document: Document) -> Whole<'a> {
+        let options = document.run(db).options(db);
+        Whole { db, document, main: FileId(document.id(db)), options, layout: layout(db, document) }
+    }
+}
+
+/// A run through a file, chunk after chunk.
+trait Run {
+    /// Runs a chunk without control flow.
+    fn step(&mut self, part: &Part, fold: &mut Fold);
+    /// Runs on from a chunk with control flow; returns the first line behind the stretch.
+    fn flow(&mut self, part: &Part, fold: &mut Fold) -> Option<u32>;
+    /// Execution is at the start of a chunk.
+    fn at(&mut self, part: usize);
+    /// State at present.
+    fn modal(&self) -> &Modal;
+}
+
+/// What was found so far.
+#[derive(Default)]
+struct Fold {
     groups: Vec<Group>,
-    /// Findings in them.
+    /// Findings of the interpreter so far.
     spoken: usize,
     late: Late,
     end: Option<End>,
     /// Unclosed statements of the other files that were opened.
     others: Vec<(FileId, Vec<Found>)>,
-    known: Known<'db>,
-    entries: Vec<Option<Known<'db>>>,
+    /// What is kept of the findings; none = all.
+    listed: Option<Listed>,
 }
 
-fn fold<'db>(db: &'db dyn Db, document: Document, last_line: u32) -> Timeline<'db> {
-    let run = document.run(db);
-    let options = run.options(db);
-    let main = FileId(document.id(db));
-    let layout = layout(db, document);
-    let parts = &layout.parts;
-    let mut fold = Fold {
-        groups: Vec::new(),
-        spoken: 0,
-        late: Late::default(),
-        end: None,
-        others: Vec::new(),
-        known: start(db, run, layout.percent),
-        entries: vec![None; parts.len()],
-    };
-    let mut at = 0;
-    while at < parts.len() && fold.end.is_none() && parts[at].first_line <= last_line {
-        fold.entries[at] = Some(fold.known);
-        if parts[at].control {
-            let next = fold.flow(db, document, layout, &parts[at]);
-            at = next.map_or(parts.len(), |line| parts.partition_point(|p| p.first_line < line));
-        } else {
-            fold.step(db, document, &parts[at]);
-            at += 1;
+/// The findings that a list of all has room for; the others are counted.
+#[derive(Default)]
+struct Listed {
+    seen: BTreeMap<Code, BTreeSet<Key>>,
+    unlisted: Unlisted,
+}
+
+/// Findings of these kinds may be taken back later, when others are known.
+const MAY_BE_DROPPED: [Code; 4] = [CONSEQUENCES[0], CONSEQUENCES[1], code::END_SPINDLE_ON, code::END_COMPENSATION_ON];
+
+impl Listed {
+    /// Whether there is room for a finding in the list.
+    fn has_room(&mut self, found: &Found, key: Key) -> bool {
+        // Faults stop the run before there are many.
+        if found.from == From::Fault || MAY_BE_DROPPED.contains(&found.code) {
+            return true;
         }
-        if fold.spoken >= GIVE_UP
-            && let Some(line) = too_many(&mut fold.groups)
-        {
-            fold.end = Some(End { line, stopped: true, program: false });
+        let seen = self.seen.entry(found.code).or_default();
+        if seen.len() < MOST_OF_A_KIND {
+            seen.insert(key);
+            return true;
+        }
+        let again = seen.contains(&key);
+        if !again {
+            *self.unlisted.entry((found.code, found.severity)).or_default() += 1;
+        }
+        again
+    }
+}
+
+impl Fold {
+    /// Adds what a chunk without control flow gave.
+    fn step(&mut self, file: Whole<'_>, part: &Part, found: &Arc<[Found]>, summary: &Summary, end: Option<End>) {
+        self.late(file, summary, Some((file.main, part.first_line)));
+        self.end = end.map(|e| e.shifted(part.first_line));
+        self.add(file.main, part.first_line, found, None);
+    }
+
+    /// Adds what a stretch with control flow gave.
+    fn flow(&mut self, file: Whole<'_>, found: &Arc<[Found]>, frames: &Frames, summary: &Summary, end: Option<End>) {
+        self.late(file, summary, None);
+        self.end = end;
+        self.add(file.main, 0, found, Some(frames.clone()));
+    }
+
+    fn late(&mut self, file: Whole<'_>, summary: &Summary, base: Option<(FileId, u32)>) {
+        let Fold { late, listed, .. } = self;
+        late.take_some(summary, base, &file.options.rules, |f| {
+            let place = f.place;
+            let span = f.span.map(|s| (s.start, s.end));
+            listed.as_mut().is_none_or(|l| l.has_room(f, (place.file, place.line, f.code, f.letter, span)))
+        });
+    }
+
+    fn unclosed(&mut self, unclosed: &[(FileId, Vec<Found>)]) {
+        for (file, found) in unclosed {
+            if !self.others.iter().any(|(f, _)| f == file) {
+                self.others.push((*file, found.clone()));
+            }
         }
     }
-    let Fold { mut groups, mut late, mut end, others, known, entries, .. } = fold;
+
+    fn add(&mut self, main: FileId, first_line: u32, found: &Arc<[Found]>, frames: Option<Frames>) {
+        if found.is_empty() {
+            return;
+        }
+        let mut group = Group { first_line, found: found.clone(), frames };
+        if let Some(at) = gives_up(found, self.spoken) {
+            let last = &found[at];
+            // Lints of a stretch with control flow come behind its findings.
+            let keep = |(i, f): &(usize, &Found)| *i <= at || (f.from == From::Lint && f.place.line <= last.place.line);
+            group.found = found.iter().enumerate().filter(keep).map(|(_, f)| f.clone()).collect();
+            let line = last.place.line.wrapping_add(first_line);
+            self.end = Some(End { line, stopped: true, program: false });
+        }
+        self.spoken += found.iter().filter(|f| f.from != From::Lint).count();
+        if let Some(listed) = &mut self.listed {
+            let room: Vec<bool> = group.found.iter().map(|f| listed.has_room(f, key(f, &group, main))).collect();
+            if room.contains(&false) {
+                group.found = group.found.iter().zip(room).filter(|(_, room)| *room).map(|(f, _)| f.clone()).collect();
+            }
+        }
+        if !group.found.is_empty() {
+            self.groups.push(group);
+        }
+    }
+}
+
+/// Runs through a file and says what there is to say.
+fn told(run: &mut impl Run, file: Whole<'_>, mut fold: Fold, last_line: u32) -> Story {
+    let Whole { main, options, layout, .. } = file;
+    let parts = &layout.parts;
+    let mut at = 0;
+    while at < parts.len() && fold.end.is_none() && parts[at].first_line <= last_line {
+        run.at(at);
+        if parts[at].control {
+            let next = run.flow(&parts[at], &mut fold);
+            at = next.map_or(parts.len(), |line| parts.partition_point(|p| p.first_line < line));
+        } else {
+            run.step(&parts[at], &mut fold);
+            at += 1;
+        }
+    }
+    let Fold { mut groups, mut late, mut end, others, listed, .. } = fold;
     let complete = at >= parts.len() || end.is_some();
     let after_error = drop_consequences(&mut groups, main, layout.first_control.unwrap_or(0));
     if complete {
@@ -366,8 +523,7 @@ fn fold<'db>(db: &'db dyn Db, document: Document, last_line: u32) -> Timeline<'d
         if !unclosed.is_empty() {
             groups.push(Group { first_line: 0, found: unclosed.into(), frames: Some(Arc::default()) });
         }
-        let modal = known.entry.boundary(db).modal();
-        late.found.extend(engine::finish(&engine::Finish { layout, main, options, modal, end }));
+        late.found.extend(engine::finish(&engine::Finish { layout, main, options, modal: run.modal(), end }));
     }
     if groups.iter().any(|g: &Group| g.found.iter().any(|f| f.code.def().severity == Severity::Error)) {
         // After an error the rest is not to be trusted: what is still on at the end says nothing.
@@ -382,53 +538,112 @@ fn fold<'db>(db: &'db dyn Db, document: Document, last_line: u32) -> Timeline<'d
     if !late.found.is_empty() {
         groups.push(Group { first_line: 0, found: late.found.into(), frames: Some(Arc::default()) });
     }
-    Timeline { entries, groups, end, complete }
+    Story { groups, end, complete, unlisted: listed.unwrap_or_default().unlisted }
 }
 
-impl<'db> Fold<'db> {
-    /// Adds a chunk without control flow.
-    fn step(&mut self, db: &'db dyn Db, document: Document, part: &Part) {
+/// A run of which each part is remembered by what it depends on.
+struct Remembered<'db> {
+    file: Whole<'db>,
+    known: Known<'db>,
+    entries: Vec<Option<Known<'db>>>,
+    /// Parameters that don't matter from chunk to chunk.
+    unread: &'db [Parameter],
+    /// Other files were opened.
+    calls_others: bool,
+}
+
+impl<'db> Remembered<'db> {
+    fn goes_on(&mut self, from: Env<'db>, known: Known<'db>) {
+        self.known = known;
+        if !self.unread.is_empty() && known.env != from {
+            self.known.env = that_matters(self.file.db, self.file.document, known.env);
+        }
+    }
+}
+
+impl Run for Remembered<'_> {
+    fn step(&mut self, part: &Part, fold: &mut Fold) {
+        let Whole { db, document, .. } = self.file;
         let run = document.run(db);
-        let Known { entry, env, labels } = self.known;
+        let Known { entry, env, mut labels } = self.known;
         let mut step = step(db, part.chunk, run, entry, part.environment.then_some(env));
         if step.impure {
             step = self::step(db, part.chunk, run, entry, Some(env));
         }
-        let first_line = part.first_line;
-        self.late.take(&step.summary, Some((FileId(document.id(db)), first_line)), &run.options(db).rules);
-        let mut labels = labels;
-        if !step.found.is_empty() {
-            self.spoken += step.found.len();
-            self.groups.push(Group { first_line, found: step.found.clone(), frames: None });
-            if step.found.iter().any(|f| f.from == From::Fault) {
-                labels = Labels::new(db, labels.carried(db).without_labels());
-            }
+        fold.step(self.file, part, &step.found, &step.summary, step.end);
+        if step.found.iter().any(|f| f.from == From::Fault) {
+            labels = Labels::new(db, labels.carried(db).without_labels());
         }
-        self.end = step.end.map(|e| e.shifted(first_line));
-        self.known = Known { entry: step.exit, env: step.env.unwrap_or(env), labels };
+        self.goes_on(env, Known { entry: step.exit, env: step.env.unwrap_or(env), labels });
     }
 
-    /// Adds a stretch with control flow; returns the first line behind it.
-    fn flow(&mut self, db: &'db dyn Db, document: Document, layout: &Layout, part: &Part) -> Option<u32> {
+    fn flow(&mut self, part: &Part, fold: &mut Fold) -> Option<u32> {
+        let Whole { db, document, main, layout, .. } = self.file;
         let Known { entry, env, labels } = self.known;
         let flow = flow(db, document, part.chunk, entry, env, labels);
-        let moved = Moved::new(&flow.came, &layout.starts, FileId(document.id(db)), part.chunk);
-        let moved = moved.as_ref();
-        let summary = moved.map(|m| m.summary(&flow.summary));
-        self.late.take(summary.as_ref().unwrap_or(&flow.summary), None, &document.run(db).options(db).rules);
-        if !flow.found.is_empty() {
-            self.spoken += flow.found.len();
-            let found = moved.map_or_else(|| flow.found.clone(), |m| m.found(&flow.found).into());
-            let frames = moved.map_or_else(|| flow.frames.clone(), |m| m.frames(&flow.frames).into());
-            self.groups.push(Group { first_line: 0, found, frames: Some(frames) });
-        }
-        for (file, found) in &flow.unclosed {
-            if !self.others.iter().any(|(f, _)| f == file) {
-                self.others.push((*file, found.clone()));
+        let moved = Moved::new(&flow.came, &layout.starts, main, part.chunk);
+        match &moved {
+            None => fold.flow(self.file, &flow.found, &flow.frames, &flow.summary, flow.end),
+            Some(m) => {
+                let (found, frames) = (m.found(&flow.found).into(), m.frames(&flow.frames).into());
+                fold.flow(self.file, &found, &frames, &m.summary(&flow.summary), flow.end.map(|e| m.end(e)));
             }
         }
-        self.end = flow.end.map(|end| moved.map_or(end, |m| m.end(end)));
-        self.known = flow.exit;
+        fold.unclosed(&flow.unclosed);
+        self.calls_others |= !flow.unclosed.is_empty();
+        self.goes_on(env, flow.exit);
         flow.next.map(|line| moved.map_or(line, |m| m.behind(line)))
+    }
+
+    fn at(&mut self, part: usize) {
+        self.entries[part] = Some(self.known);
+    }
+
+    fn modal(&self) -> &Modal {
+        self.known.entry.boundary(self.file.db).modal()
+    }
+}
+
+/// A run that leaves nothing behind.
+struct Passing<'a> {
+    file: Whole<'a>,
+    boundary: Boundary,
+    env: Environment,
+    carried: Carried,
+}
+
+impl Run for Passing<'_> {
+    fn step(&mut self, part: &Part, fold: &mut Fold) {
+        let Whole { db, document, options, .. } = self.file;
+        let scan = scanned(db, part.chunk, document.run(db));
+        let chunk = gr_gcode::Chunk { text: part.chunk.text(db).clone(), scan };
+        let mut step = engine::step(&chunk, &self.boundary, part.environment.then_some(&self.env), options);
+        if step.impure {
+            step = engine::step(&chunk, &self.boundary, Some(&self.env), options);
+        }
+        if step.found.iter().any(|f| f.from == From::Fault) {
+            self.carried = self.carried.without_labels();
+        }
+        fold.step(self.file, part, &step.found.into(), &step.summary, step.end);
+        self.boundary = step.boundary;
+        if let Some(env) = step.environment {
+            self.env = env;
+        }
+    }
+
+    fn flow(&mut self, part: &Part, fold: &mut Fold) -> Option<u32> {
+        let Whole { db, document, .. } = self.file;
+        let stretch = Stretch { db, document, chunk: part.chunk, entry: &self.boundary, env: &self.env, carried: &self.carried };
+        let flow = engine::flow(&stretch);
+        fold.flow(self.file, &flow.found.into(), &flow.frames.into(), &flow.summary, flow.end);
+        fold.unclosed(&flow.unclosed);
+        (self.boundary, self.env, self.carried) = (flow.boundary, flow.environment, flow.carried);
+        flow.next
+    }
+
+    fn at(&mut self, _part: usize) {}
+
+    fn modal(&self) -> &Modal {
+        self.boundary.modal()
     }
 }

@@ -7,12 +7,17 @@ use gr_text::{Diagnostic, FileId};
 
 use crate::db::{Database, Db, Document, scanned};
 
+/// Whether a file is in that language.
+pub(crate) fn speaks(db: &dyn Db, document: Document) -> bool {
+    document.run(db).options(db).setup.dialect.family == Family::Ufmg2008
+}
+
 /// Findings of a file in that language; none for files in other languages.
 pub(crate) fn check(db: &Database, document: Document) -> Option<Vec<Diagnostic>> {
-    let run = document.run(db);
-    if run.options(db).setup.dialect.family != Family::Ufmg2008 {
+    if !speaks(db, document) {
         return None;
     }
+    let run = document.run(db);
     let chunks = document.chunks(db).iter().map(|c| Chunk { text: c.text(db).clone(), scan: scanned(db, *c, run) });
     let file = File::new("", chunks.collect());
     let id = FileId(document.id(db));
@@ -28,10 +33,10 @@ pub(crate) fn check(db: &Database, document: Document) -> Option<Vec<Diagnostic>
 
 /// Motion of a file in that language; none for files in other languages.
 pub(crate) fn motion(db: &dyn Db, document: Document) -> Option<gr_ir::Program> {
-    let run = document.run(db);
-    if run.options(db).setup.dialect.family != Family::Ufmg2008 {
+    if !speaks(db, document) {
         return None;
     }
+    let run = document.run(db);
     let id = FileId(document.id(db));
     let (commands, _) = gr_backends::joint::language::read(id, &crate::library::whole(db, document, run));
     let machine = gr_machine::builtin("ufmg/plano-3r")?;

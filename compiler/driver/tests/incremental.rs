@@ -20,6 +20,11 @@ fn scratch(text: &str, chunk: usize) -> Check {
     session.check(file)
 }
 
+/// The check that remembers nothing.
+fn once(text: &str, chunk: usize) -> Check {
+    gr_driver::check_once("part.ngc", text, options(chunk)).check
+}
+
 /// What people see: easier to read in a failure than the whole structure.
 fn shown(text: &str, all: &[Diagnostic]) -> Vec<String> {
     let line = |at: u32| text[..at as usize].matches('\n').count() + 1;
@@ -82,6 +87,12 @@ fn line() -> impl Strategy<Value = String> {
         Just("G1 X#1"),
         Just("#1=5"),
         Just("#1=[#1+1]"),
+        Just("#100=3"),
+        Just("#100=[#100+1]"),
+        Just("G1 X#100"),
+        Just("#[100]=4"),
+        Just("#101=2"),
+        Just("#<width>=EXISTS[#<depth>]"),
         Just("#<depth>=2"),
         Just("G1 Z#<depth>"),
         Just("é\u{1F600}"),
@@ -203,7 +214,9 @@ proptest! {
 
     #[test]
     fn chunk_size_is_invisible(text in text(), chunk in 1usize..9) {
-        assert_same(&text, &scratch(&text, chunk), &scratch(&text, 256), "chunks");
+        let expected = scratch(&text, 256);
+        assert_same(&text, &scratch(&text, chunk), &expected, "chunks");
+        assert_same(&text, &once(&text, chunk), &expected, "once");
     }
 
     #[test]
@@ -213,7 +226,9 @@ proptest! {
 
     #[test]
     fn chunk_size_is_invisible_in_structured_programs(text in structured(), chunk in 1usize..9) {
-        assert_same(&text, &scratch(&text, chunk), &scratch(&text, 256), "chunks");
+        let expected = scratch(&text, 256);
+        assert_same(&text, &scratch(&text, chunk), &expected, "chunks");
+        assert_same(&text, &once(&text, chunk), &expected, "once");
     }
 
     #[test]
@@ -238,6 +253,24 @@ proptest! {
 /// More cases on request: `GCC_ROBOT_CASES=20000 cargo test`.
 fn cases() -> u32 {
     std::env::var("GCC_ROBOT_CASES").ok().and_then(|v| v.parse().ok()).unwrap_or(256)
+}
+
+#[test]
+fn findings_beyond_the_limit_are_counted() {
+    let lints = "G64 P0.0001\nG1 X1\nG1 X2\n".repeat(3000);
+    let looped = "#1=0\no1 while [#1 LT 20]\n#1=[#1+1]\nG64 P0.0002\nG1 X[#1]\no1 endwhile\n".repeat(3);
+    let damaged = "X[1+\n".repeat(2500);
+    let text = format!("G21 G90 G17\nF100\nS100 M3\n{looped}{lints}{looped}M5\nM2\n{damaged}");
+    for chunk in [7, 256] {
+        let mut options = Options::new(Setup::default());
+        options.chunk_lines = Some(chunk);
+        let mut session = Session::new();
+        let file = session.open("part.ngc", &text, options.clone());
+        let whole = session.check(file);
+        let counts: Vec<usize> = whole.unlisted.values().copied().collect();
+        assert_eq!(counts.iter().filter(|n| **n > 1000).count(), 2, "{:?}", whole.unlisted);
+        assert_eq!(gr_driver::check_once("part.ngc", &text, options).check, whole);
+    }
 }
 
 fn program(lines: usize) -> String {
@@ -362,6 +395,61 @@ fn a_line_above_calls_leaves_them_alone() {
             assert!(session.executed().flows - before.flows <= 1);
         }
     }
+}
+
+/// A branch with a label of its own in every tenth line.
+fn labels_everywhere(lines: usize) -> String {
+    let block = |i: usize| if i % 10 == 9 { format!("o{i} if [1]\nM8\no{i} endif\n") } else { format!("G1 X{}.5 Y{}\n", i % 97, i % 89) };
+    format!("G21 G90 G17\nS1000 M3\nF100\n{}M5\nM9\nM2\n", (0..lines).map(block).collect::<String>())
+}
+
+#[test]
+fn a_line_above_labels_leaves_those_below_alone() {
+    let mut text = labels_everywhere(4000);
+    let mut session = Session::new();
+    let file = session.open("part.ngc", &text, options(100));
+    assert_eq!(session.check(file), scratch(&text, 256));
+    let at = text[text.len() / 3..].find("G1 X").unwrap() + text.len() / 3;
+    for (old, new) in [("", "(one more line)\n"), ("(one more line)\n", ""), ("", "G1 X\n")] {
+        let before = session.executed();
+        text.replace_range(at..at + old.len(), new);
+        session.edit(file, at as u32..(at + old.len()) as u32, new);
+        assert_eq!(session.check(file), scratch(&text, 256));
+        // A mistake makes the controller forget all labels.
+        assert!(session.executed().flows - before.flows <= 1 || new.ends_with("X\n"));
+    }
+}
+
+#[test]
+fn a_parameter_that_nothing_reads_changes_nothing_below() {
+    let mut text = calls_everywhere(4000);
+    let mut session = Session::new();
+    let file = session.open("part.ngc", &text, options(100));
+    session.check(file);
+    let at = text[text.len() / 3..].find("G1 X").unwrap() + text.len() / 3;
+    for (old, new, most) in [("", "#100=5\n", 1), ("5", "6", 1), ("6\n", "6\n#<width>=2\n", 1), ("", "G1 X#100\n", 1000)] {
+        let from = at + text[at..].find(old).unwrap();
+        let before = session.executed();
+        text.replace_range(from..from + old.len(), new);
+        session.edit(file, from as u32..(from + old.len()) as u32, new);
+        assert_eq!(session.check(file), scratch(&text, 256));
+        assert!(session.executed().flows - before.flows <= most, "{new}");
+    }
+}
+
+#[test]
+fn a_file_that_is_called_reads_what_its_caller_does_not() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("mill.ngc"), "o<mill> sub\nG1 X[1/#100] F100\no<mill> endsub\nM2\n").unwrap();
+    let path = folder.path().join("main.ngc").to_string_lossy().into_owned();
+    let mut options = options(1);
+    let dir = folder.path().to_string_lossy().into_owned();
+    options.setup.ini.values.insert(("rs274ngc".into(), "subroutine_path".into()), vec![dir]);
+    let mut session = Session::new();
+    let main = session.open(&path, "G21\n#100=1\nG1 X5 F100\no<mill> call\nM2\n", options);
+    assert_eq!(session.check(main).diagnostics, vec![]);
+    session.edit(main, 9..10, "0");
+    assert_eq!(session.check(main).diagnostics.len(), 1);
 }
 
 #[test]

@@ -287,7 +287,7 @@ impl Fault {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Chunk {
     /// Text.
-    pub text: Arc<str>,
+    pub text: gr_text::Text,
     /// Tables.
     pub scan: Arc<Scan>,
 }

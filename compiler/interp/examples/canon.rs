@@ -17,7 +17,7 @@ fn load(path: &Path, setup: &Setup) -> Option<File> {
     let text = gr_text::decode(std::fs::read(path).ok()?).text;
     let chunks = gr_gcode::split_chunks(&text, 4096)
         .into_iter()
-        .map(|t| Chunk { text: Arc::from(t), scan: Arc::new(gr_gcode::scan(t, setup.dialect)) })
+        .map(|t| Chunk { text: gr_text::Text::from(t), scan: Arc::new(gr_gcode::scan(t, setup.dialect)) })
         .collect();
     Some(File::new(&path.to_string_lossy(), chunks))
 }

@@ -109,6 +109,18 @@ impl Params {
             self.levels.pop();
         }
     }
+    /// Takes a parameter of the main program away, as if it had never been set.
+    pub fn forget(&mut self, parameter: &gr_gcode::Parameter) {
+        match parameter {
+            gr_gcode::Parameter::Number(n) => self.set(*n, 0.0),
+            gr_gcode::Parameter::Named(name) => {
+                let Some(value) = self.levels.first().and_then(|l| l.get(name)).copied() else { return };
+                let key = name_key(0, name);
+                self.hash ^= mix(key, 1e300) ^ mix(key, value);
+                Arc::make_mut(&mut self.levels[0]).remove(name);
+            }
+        }
+    }
     /// Hash of the whole content.
     pub fn content_hash(&self) -> u64 {
         self.hash

@@ -88,7 +88,7 @@ pub enum End {
 /// The line read last; its text is what `At::now` shows.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Reading {
-    pub text: Arc<str>,
+    pub text: gr_text::Text,
     pub scan: Arc<Scan>,
     pub line: u32,
     /// First byte of the line, for places in it.

@@ -30,7 +30,7 @@ fn run(text: &str) -> (String, Outcome) {
         uvw: false,
         ..Setup::default()
     };
-    let chunk = Chunk { text: Arc::from(text), scan: Arc::new(gr_gcode::scan(text, setup.dialect)) };
+    let chunk = Chunk { text: gr_text::Text::from(text), scan: Arc::new(gr_gcode::scan(text, setup.dialect)) };
     let mut files = One(File::new("test.ngc", vec![chunk]));
     let mut printer = Printer::new(Vec::new(), Version::V2_9);
     let outcome = Interp::new(&mut files, &setup, &mut printer).run(FileId(0));
@@ -238,7 +238,7 @@ fn peck_clearance_by_version() {
     let told = "G21 G90 F100\nG0 Z5\nG83 X0 Y0 Z-10 R0 Q5 D2\nG80\nM2\n";
     let stream = |version, ini: &str, program: &str| {
         let setup = Setup { version, ini: gr_interp::read_ini(ini, FileId(0), None, None).0, ..Setup::default() };
-        let chunk = Chunk { text: Arc::from(program), scan: Arc::new(gr_gcode::scan(program, setup.dialect)) };
+        let chunk = Chunk { text: gr_text::Text::from(program), scan: Arc::new(gr_gcode::scan(program, setup.dialect)) };
         let mut files = One(File::new("test.ngc", vec![chunk]));
         let mut printer = Printer::new(Vec::new(), Version::V2_9);
         let _ = Interp::new(&mut files, &setup, &mut printer).run(FileId(0));

@@ -16,7 +16,7 @@ const TOOLS: &str = "T1 P1 Z1.5 D0.25\nT2 P2 Z1 D0.5\nT9 P3 X0.1 Z0.2 D0.1 Q9\n"
 struct Memory(Vec<(String, File)>);
 
 fn chunk(text: &str, dialect: &'static Dialect) -> Chunk {
-    Chunk { text: Arc::from(text), scan: Arc::new(gr_gcode::scan(text, dialect)) }
+    Chunk { text: gr_text::Text::from(text), scan: Arc::new(gr_gcode::scan(text, dialect)) }
 }
 
 impl Memory {

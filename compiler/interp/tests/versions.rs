@@ -23,7 +23,7 @@ fn run_two(version: Version, text: &str, sub: &str) -> (Vec<String>, String) {
     let dialect = Dialect::find(name).expect("a dialect of the tables");
     let setup = Setup { version, dialect, machine_units: Units::Inch, ..Setup::default() };
     let file = |name: &str, text: &str| {
-        let chunk = Chunk { text: Arc::from(text), scan: Arc::new(gr_gcode::scan(text, dialect)) };
+        let chunk = Chunk { text: gr_text::Text::from(text), scan: Arc::new(gr_gcode::scan(text, dialect)) };
         File::new(name, vec![chunk])
     };
     let mut files = Two(file("main.ngc", text), file("sub.ngc", sub));

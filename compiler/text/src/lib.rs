@@ -8,12 +8,14 @@ mod diagnostic;
 pub mod figures;
 mod findings;
 mod lines;
+mod text;
 
 pub use decode::{Decoded, Encoding, decode, decode_as_linuxcnc};
 pub use diagnostic::{Diagnostic, Fix, Frame, Label};
 pub use findings::Findings;
 pub use gr_spec::{Code, Severity, code};
-pub use lines::LineIndex;
+pub use lines::{LineIndex, LineMarks};
+pub use text::Text;
 
 /// Half-open byte range.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Default, PartialOrd, Ord)]

@@ -14,7 +14,7 @@ pub struct Memory(File);
 
 /// One chunk.
 pub fn chunk(text: &str, setup: &Setup) -> Chunk {
-    Chunk { text: Arc::from(text), scan: Arc::new(gr_gcode::scan(text, setup.dialect)) }
+    Chunk { text: gr_text::Text::from(text), scan: Arc::new(gr_gcode::scan(text, setup.dialect)) }
 }
 
 impl Memory {

@@ -90,7 +90,7 @@ pub fn run(global: &Global, args: &AccuracyArgs) -> Exit {
         Ok((made, found)) => (Some(made), found),
         Err(found) => (None, found),
     };
-    show(&mut renderer, &Checked { sources: motion.sources, found, more: 0, unreadable: false });
+    show(&mut renderer, &Checked { sources: motion.sources, found, ..Checked::nothing() });
     let mut exit = if made.is_some() { Exit::Ok } else { Exit::Findings };
     if let Some((text, files)) = made {
         let mut files = files;

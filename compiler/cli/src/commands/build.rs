@@ -264,7 +264,7 @@ impl<'a> Round<'a> {
     fn keep(&mut self, job: &Job, station: &Station, mut built: Built) {
         built.found.iter_mut().for_each(|d| station.lints.harden(d));
         let bad = built.found.iter().any(|d| d.severity == Severity::Error);
-        let checked = Checked { sources: built.sources, found: built.found, more: 0, unreadable: false };
+        let checked = Checked { sources: built.sources, found: built.found, ..Checked::nothing() };
         self.show_new(job, checked);
         if bad {
             return self.fail(Exit::Findings);

@@ -5,15 +5,15 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc;
 
-use gr_driver::{Options, Session};
-use gr_text::{Code, Diagnostic, FileId, Severity, Span, code};
+use gr_driver::{Once, Options};
+use gr_text::{Code, Diagnostic, FileId, Severity, Span, Text, code};
 
 use crate::exchange;
 use crate::exit::Exit;
 use crate::options::{CheckArgs, Global};
 use crate::progress::Progress;
-use crate::render::Renderer;
-use crate::setup::{Station, is_program, station};
+use crate::render::{Renderer, Tally};
+use crate::setup::{Levels, Station, is_program, station};
 use crate::sources::{Sources, read_program, walk};
 
 /// What came of one file.
@@ -23,7 +23,7 @@ pub struct Checked {
     /// The findings.
     pub found: Vec<Diagnostic>,
     /// Findings that are not listed.
-    pub more: usize,
+    pub more: Tally,
     /// It could not be read at all.
     pub unreadable: bool,
 }
@@ -31,7 +31,14 @@ pub struct Checked {
 impl Checked {
     /// Nothing was found.
     pub fn nothing() -> Checked {
-        Checked { sources: Sources::default(), found: Vec::new(), more: 0, unreadable: false }
+        Checked { sources: Sources::default(), found: Vec::new(), more: Tally::default(), unreadable: false }
+    }
+    /// What is to be said about a G-code program.
+    pub fn of(name: &str, text: &Text, options: Options, lints: &Levels) -> Checked {
+        let once = gr_driver::check_once(name, text, options);
+        let mut found = once.check.diagnostics.clone();
+        found.iter_mut().for_each(|d| lints.harden(d));
+        Checked { sources: used(&once, &found), found, more: lints.tally(&once.check.unlisted), unreadable: false }
     }
 }
 
@@ -80,9 +87,7 @@ pub fn run(global: &Global, args: &CheckArgs) -> Exit {
 pub fn show(renderer: &mut Renderer, checked: &Checked) {
     renderer.forget();
     checked.found.iter().for_each(|d| renderer.show(&checked.sources, d));
-    if checked.more > 0 {
-        renderer.remark(&format!("… and {} more findings of these kinds", checked.more));
-    }
+    renderer.pass_over(&checked.more);
     renderer.flush();
 }
 
@@ -162,9 +167,10 @@ pub fn check(path: &Path, station: &Station) -> Checked {
     let name = if path == Path::new("-") { "<stdin>".to_string() } else { path.display().to_string() };
     match read_program(path) {
         Ok(decoded) => {
-            let mut checked = checked(&name, path, &decoded.text, station);
-            if is_marked(decoded.encoding) && !exchange::is_exchange(path, &decoded.text) {
-                byte_order_mark(&mut checked, (&name, path), decoded.text, station);
+            let text = decoded.text.into();
+            let mut checked = checked(&name, path, &text, station);
+            if is_marked(decoded.encoding) && !exchange::is_exchange(path, &text) {
+                byte_order_mark(&mut checked, (&name, path), &text, station);
             }
             checked
         }
@@ -178,11 +184,11 @@ pub fn is_marked(decoded: gr_text::Encoding) -> bool {
 }
 
 /// The mark is not part of the text, but the control reads it.
-pub fn byte_order_mark(checked: &mut Checked, (name, path): (&str, &Path), text: String, station: &Station) {
+pub fn byte_order_mark(checked: &mut Checked, (name, path): (&str, &Path), text: &Text, station: &Station) {
     if station.lints.allow.contains(&code::TEXT_BYTE_ORDER_MARK) {
         return;
     }
-    let refused = !station.undeclared(path, &text) && station.setup_for(path, &text).dialect.family == gr_spec::Family::Linuxcnc;
+    let refused = !station.undeclared(path, text) && station.setup_for(path, text).dialect.family == gr_spec::Family::Linuxcnc;
     if checked.sources.get(FileId(0)).is_none() {
         checked.sources.add(name, text);
     }
@@ -195,7 +201,7 @@ pub fn byte_order_mark(checked: &mut Checked, (name, path): (&str, &Path), text:
 }
 
 /// What can be said of a program for an unknown control: nothing is an error there.
-fn syntax_only(name: &str, text: &str, station: &Station) -> Checked {
+fn syntax_only(name: &str, text: &Text, station: &Station) -> Checked {
     let mut sources = Sources::default();
     let id = sources.add(name, text);
     let file = gr_driver::scan_file(name, text, gr_spec::Dialect::linuxcnc());
@@ -207,7 +213,7 @@ fn syntax_only(name: &str, text: &str, station: &Station) -> Checked {
             d
         }));
     }
-    let more = found.len().saturating_sub(gr_driver::MOST_OF_A_KIND);
+    let more = Tally { hints: found.len().saturating_sub(gr_driver::MOST_OF_A_KIND), ..Tally::default() };
     found.truncate(gr_driver::MOST_OF_A_KIND);
     found.iter_mut().for_each(|d| station.lints.harden(d));
     Checked { sources, found, more, unreadable: false }
@@ -218,32 +224,27 @@ pub fn unreadable(name: &str, code: Code, args: &[String]) -> Checked {
     let mut sources = Sources::default();
     let file = sources.add(name, "");
     let found = vec![crate::sources::about_file(code, file, args)];
-    Checked { sources, found, more: 0, unreadable: true }
+    Checked { sources, found, more: Tally::default(), unreadable: true }
 }
 
-fn checked(name: &str, path: &Path, text: &str, station: &Station) -> Checked {
+fn checked(name: &str, path: &Path, text: &Text, station: &Station) -> Checked {
     if exchange::is_exchange(path, text) {
         return exchange::check(name, text, path, station);
     }
     if station.undeclared(path, text) {
         return syntax_only(name, text, station);
     }
-    let mut session = Session::new();
     let mut options = Options::new(station.setup_for(path, text));
     station.lints.put_into(&mut options.rules);
-    let file = session.open(name, text, options);
-    let check = session.check(file);
-    let mut found = check.diagnostics;
-    found.iter_mut().for_each(|d| station.lints.harden(d));
-    let mut checked = Checked { sources: session_sources(&session, &found), found, more: check.more, unreadable: false };
+    let mut checked = Checked::of(name, text, options, &station.lints);
     if let Some(machine) = &station.machine {
         crate::robot::ask(name, text, machine, &station.setup_for(path, text), &mut checked);
     }
     checked
 }
 
-/// The files that findings point into, under the numbers that the session gave them.
-pub fn session_sources(session: &Session, found: &[Diagnostic]) -> Sources {
+/// The files that findings point into, under the numbers that the check gave them.
+fn used(once: &Once, found: &[Diagnostic]) -> Sources {
     let mut used = std::collections::BTreeSet::new();
     for d in found {
         used.extend(d.labels.iter().map(|l| l.file));
@@ -253,8 +254,8 @@ pub fn session_sources(session: &Session, found: &[Diagnostic]) -> Sources {
     let mut sources = Sources::default();
     for id in 0..used.last().map_or(0, |f: &FileId| f.0 + 1) {
         let id = FileId(id);
-        let text = if used.contains(&id) { session.any_text(id).unwrap_or_default() } else { String::new() };
-        sources.add(session.path(id).unwrap_or_default(), text);
+        let text = if used.contains(&id) { once.text(id).unwrap_or_default() } else { Text::default() };
+        sources.add(once.path(id).unwrap_or_default(), text);
     }
     sources
 }

@@ -79,7 +79,7 @@ fn filter(args: &FilterArgs, renderer: &mut Renderer) -> Exit {
 
 fn deliver(args: &FilterArgs, station: &Station, built: Built, renderer: &mut Renderer, sources: &mut Sources) -> Exit {
     let bad = built.found.iter().any(|d| d.severity == Severity::Error);
-    show(renderer, &Checked { sources: built.sources, found: built.found, more: 0, unreadable: false });
+    show(renderer, &Checked { sources: built.sources, found: built.found, ..Checked::nothing() });
     let Some(main) = built.artifacts.into_iter().next().filter(|_| !bad) else { return Exit::Findings };
     if let Some(name) = args.write_tools.as_ref().filter(|path| same_file(path, &args.file)).map(|p| p.display().to_string()) {
         super::complain(renderer, sources, &name, code::FILE_OVERWRITES_SOURCE, std::slice::from_ref(&name));

@@ -145,7 +145,7 @@ impl Host for Editor {
 
     fn check_exchange(&self, path: &Path, text: &str, station: &Station) -> Vec<Diagnostic> {
         match own(station) {
-            Some(own) => crate::exchange::check(&path.display().to_string(), text, path, own).found,
+            Some(own) => crate::exchange::check(&path.display().to_string(), &text.into(), path, own).found,
             None => gr_step::diagnostics(text, FileId(0)),
         }
     }

@@ -80,7 +80,7 @@ pub fn run(global: &Global, args: &PlaceArgs) -> Exit {
     }
     let top = |args: [String; 2]| Diagnostic::new(code::ACCURACY_NO_DATA, FileId(0), Span::default(), &args);
     faults.extend(super::map::limitless(&machine).map(top));
-    show(&mut renderer, &Checked { sources: motion.sources, found: faults, more: 0, unreadable: false });
+    show(&mut renderer, &Checked { sources: motion.sources, found: faults, ..Checked::nothing() });
     renderer.finish(false);
     let error = found.error.map(|e| e * 1e3);
     let printed = super::print(&match args.format {

@@ -41,7 +41,7 @@ pub fn run(global: &Global, args: &PreviewArgs) -> Exit {
     let trace = (kind == "html").then(|| traced(&motion, &unit, station.machine.as_ref()));
     let made = picture(&motion.program, trace.as_ref(), &kind, &plot);
     drop(progress);
-    show(&mut renderer, &Checked { sources: motion.sources, found: motion.found, more: 0, unreadable: false });
+    show(&mut renderer, &Checked { sources: motion.sources, found: motion.found, ..Checked::nothing() });
     let exit = match made {
         _ if bad => Exit::Findings,
         Err(text) => {

@@ -207,7 +207,7 @@ impl Drawing {
         true
     }
 
-    fn draw(&mut self, text: Arc<str>, encoding: Encoding) {
+    fn draw(&mut self, text: gr_text::Text, encoding: Encoding) {
         let unit = Unit::new(&self.file, text.clone(), encoding, &self.station);
         let said = match motion(&unit, self.station.machine.as_ref()) {
             Ok((motion, checked)) => {
@@ -244,7 +244,7 @@ fn problem(checked: &Checked) -> String {
     let Some(first) = errors.next() else { return String::new() };
     let (file, span) = first.primary();
     let (line, _) = Positions::default().of(&checked.sources, file, span.start);
-    let more = errors.count() + checked.more;
+    let more = errors.count() + checked.more.errors;
     let rest = if more > 0 { format!(" (and {more} more)") } else { String::new() };
     format!("line {line}: {}{rest}", first.message)
 }

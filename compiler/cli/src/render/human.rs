@@ -226,7 +226,6 @@ impl Excerpt {
 
     fn build(&mut self, sources: &Sources, positions: &mut Positions, file: FileId) {
         let Some(source) = sources.get(file) else { return };
-        let index = positions.index(source, file);
         let text = &*source.text;
         self.first = self.wanted.keys().next().copied().unwrap_or(0);
         let mut at = self.first;
@@ -235,8 +234,8 @@ impl Excerpt {
                 self.text.push('\n');
                 at += 1;
             }
-            let start = index.start(*line as usize) as usize;
-            let whole = text.get(start..index.start(*line as usize + 1) as usize).unwrap_or("");
+            let start = positions.start(source, file, *line);
+            let whole = text.get(start..positions.start(source, file, *line + 1)).unwrap_or("");
             let end = start + whole.trim_end_matches(['\n', '\r']).len();
             let (mut cut_start, mut cut_end) = (start, end);
             if end - start > WIDTH {

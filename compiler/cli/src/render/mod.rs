@@ -51,11 +51,19 @@ pub struct Tally {
 impl Tally {
     /// Counts a finding.
     pub fn count(&mut self, severity: Severity) {
+        self.add(severity, 1);
+    }
+    /// Counts `n` findings.
+    pub fn add(&mut self, severity: Severity, n: usize) {
         match severity {
-            Severity::Error => self.errors += 1,
-            Severity::Warning => self.warnings += 1,
-            Severity::Hint => self.hints += 1,
+            Severity::Error => self.errors += n,
+            Severity::Warning => self.warnings += n,
+            Severity::Hint => self.hints += n,
         }
+    }
+    /// Findings of all kinds.
+    pub fn sum(&self) -> usize {
+        self.errors + self.warnings + self.hints
     }
     /// `2 errors and 1 warning in 3 files`.
     pub fn sentence(&self) -> String {
@@ -123,6 +131,15 @@ impl Renderer {
         }
         if self.held.len() > 1 << 16 {
             self.flush();
+        }
+    }
+    /// Findings that are not shown.
+    pub fn pass_over(&mut self, more: &Tally) {
+        self.tally.errors += more.errors;
+        self.tally.warnings += more.warnings;
+        self.tally.hints += more.hints;
+        if more.sum() > 0 {
+            self.remark(&format!("… and {} more findings of these kinds", more.sum()));
         }
     }
     /// A sentence for people.
