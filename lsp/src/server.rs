@@ -121,7 +121,7 @@ impl Backend {
         }
     }
 
-    /// As [`Backend::ask`], tried again when an edit overtook it: for what editors show all the time.
+    /// As [`Backend::ask`], tried again when an edit or new settings overtook it: for all that only looks.
     async fn ask_again<T: Send + 'static>(&self, uri: lsp::Uri, work: impl Fn(View) -> Answer<T> + Send + Clone + 'static) -> Result<Option<T>> {
         for _ in 0..3 {
             match self.ask(uri.clone(), work.clone()).await {
@@ -410,7 +410,7 @@ impl LanguageServer for Backend {
 
     async fn hover(&self, p: lsp::HoverParams) -> Result<Option<lsp::Hover>> {
         let at = p.text_document_position_params;
-        self.ask(at.text_document.uri, move |v| features::hover(v, at.position)).await.map(Option::flatten)
+        self.ask_again(at.text_document.uri, move |v| features::hover(v, at.position)).await.map(Option::flatten)
     }
     async fn completion(&self, p: lsp::CompletionParams) -> Result<Option<lsp::CompletionResponse>> {
         let at = p.text_document_position;
@@ -420,21 +420,21 @@ impl LanguageServer for Backend {
     }
     async fn signature_help(&self, p: lsp::SignatureHelpParams) -> Result<Option<lsp::SignatureHelp>> {
         let at = p.text_document_position_params;
-        self.ask(at.text_document.uri, move |v| features::signature(v, at.position)).await.map(Option::flatten)
+        self.ask_again(at.text_document.uri, move |v| features::signature(v, at.position)).await.map(Option::flatten)
     }
     async fn goto_definition(&self, p: lsp::GotoDefinitionParams) -> Result<Option<lsp::GotoDefinitionResponse>> {
         let at = p.text_document_position_params;
-        let found = self.ask(at.text_document.uri, move |v| features::definition(v, at.position)).await?;
+        let found = self.ask_again(at.text_document.uri, move |v| features::definition(v, at.position)).await?;
         Ok(found.map(lsp::GotoDefinitionResponse::Array))
     }
     async fn references(&self, p: lsp::ReferenceParams) -> Result<Option<Vec<lsp::Location>>> {
         let at = p.text_document_position;
         let declaration = p.context.include_declaration;
-        self.ask(at.text_document.uri, move |v| features::references(v, at.position, declaration)).await
+        self.ask_again(at.text_document.uri, move |v| features::references(v, at.position, declaration)).await
     }
     async fn document_highlight(&self, p: lsp::DocumentHighlightParams) -> Result<Option<Vec<lsp::DocumentHighlight>>> {
         let at = p.text_document_position_params;
-        self.ask(at.text_document.uri, move |v| features::highlights(v, at.position)).await
+        self.ask_again(at.text_document.uri, move |v| features::highlights(v, at.position)).await
     }
     async fn document_symbol(&self, p: lsp::DocumentSymbolParams) -> Result<Option<lsp::DocumentSymbolResponse>> {
         let symbols = self.ask_again(p.text_document.uri, features::symbols).await?;
@@ -473,7 +473,7 @@ impl LanguageServer for Backend {
     }
     async fn selection_range(&self, p: lsp::SelectionRangeParams) -> Result<Option<Vec<lsp::SelectionRange>>> {
         let at = p.positions;
-        self.ask(p.text_document.uri, move |v| features::selections(v, &at)).await
+        self.ask_again(p.text_document.uri, move |v| features::selections(v, &at)).await
     }
     async fn formatting(&self, p: lsp::DocumentFormattingParams) -> Result<Option<Vec<lsp::TextEdit>>> {
         self.ask(p.text_document.uri, move |v| features::format(v, None, &p.options)).await
@@ -494,19 +494,19 @@ impl LanguageServer for Backend {
     }
     async fn linked_editing_range(&self, p: lsp::LinkedEditingRangeParams) -> Result<Option<lsp::LinkedEditingRanges>> {
         let at = p.text_document_position_params;
-        self.ask(at.text_document.uri, move |v| features::linked(v, at.position)).await.map(Option::flatten)
+        self.ask_again(at.text_document.uri, move |v| features::linked(v, at.position)).await.map(Option::flatten)
     }
     async fn prepare_call_hierarchy(&self, p: lsp::CallHierarchyPrepareParams) -> Result<Option<Vec<lsp::CallHierarchyItem>>> {
         let at = p.text_document_position_params;
-        self.ask(at.text_document.uri, move |v| features::prepare_calls(v, at.position)).await
+        self.ask_again(at.text_document.uri, move |v| features::prepare_calls(v, at.position)).await
     }
     async fn incoming_calls(&self, p: lsp::CallHierarchyIncomingCallsParams) -> Result<Option<Vec<lsp::CallHierarchyIncomingCall>>> {
         let item = p.item;
-        self.ask(item.uri.clone(), move |v| features::incoming(v, &item)).await
+        self.ask_again(item.uri.clone(), move |v| features::incoming(v, &item)).await
     }
     async fn outgoing_calls(&self, p: lsp::CallHierarchyOutgoingCallsParams) -> Result<Option<Vec<lsp::CallHierarchyOutgoingCall>>> {
         let item = p.item;
-        self.ask(item.uri.clone(), move |v| features::outgoing(v, &item)).await
+        self.ask_again(item.uri.clone(), move |v| features::outgoing(v, &item)).await
     }
     async fn inlay_hint(&self, p: lsp::InlayHintParams) -> Result<Option<Vec<lsp::InlayHint>>> {
         self.ask_again(p.text_document.uri, move |v| features::hints(v, p.range)).await
@@ -565,10 +565,10 @@ impl Backend {
         self.ask_again(p.text_document.uri.clone(), move |v| features::preview(v, &p)).await
     }
     async fn output(&self, p: custom::OutputParams) -> Result<Option<custom::Output>> {
-        self.ask(p.text_document.uri.clone(), move |v| features::output(v, &p)).await
+        self.ask_again(p.text_document.uri.clone(), move |v| features::output(v, &p)).await
     }
     async fn state(&self, p: custom::StateParams) -> Result<Option<custom::State>> {
-        self.ask(p.text_document.uri, move |v| features::state(v, p.position)).await
+        self.ask_again(p.text_document.uri, move |v| features::state(v, p.position)).await
     }
     async fn targets(&self) -> Result<custom::Choices> {
         Ok(features::choices())

@@ -121,6 +121,25 @@ fn rapids_pass_over_a_boss_that_stands_above_its_pocket() {
     assert!(worst < 1e-6, "a rapid {worst} mm in the block");
 }
 
+/// A tool path of the file keeps its rapids, and is told of those that go through the block.
+#[test]
+fn rapids_of_the_file_through_the_block_are_told() {
+    let part = |z: f64| {
+        let mut p = Part::new(BLOCK);
+        let tool = p.tool("ENDMILL", 6.0, 0.0, None);
+        let (t, f) = (p.technology(), p.functions());
+        let points: Vec<String> = [[10.0, 10.0, 20.0], [10.0, 10.0, z], [50.0, 30.0, z]].iter().map(|q| format!("#{}", p.point(*q))).collect();
+        let line = p.add(format!("POLYLINE('',({}))", points.join(",")));
+        let path = p.add(format!("CUTTER_LOCATION_TRAJECTORY(.T.,.APPROACH.,SPEED_NAME(.RAPID.),$,$,.T.,#{line},$,$)"));
+        let list = p.add(format!("TOOLPATH_LIST((#{path}))"));
+        let op = p.add(format!("FREEFORM_OPERATION(#{list},$,'op',$,$,#{tool},#{t},#{f},$,$,$,$)"));
+        p.machine("TOOLPATH_FEATURE", &[op], [0.0; 3], Some(0.0), "");
+        p
+    };
+    says(&part(3.0), code::PLAN_RAPID_THROUGH_STOCK, "reaches up to Z12.000");
+    silent(&part(12.5), code::PLAN_RAPID_THROUGH_STOCK);
+}
+
 fn slot(x: [f64; 2], ends: [&str; 2], first: bool) -> Part {
     let mut p = Part::new(BLOCK);
     let tool = p.tool("ENDMILL", 10.0, 0.0, None);
