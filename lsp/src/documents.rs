@@ -49,6 +49,8 @@ pub struct Exchange {
     pub tables: gr_p21::Exchange,
     /// Its lines.
     pub lines: LineIndex,
+    /// In which units its speeds and angles are.
+    pub units: gr_ide::p21::Units,
 }
 
 /// A program that was run as a whole.
@@ -268,7 +270,8 @@ impl View {
             let text = self.text.to_string();
             let tables = gr_p21::parse(text.as_bytes());
             let lines = LineIndex::new(text.as_bytes());
-            Arc::new(Exchange { text, tables, lines })
+            let units = self.station.step_units.unwrap_or_else(|| gr_ide::p21::Units::of(text.as_bytes(), &tables));
+            Arc::new(Exchange { text, tables, lines, units })
         });
         made.clone()
     }

@@ -9,6 +9,8 @@ use gr_interp::Setup;
 use gr_spec::{Code, Dialect};
 use gr_text::{Diagnostic, Severity};
 
+pub use gr_ide::p21::Units as StepUnits;
+
 use crate::settings::Settings;
 
 /// The dialect of a file, by its name and text.
@@ -31,6 +33,8 @@ pub struct Station {
     pub dialect_of: DialectOf,
     /// Machine.
     pub machine: Option<Arc<gr_machine::Machine>>,
+    /// Units of STEP-NC files; none = by the program that wrote them.
+    pub step_units: Option<StepUnits>,
     /// Files it was made of: when they change it is made anew.
     pub files: Vec<PathBuf>,
     /// What is wrong with those files: the file, its text, the finding.
@@ -51,6 +55,7 @@ impl Default for Station {
             deny: Vec::new(),
             dialect_of: Arc::new(|_, _| Dialect::linuxcnc()),
             machine: None,
+            step_units: None,
             files: Vec::new(),
             found: Vec::new(),
             said: Vec::new(),

@@ -38,6 +38,8 @@ struct Abilities {
     /// Of code actions, what they do.
     resolves: bool,
     snippets: bool,
+    /// An edit may rename files.
+    moves_files: bool,
 }
 
 #[derive(Clone)]
@@ -264,7 +266,7 @@ impl Everything {
                 Kind::Exchange => {
                     let text = open.text.to_string();
                     let tables = gr_p21::parse(text.as_bytes());
-                    gr_ide::p21::outline::outline(gr_ide::p21::Doc { text: text.as_bytes(), file: &tables })
+                    gr_ide::p21::outline::outline(gr_ide::p21::Doc { text: text.as_bytes(), file: &tables, units: gr_ide::p21::Units::default() })
                 }
                 _ => continue,
             };
@@ -341,6 +343,8 @@ impl LanguageServer for Backend {
             resolves: wire.pointer("/textDocument/codeAction/resolveSupport/properties").and_then(Value::as_array).is_some_and(|p| p.iter().any(|p| p == "edit"))
                 && can("/textDocument/codeAction/dataSupport"),
             snippets: can("/textDocument/completion/completionItem/snippetSupport"),
+            moves_files: can("/workspace/workspaceEdit/documentChanges")
+                && wire.pointer("/workspace/workspaceEdit/resourceOperations").and_then(Value::as_array).is_some_and(|o| o.iter().any(|o| o == "rename")),
         };
         let folders = params.workspace_folders.unwrap_or_default();
         *self.folders.lock().unwrap_or_else(PoisonError::into_inner) = folders.iter().map(|f| f.uri.clone()).collect();
@@ -490,7 +494,8 @@ impl LanguageServer for Backend {
     }
     async fn rename(&self, p: lsp::RenameParams) -> Result<Option<lsp::WorkspaceEdit>> {
         let at = p.text_document_position;
-        self.ask(at.text_document.uri, move |v| features::rename(v, at.position, &p.new_name)).await.map(Option::flatten)
+        let moves_files = self.abilities().moves_files;
+        self.ask(at.text_document.uri, move |v| features::rename(v, at.position, &p.new_name, moves_files)).await.map(Option::flatten)
     }
     async fn linked_editing_range(&self, p: lsp::LinkedEditingRangeParams) -> Result<Option<lsp::LinkedEditingRanges>> {
         let at = p.text_document_position_params;

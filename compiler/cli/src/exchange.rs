@@ -125,6 +125,11 @@ fn syntax(unit: &Unit) -> Vec<Diagnostic> {
     if unit.step_overlap.is_some() || unit.step_units == Some(Units::StepModeler) {
         found.retain(|d| d.code != code::STEP_OVERLAP);
     }
+    // What a number is in the standard's unit is of no interest when the project says that it is in another.
+    if unit.step_units == Some(Units::StepModeler) {
+        let of_units = [code::STEP_FEED_UNIT, code::STEP_SPINDLE_UNIT, code::STEP_CUTSPEED_UNIT, code::STEP_NEGATIVE_SPINDLE];
+        found.retain(|d| !of_units.contains(&d.code));
+    }
     let mut all = Vec::new();
     add(&mut all, found, &unit.lints);
     all

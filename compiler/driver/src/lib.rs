@@ -8,6 +8,7 @@
 mod carried;
 mod check;
 mod db;
+mod deeds;
 mod disk;
 mod editor;
 mod engine;
@@ -26,10 +27,12 @@ mod ufmg;
 
 pub use check::{Check, MOST_OF_A_KIND, Unlisted};
 pub use db::Executed;
+pub use deeds::{Deeds, deeds};
 pub use editor::Traced;
 pub use hover::StateAt;
 pub use lazy::Lazy;
+pub use library::plain_path;
 pub use lints::{Level, Rules};
 pub use rates::rates;
 pub use session::{Cancelled, Canceller, Once, Options, Session, Snapshot, check_once};
-pub use stream::{Loaded, Motion, Streamed, lower, scan_file, stream};
+pub use stream::{Loaded, Motion, Overlay, Streamed, lower, scan_file, stream};

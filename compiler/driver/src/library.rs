@@ -260,7 +260,7 @@ pub(crate) fn sub_file(db: &dyn Db, run: RunOptions, id: FileId) -> Option<Arc<F
 }
 
 /// A path as files are compared by: absolute, without `.` and `..`.
-pub(crate) fn plain_path(path: &Path) -> PathBuf {
+pub fn plain_path(path: &Path) -> PathBuf {
     let mut plain = PathBuf::new();
     for part in std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf()).components() {
         match part {

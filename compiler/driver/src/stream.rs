@@ -26,12 +26,28 @@ pub struct Loaded {
     subs: Vec<File>,
     known: BTreeMap<PathBuf, FileId>,
     setup: Setup,
+    overlay: Overlay,
 }
+
+/// Texts that stand in for files on disk, by their absolute paths without `.` and `..`; none = there is no such file.
+pub type Overlay = BTreeMap<PathBuf, Option<std::sync::Arc<str>>>;
 
 impl Loaded {
     /// The program and what it will be run with. Nothing is scanned yet.
     pub fn new(path: &str, text: Text, setup: &Setup) -> Loaded {
-        Loaded { main: Lazy::new(path, text, setup.dialect), subs: Vec::new(), known: BTreeMap::new(), setup: setup.clone() }
+        Loaded::over(path, text, setup, Overlay::new())
+    }
+    /// The same with texts that go before those on disk.
+    pub fn over(path: &str, text: Text, setup: &Setup, overlay: Overlay) -> Loaded {
+        Loaded { main: Lazy::new(path, text, setup.dialect), subs: Vec::new(), known: BTreeMap::new(), setup: setup.clone(), overlay }
+    }
+    fn read(&self, path: &std::path::Path) -> Option<String> {
+        if !self.overlay.is_empty()
+            && let Some(text) = self.overlay.get(&crate::library::plain_path(path))
+        {
+            return text.as_deref().map(str::to_string);
+        }
+        Some(crate::disk::read_as(std::fs::read(path).ok()?, self.setup.dialect))
     }
     /// Subroutine files that were pulled in, in the order of their names.
     pub fn subs(&self) -> impl Iterator<Item = &PathBuf> {
@@ -57,8 +73,7 @@ impl Files for Loaded {
             if let Some(id) = self.known.get(&path) {
                 return Some(*id);
             }
-            let Ok(bytes) = std::fs::read(&path) else { continue };
-            let text = crate::disk::read_as(bytes, self.setup.dialect).into();
+            let Some(text) = self.read(&path).map(Text::from) else { continue };
             self.subs.push(crate::disk::file_of(&path.to_string_lossy(), &text, crate::disk::CHUNK, self.setup.dialect));
             let id = FileId(self.subs.len() as u32);
             self.known.insert(path, id);
@@ -93,7 +108,11 @@ pub struct Streamed<S> {
 
 /// Runs a program into a sink. With `rules`, the lints watch.
 pub fn stream<S: Sink>(path: &str, text: Text, setup: &Setup, rules: Option<&Rules>, sink: S) -> Streamed<S> {
-    let mut files = Loaded::new(path, text, setup);
+    stream_of(Loaded::new(path, text, setup), setup, rules, sink)
+}
+
+/// The same of files that were put together before.
+pub(crate) fn stream_of<S: Sink>(mut files: Loaded, setup: &Setup, rules: Option<&Rules>, sink: S) -> Streamed<S> {
     let tee = Tee { sink, lints: None, doubt: false };
     let mut run = Interp::new(&mut files, setup, tee);
     run.init();

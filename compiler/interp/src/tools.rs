@@ -50,7 +50,11 @@ impl<S: Sink> Interp<'_, S> {
 
     /// T.
     pub(crate) fn convert_tool_select(&mut self) -> Res {
-        let number = to_int(self.block.or_zero(b't'));
+        let mut number = to_int(self.block.or_zero(b't'));
+        // T0101 of a lathe is tool 1 with offset 1.
+        if crate::fanuc::is_lathe(self.setup.dialect) && number >= 100 {
+            number /= 100;
+        }
         let index = self.find_tool(number, b't')?;
         self.emit(Call::SelectTool(number));
         self.m.selected_pocket = index;

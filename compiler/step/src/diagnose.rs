@@ -201,34 +201,8 @@ impl Out<'_> {
         }
     }
 
-    /// The value in each unit that may have been meant: a finding about a unit chooses none.
-    fn readings(&self, f: &Finding) -> Vec<Fix> {
-        let c = f.code;
-        let meant: &[(usize, &str)] = if c == code::STEP_FEED_UNIT {
-            &[(2, "m/min was meant"), (3, "mm/min was meant")]
-        } else if c == code::STEP_SPINDLE_UNIT {
-            &[(2, "rpm was meant")]
-        } else if c == code::STEP_CUTSPEED_UNIT {
-            &[(2, "m/min was meant")]
-        } else if c == code::STEP_SPINDLE_SIGN {
-            &[(1, "clockwise, M3")]
-        } else if c == code::STEP_OVERLAP {
-            &[(1, "millimeters were meant"), (2, "percent was meant")]
-        } else {
-            &[]
-        };
-        let fix = |(n, why): &(usize, &str)| {
-            // A ratio of a tool that is not known is no number.
-            let value = f.args.get(*n).filter(|v| v.parse::<f64>().is_ok())?;
-            let real = if value.contains('.') { value.clone() } else { format!("{value}.") };
-            Some(Fix { title: format!("write {real} ({why})"), edits: vec![(self.file, f.span, real)] })
-        };
-        meant.iter().filter_map(fix).collect()
-    }
-
     fn finding(&mut self, f: Finding, kind: Dialect) {
         let mut d = Diagnostic::new(f.code, self.file, f.span, &f.args);
-        d.fixes = self.readings(&f);
         d.notes = f.notes;
         for (span, text) in f.labels {
             d = d.label(self.file, span, text);
@@ -242,6 +216,36 @@ impl Out<'_> {
         if f.code == code::STEP_BOTH_SPEEDS && kind == Dialect::StepModeler {
             d = d.note("the file was written by STEP Modeler (ST-GENERATOR), which has units of its own");
         }
+        d.fixes = self.readings(f.code, f.span, &f.args);
         self.list.push(d);
     }
+
+    /// The values that may have been meant, where a number is in another unit than the standard's.
+    fn readings(&self, c: gr_spec::Code, span: Span, args: &[String]) -> Vec<Fix> {
+        let of_tool = args.get(1).and_then(|a| a.parse::<f64>().ok());
+        let written = self.text.get(span.range()).and_then(|t| std::str::from_utf8(t).ok()).and_then(|t| t.trim().parse::<f64>().ok());
+        let Some(v) = written.filter(|v| v.is_finite()) else { return Vec::new() };
+        let readings: &[(f64, &str)] = match c {
+            code::STEP_FEED_UNIT => &[(v / 60.0, "m/min was meant"), (v / 60_000.0, "mm/min was meant")],
+            code::STEP_SPINDLE_UNIT => &[(v / 60.0, "rpm was meant")],
+            code::STEP_CUTSPEED_UNIT => &[(v / 60.0, "m/min was meant")],
+            code::STEP_SPINDLE_SIGN => &[(-v, "the tool turns clockwise (M3)")],
+            code::STEP_OVERLAP => &[(of_tool.unwrap_or(0.0), "millimeters were meant"), (v / 100.0, "percent was meant")],
+            _ => &[],
+        };
+        // The share of a tool is a ratio.
+        let sound = |(value, _): &&(f64, &str)| c != code::STEP_OVERLAP || (*value > 0.0 && *value < 1.0);
+        let fix = |(value, why): &(f64, &str)| {
+            let new = real(*value);
+            Fix { title: format!("write {new}: {why}"), edits: vec![(self.file, span, new)] }
+        };
+        readings.iter().filter(sound).map(fix).collect()
+    }
+}
+
+/// A number as Part 21 writes reals: with a decimal point, at most nine digits that count.
+fn real(v: f64) -> String {
+    let places = (8.0 - libm::floor(libm::log10(v.abs().max(1e-12)))).clamp(0.0, 15.0) as usize;
+    let text = format!("{v:.places$}");
+    if text.contains('.') { text.trim_end_matches('0').to_string() } else { format!("{text}.") }
 }

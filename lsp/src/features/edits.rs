@@ -161,7 +161,8 @@ fn fixes(view: &View, at: Span) -> Answer<(Vec<lsp::CodeAction>, Vec<lsp::Diagno
             }
             let mut a = action(view, Action { title: fix.title.clone(), kind: ActionKind::Fix, edits });
             a.diagnostics = Some(vec![protocol::diagnostic(d, &view.text, view.columns, &|_| None)]);
-            a.is_preferred = Some(n == 0);
+            // Of several readings none is the one to take unasked.
+            a.is_preferred = Some(n == 0 && d.fixes.len() == 1);
             out.push(a);
         }
         if d.fixes.is_empty() {

@@ -50,24 +50,19 @@ fn gcode_hover(view: &mut View, offset: u32) -> Answer<Option<gr_ide::Hover>> {
     let traced = trace_line(view, line.line, &wanted)?;
     let moves = traced.as_ref().is_some_and(|t| t.program.steps().any(|s| s.op.moves()));
     let motion = if moves && view.station.machine.is_some() { view.motion()? } else { None };
+    let written = match parameter.as_ref().and_then(|p| names::last_write(doc, p, line.line)) {
+        Some(w) if w.certain => Some(w.line),
+        // The only setting of the program: was it carried out, and is the value its own?
+        Some(w) => trace_line(view, w.line, &wanted)?.filter(|set| traced.as_ref().is_some_and(|t| t.values == set.values_after)).map(|_| w.line),
+        None => None,
+    };
+    let written = written.and_then(|l| doc.line(l)).map(|l| (l.line, l.text()));
     let pace = view.pace()?;
     view.release();
     let run = traced.map(|t| run_of(view, t, &pace, motion.as_deref(), parameter.is_some()));
-    // The text tells which assignment was the last only where lines are run one after the other.
-    let straight = |p: &Parameter| is_programs_own(p) && tables.0.chunks.iter().all(|c| c.scan.controls.is_empty() && c.scan.lines.iter().all(|l| !l.deleted));
-    let written = parameter.filter(straight).and_then(|p| names::last_write(doc, &p, line.line));
-    let written = written.and_then(|l| doc.line(l)).map(|l| (l.line, l.text()));
     let setup = &view.station.setup;
     let facts = Facts { run: run.as_ref(), tools: Some((&setup.tools, setup.machine_units)), last_write: written, repeats: repeats(doc, line.line) };
     Ok(gcode::hover::hover(doc, offset, facts))
-}
-
-/// Whether nothing but assignments changes a parameter: system parameters follow offsets, positions, probes.
-fn is_programs_own(p: &Parameter) -> bool {
-    match p {
-        Parameter::Number(n) => *n < 5_000,
-        Parameter::Named(n) => gr_spec::parameter(n).is_none(),
-    }
 }
 
 /// Whether a line stands in a subroutine or a loop.
@@ -376,7 +371,7 @@ pub fn lenses(mut view: View) -> Answer<Vec<lsp::CodeLens>> {
             let Some(tables) = view.program()? else { return Ok(Vec::new()) };
             let doc = doc(&tables);
             let subs = names::subs(doc);
-            let elsewhere = if subs.is_empty() { Vec::new() } else { calls_elsewhere(&view) };
+            let elsewhere = if subs.is_empty() { Vec::new() } else { super::names::calls_elsewhere(&view, &tables) };
             let count = |label: &str| elsewhere.iter().filter(|l| *l == label).count();
             let ran = motion.as_ref().zip(report.as_ref()).map(|(m, r)| (&*m.program, m.main, &**r, &m.rates));
             gcode::lenses::lenses(doc, ran, &count)
@@ -397,14 +392,6 @@ pub fn lenses(mut view: View) -> Answer<Vec<lsp::CodeLens>> {
         }
     };
     Ok(found.into_iter().map(lens).collect())
-}
-
-/// Labels that the other programs of the workspace call, each as often as it is called.
-fn calls_elsewhere(view: &View) -> Vec<String> {
-    let dialect = if let Kind::Gcode(_, d) = view.kind { d } else { gr_spec::Dialect::linuxcnc() };
-    let all = view.other_programs();
-    let calls = all.iter().flat_map(|(_, _, file)| names::calls(gcode::Doc { file, dialect }));
-    calls.map(|c| names::label_text(&c.label)).collect()
 }
 
 /// Subroutine files that are called.

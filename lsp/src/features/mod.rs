@@ -5,6 +5,7 @@ mod custom;
 mod edits;
 mod look;
 mod names;
+mod reach;
 mod write;
 
 pub use custom::*;
@@ -185,7 +186,7 @@ fn doc<'a>(tables: &'a (std::sync::Arc<gr_gcode::File>, &'static gr_spec::Dialec
 
 /// The exchange file of a view.
 fn exchange_doc(exchange: &crate::documents::Exchange) -> gr_ide::p21::Doc<'_> {
-    gr_ide::p21::Doc { text: exchange.text.as_bytes(), file: &exchange.tables }
+    gr_ide::p21::Doc { text: exchange.text.as_bytes(), file: &exchange.tables, units: exchange.units }
 }
 
 /// Edits of one file as the protocol has them.

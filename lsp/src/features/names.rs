@@ -1,6 +1,6 @@
 //! Names over files: definition, references, rename, highlights, linked editing, call hierarchy.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::PathBuf;
 
 use gr_gcode::{Label, Parameter};
@@ -11,6 +11,7 @@ use names::Name;
 use serde_json::json;
 use tower_lsp::ls_types as lsp;
 
+use super::reach::{Home, Reach};
 use super::{Answer, Failure, doc, exchange_doc};
 use crate::documents::{Kind, View};
 use crate::text::Text;
@@ -72,6 +73,14 @@ pub fn definition(mut view: View, at: lsp::Position) -> Answer<Vec<lsp::Location
     let doc = doc(&tables);
     let Some((name, _)) = names::name_at(doc, offset) else { return Ok(Vec::new()) };
     let line = doc.line_at(offset).map(|l| l.line);
+    if let Name::Sub(label) = &name
+        && let reach = Reach::with(&view, tables.clone())
+        && let Home::File(home) = reach.home(label, offset)
+        && let Some(sub) = reach.sub(home, label)
+    {
+        let file = &reach.files[home];
+        return Ok(vec![location(&file.uri, &file.file, sub.span, &view)]);
+    }
     let found = names::definitions(doc, &name, line);
     if !found.is_empty() {
         return Ok(found.into_iter().map(|s| lsp::Location { uri: view.uri.clone(), range: view.range(s) }).collect());
@@ -79,6 +88,11 @@ pub fn definition(mut view: View, at: lsp::Position) -> Answer<Vec<lsp::Location
     Ok(match &name {
         Name::Sub(label) => sub_elsewhere(&view, label, tables.1).map(|(uri, file, span)| location(&uri, &file, span, &view)).into_iter().collect(),
         Name::Tool(number) => tool_row(&view, *number).into_iter().collect(),
+        Name::Parameter(p) if !names::is_local(p) => {
+            let reach = Reach::with(&view, tables.clone());
+            let written = |i: usize| names::occurrences(reach.doc(i), &name, None).into_iter().filter(|o| o.role == Role::Write).map(move |o| (i, o.span));
+            reach.connected(0).into_iter().flat_map(written).map(|(i, span)| location(&reach.files[i].uri, &reach.files[i].file, span, &view)).collect()
+        }
         _ => Vec::new(),
     })
 }
@@ -100,7 +114,8 @@ fn sub_elsewhere(view: &View, label: &Label, dialect: &'static gr_spec::Dialect)
             return Some(found);
         }
     }
-    view.other_programs().into_iter().find_map(|(_, uri, file)| in_file(uri, file))
+    let named = |path: &PathBuf| path.file_stem().is_some_and(|s| s.to_string_lossy() == *name);
+    view.other_programs().into_iter().filter(|(path, ..)| named(path)).find_map(|(_, uri, file)| in_file(uri, file))
 }
 
 /// The line of a tool in the tool table.
@@ -117,49 +132,67 @@ fn tool_row(view: &View, number: i64) -> Option<lsp::Location> {
 /// Everywhere that the name under the cursor stands.
 pub fn references(mut view: View, at: lsp::Position, declaration: bool) -> Answer<Vec<lsp::Location>> {
     let offset = view.offset(at);
-    let mut found = Vec::new();
-    for (uri, spans, text) in everywhere(&mut view, offset)?.1 {
-        let text = text.as_ref().unwrap_or(&view.text);
-        let wanted = spans.into_iter().filter(|o| declaration || o.role != Role::Definition);
-        found.extend(wanted.map(|o| lsp::Location { uri: uri.clone(), range: text.range(o.span, view.columns) }));
+    let wanted = |o: &gr_ide::Occurrence| declaration || o.role != Role::Definition;
+    match everywhere(&mut view, offset)? {
+        Target::None => Ok(Vec::new()),
+        Target::Instance(_, spans) => {
+            let own = |o: gr_ide::Occurrence| lsp::Location { uri: view.uri.clone(), range: view.range(o.span) };
+            Ok(spans.into_iter().filter(wanted).map(own).collect())
+        }
+        Target::Name(named) => {
+            let mut found = Vec::new();
+            for (i, spans) in named.places {
+                let (uri, text) = (&named.reach.files[i].uri, Text::new(&named.reach.text(i)));
+                found.extend(spans.into_iter().filter(wanted).map(|o| lsp::Location { uri: uri.clone(), range: text.range(o.span, view.columns) }));
+            }
+            Ok(found)
+        }
     }
-    Ok(found)
 }
 
 /// What stands under the cursor.
 enum Target {
     None,
-    Instance(u64),
-    Name(Name, Option<u32>),
+    Instance(u64, Vec<gr_ide::Occurrence>),
+    Name(Named),
 }
 
-type PerFile = Vec<(lsp::Uri, Vec<gr_ide::Occurrence>, Option<Text>)>;
+/// A name of programs.
+struct Named {
+    name: Name,
+    /// Where it was asked for.
+    line: Option<u32>,
+    /// Of a subroutine: where it is.
+    home: Home,
+    /// Where it stands, by file.
+    places: Vec<(usize, Vec<gr_ide::Occurrence>)>,
+    reach: Reach,
+}
 
-fn everywhere(view: &mut View, offset: u32) -> Answer<(Target, PerFile)> {
-    let uri = view.uri.clone();
+fn everywhere(view: &mut View, offset: u32) -> Answer<Target> {
     if matches!(view.kind, Kind::Exchange) {
         let exchange = view.exchange();
         let doc = exchange_doc(&exchange);
-        let Some((id, _)) = p21::names::name_at(doc, offset) else { return Ok((Target::None, Vec::new())) };
-        return Ok((Target::Instance(id), vec![(uri, p21::names::occurrences(doc, id), None)]));
+        let Some((id, _)) = p21::names::name_at(doc, offset) else { return Ok(Target::None) };
+        return Ok(Target::Instance(id, p21::names::occurrences(doc, id)));
     }
-    let Some(tables) = view.program()? else { return Ok((Target::None, Vec::new())) };
-    let doc = doc(&tables);
-    let Some((name, _)) = names::name_at(doc, offset) else { return Ok((Target::None, Vec::new())) };
+    let Some(reach) = Reach::of(view)? else { return Ok(Target::None) };
+    let doc = reach.doc(0);
+    let Some((name, _)) = names::name_at(doc, offset) else { return Ok(Target::None) };
     let line = doc.line_at(offset).map(|l| l.line);
-    let mut found = vec![(uri, names::occurrences(doc, &name, line), None)];
-    // Subroutines are known to all files; so are global names, but each program starts with none of them.
-    let shared = matches!(name, Name::Sub(_));
-    if shared {
-        for (_, uri, file) in view.other_programs() {
-            let spans = names::occurrences(gcode::Doc { file: &file, dialect: tables.1 }, &name, None);
-            if !spans.is_empty() {
-                let text: String = file.chunks.iter().map(|c| &*c.text).collect();
-                found.push((uri, spans, Some(Text::new(&text))));
-            }
+    let own = || vec![(0, names::occurrences(doc, &name, line))];
+    let (home, places) = match &name {
+        Name::Sub(label) => match reach.home(label, offset) {
+            Home::File(home) => (Home::File(home), reach.of_sub(home, label)),
+            other => (other, own()),
+        },
+        Name::Parameter(p) if !names::is_local(p) => {
+            let of = |i: usize| (i, names::occurrences(reach.doc(i), &name, None));
+            (Home::Nowhere, reach.connected(0).into_iter().map(of).filter(|f| !f.1.is_empty()).collect())
         }
-    }
-    Ok((Target::Name(name, line), found))
+        _ => (Home::Nowhere, own()),
+    };
+    Ok(Target::Name(Named { name, line, home, places, reach }))
 }
 
 /// The name that would be renamed.
@@ -170,44 +203,155 @@ pub fn prepare_rename(mut view: View, at: lsp::Position) -> Answer<Option<lsp::P
     } else {
         let Some(tables) = view.program()? else { return Ok(None) };
         let found = names::name_at(doc(&tables), offset);
-        if let Some((Name::Parameter(Parameter::Named(n)), _)) = &found
-            && gr_spec::parameter(n).is_some_and(|d| !d.name.is_empty())
-        {
-            return Err(Failure::Refused(format!("#<{n}> is the controller's own")));
+        if let Some(why) = found.as_ref().and_then(|(name, _)| names::fixed(name)) {
+            return Err(Failure::Refused(why));
         }
-        found.filter(|(n, _)| !matches!(n, Name::Tool(_))).map(|f| f.1)
+        found.map(|f| f.1)
     };
     Ok(span.map(|s| lsp::PrepareRenameResponse::RangeWithPlaceholder { range: view.range(s), placeholder: view.text.slice(s) }))
 }
 
-/// Renames in all files.
-pub fn rename(mut view: View, at: lsp::Position, new: &str) -> Answer<Option<lsp::WorkspaceEdit>> {
+/// Renames in all files. `moves_files`: the client can rename a file together with what it calls.
+pub fn rename(mut view: View, at: lsp::Position, new: &str, moves_files: bool) -> Answer<Option<lsp::WorkspaceEdit>> {
     let offset = view.offset(at);
-    let (target, files) = everywhere(&mut view, offset)?;
-    let new = match &target {
-        Target::None => return Ok(None),
-        Target::Instance(id) => {
+    match everywhere(&mut view, offset)? {
+        Target::None => Ok(None),
+        Target::Instance(id, spans) => {
             let exchange = view.exchange();
-            p21::names::rename(exchange_doc(&exchange), *id, new).map_err(Failure::Refused)?;
-            format!("#{}", new.trim().trim_start_matches('#'))
+            p21::names::rename(exchange_doc(&exchange), id, new).map_err(Failure::Refused)?;
+            let new = format!("#{}", new.trim().trim_start_matches('#'));
+            let edits = spans.into_iter().map(|o| lsp::TextEdit { range: view.range(o.span), new_text: new.clone() }).collect();
+            Ok(Some(lsp::WorkspaceEdit { changes: Some(HashMap::from([(view.uri.clone(), edits)])), ..lsp::WorkspaceEdit::default() }))
         }
-        Target::Name(name, line) => {
-            let checked = names::check_new_name(name, new).map_err(Failure::Refused)?;
-            let Kind::Gcode(_, dialect) = view.kind else { return Ok(None) };
-            let file = gr_driver::scan_file("", &view.text.to_string(), dialect);
-            if names::is_taken(gcode::Doc { file: &file, dialect }, name, *line, &checked) {
-                return Err(Failure::Refused(format!("{checked} is taken already")));
-            }
-            checked
-        }
-    };
-    let mut changes = HashMap::new();
-    for (uri, spans, text) in files {
-        let text = text.as_ref().unwrap_or(&view.text);
-        let edits = spans.into_iter().map(|o| lsp::TextEdit { range: text.range(o.span, view.columns), new_text: new.clone() }).collect();
-        changes.insert(uri, edits);
+        Target::Name(named) => rename_name(&view, &named, new, moves_files).map_err(Failure::Refused).map(Some),
     }
-    Ok(Some(lsp::WorkspaceEdit { changes: Some(changes), ..lsp::WorkspaceEdit::default() }))
+}
+
+/// Renames what can be shown to mean the same afterwards. `Err` says why it can't.
+fn rename_name(view: &View, named: &Named, new: &str, moves_files: bool) -> Result<lsp::WorkspaceEdit, String> {
+    let Named { name, line, places, reach, .. } = named;
+    let new = names::check_new_name(name, new)?;
+    if names::renamed(name, &new) == *name {
+        return Err(format!("it is called {new} already"));
+    }
+    let inside = |i: usize| i == 0 || view.others.iter().any(|o| o.path == reach.files[i].path) || view.workspace.folders().iter().any(|f| reach.files[i].path.starts_with(f));
+    let concerned: Vec<usize> = match name {
+        Name::Parameter(p) if !names::is_local(p) => reach.connected(0).into_iter().collect(),
+        _ => places.iter().map(|p| p.0).collect(),
+    };
+    for i in concerned.iter().copied() {
+        if !inside(i) && places.iter().any(|p| p.0 == i) {
+            return Err(format!("{} lies outside of the open folders", reach.name(i)));
+        }
+        let line = line.filter(|_| i == 0);
+        let in_file = |why: String| if i == 0 { why } else { format!("{}: {why}", reach.name(i)) };
+        if let Some(why) = names::objection(reach.doc(i), name, line) {
+            return Err(in_file(why));
+        }
+        if names::is_taken(reach.doc(i), name, line, &new) {
+            return Err(in_file(format!("{new} is taken already")));
+        }
+    }
+    let moved = match name {
+        Name::Sub(label) => sub_moves(view, named, label, &new, moves_files)?,
+        Name::Parameter(p) if !names::is_local(p) => shared(view, named, p, &concerned, &new).map_or(Ok(None), Err)?,
+        Name::Line(n) => jumped_to(reach, *n).map_or(Ok(None), Err)?,
+        _ => None,
+    };
+    let edited: BTreeMap<usize, String> = places.iter().map(|(i, spans)| (*i, replaced(reach.text(*i), spans, &new))).collect();
+    reach.prove(view, &edited, moved.as_ref().map(|m| (m.0, m.1.as_path())))?;
+    Ok(edit_of(view, named, &new, moved))
+}
+
+/// A text with other names in it.
+fn replaced(mut text: String, spans: &[gr_ide::Occurrence], new: &str) -> String {
+    for o in spans.iter().rev() {
+        text.replace_range(o.span.range(), new);
+    }
+    text
+}
+
+/// The file that has to be called like its subroutine, and its new name. `Err`: there would be another subroutine of that
+/// name, or it can't be told who calls this one.
+fn sub_moves(view: &View, named: &Named, label: &Label, new: &str, moves_files: bool) -> Result<Option<(usize, PathBuf)>, String> {
+    let reach = &named.reach;
+    let home = match named.home {
+        Home::File(home) => home,
+        Home::Unclear => return Err("it depends on the way of execution which of two subroutines this is".into()),
+        Home::Nowhere => return Err("no file has this subroutine".into()),
+    };
+    let callers: Vec<usize> = (0..reach.files.len()).filter(|i| named.places.iter().any(|p| p.0 == *i)).collect();
+    let unclear = |i: &usize| reach.files[*i].calls.iter().any(|c| c.0.label == *label && (c.1 == Home::Unclear || c.1 == Home::Nowhere));
+    if let Some(i) = reach.connected(home).iter().find(|i| unclear(i)) {
+        return Err(format!("a call in {} may mean this subroutine or another one", reach.name(*i)));
+    }
+    let mentioned = |remap: &String| remap.split_whitespace().any(|w| w.to_ascii_lowercase().ends_with(&format!("={}", file_name(label))));
+    if view.station.setup.ini.all("rs274ngc", "remap").iter().any(mentioned) {
+        return Err("the INI file remaps a code to it".into());
+    }
+    let Name::Sub(other) = names::renamed(&named.name, new) else { return Ok(None) };
+    if let Some(why) = reach.sub_taken(view, &callers, &other) {
+        return Err(why);
+    }
+    let path = &reach.files[home].path;
+    let named_so = path.file_stem().is_some_and(|s| s.to_string_lossy() == *file_name(label)) && path.extension().is_some_and(|e| e == "ngc");
+    if !named_so {
+        return Ok(None);
+    }
+    if !moves_files {
+        return Err(format!("{} would have to be renamed too, and this editor does not do that", reach.name(home)));
+    }
+    Ok(Some((home, path.with_file_name(format!("{}.ngc", file_name(&other))))))
+}
+
+/// Why a parameter that all subroutines know can't have this name.
+fn shared(view: &View, named: &Named, p: &Parameter, concerned: &[usize], new: &str) -> Option<String> {
+    let reach = &named.reach;
+    let setup = &view.station.setup;
+    if !setup.ini.all("rs274ngc", "remap").is_empty() {
+        return Some("codes that the INI file remaps may use it".into());
+    }
+    let kept = |p: &Parameter| matches!(p, Parameter::Number(n) if setup.params.contains_key(n));
+    if let Name::Parameter(other) = names::renamed(&named.name, new)
+        && (kept(p) || kept(&other))
+    {
+        return Some("the parameter file keeps it from one program to the next".into());
+    }
+    if let Some(i) = concerned.iter().find(|i| names::calls_by_value(reach.doc(**i))) {
+        return Some(format!("a subroutine whose number {} computes may use it", reach.name(*i)));
+    }
+    // A program of its own that sets it before it reads it does not depend on this one.
+    let relies = |i: &usize| names::occurrences(reach.doc(*i), &named.name, None).first().is_some_and(|o| o.role != Role::Write);
+    let other = (0..reach.files.len()).filter(|i| !concerned.contains(i)).find(relies)?;
+    Some(format!("{} reads it too, and may rely on what this program sets", reach.name(other)))
+}
+
+/// Why a line can't have another number: `M99 P` of a subprogram goes to lines of the program that calls it.
+fn jumped_to(reach: &Reach, n: i64) -> Option<String> {
+    let mut others = reach.connected(0).into_iter().filter(|i| *i != 0);
+    let found = others.find(|i| names::occurrences(reach.doc(*i), &Name::Line(n), None).iter().any(|o| o.role == Role::Read))?;
+    Some(format!("{} may jump to it", reach.name(found)))
+}
+
+/// The edit in the words of the protocol: file operations need the longer form.
+fn edit_of(view: &View, named: &Named, new: &str, moved: Option<(usize, PathBuf)>) -> lsp::WorkspaceEdit {
+    let edits = |i: usize, spans: &[gr_ide::Occurrence]| -> Vec<lsp::TextEdit> {
+        let text = Text::new(&named.reach.text(i));
+        spans.iter().map(|o| lsp::TextEdit { range: text.range(o.span, view.columns), new_text: new.to_string() }).collect()
+    };
+    let of = |(i, spans): &(usize, Vec<gr_ide::Occurrence>)| (named.reach.files[*i].uri.clone(), edits(*i, spans));
+    let all = named.places.iter().map(of);
+    let Some((home, new_uri)) = moved.and_then(|(home, to)| Some((home, lsp::Uri::from_file_path(&to)?))) else {
+        return lsp::WorkspaceEdit { changes: Some(all.collect()), ..lsp::WorkspaceEdit::default() };
+    };
+    let edit = |(uri, edits): (lsp::Uri, Vec<lsp::TextEdit>)| {
+        let text_document = lsp::OptionalVersionedTextDocumentIdentifier { uri, version: None };
+        lsp::DocumentChangeOperation::Edit(lsp::TextDocumentEdit { text_document, edits: edits.into_iter().map(lsp::OneOf::Left).collect() })
+    };
+    let old_uri = named.reach.files[home].uri.clone();
+    let rename = lsp::ResourceOp::Rename(lsp::RenameFile { old_uri, new_uri, options: None, annotation_id: None });
+    let operations = all.map(edit).chain(std::iter::once(lsp::DocumentChangeOperation::Op(rename))).collect();
+    lsp::WorkspaceEdit { document_changes: Some(lsp::DocumentChanges::Operations(operations)), ..lsp::WorkspaceEdit::default() }
 }
 
 /// Where the name under the cursor stands in this document.
@@ -286,23 +430,22 @@ pub fn prepare_calls(mut view: View, at: lsp::Position) -> Answer<Vec<lsp::CallH
         let n = p21::names::name_at(doc, offset).and_then(|(id, _)| doc.file.find(id)).or_else(|| doc.instance_at(offset));
         return Ok(n.and_then(|n| instance_item(&view, doc, n)).into_iter().collect());
     }
-    let Some(tables) = view.program()? else { return Ok(Vec::new()) };
-    let doc = doc(&tables);
-    let label = match names::name_at(doc, offset) {
-        Some((Name::Sub(label), _)) => Some(label),
+    let Some(reach) = Reach::of(&mut view)? else { return Ok(Vec::new()) };
+    let doc = reach.doc(0);
+    let (label, home) = match names::name_at(doc, offset) {
+        Some((Name::Sub(label), _)) => {
+            let home = reach.home(&label, offset);
+            (Some(label), home)
+        }
         _ => {
             let line = doc.line_at(offset).map_or(0, |l| l.line);
-            names::subs(doc).into_iter().find(|s| (s.first..=s.last).contains(&line)).map(|s| s.label)
+            (reach.files[0].subs.iter().find(|s| (s.first..=s.last).contains(&line)).map(|s| s.label.clone()), Home::File(0))
         }
     };
     let Some(label) = label else { return Ok(vec![main_item(&view, &view.uri, &view.text)]) };
-    if let Some(sub) = names::subs(doc).iter().find(|s| s.label == label) {
-        return Ok(vec![sub_item(&view, &view.uri, doc.file, &view.text, sub)]);
-    }
-    let Some((uri, file, _)) = sub_elsewhere(&view, &label, tables.1) else { return Ok(Vec::new()) };
-    let other = gcode::Doc { file: &file, dialect: tables.1 };
-    let text = Text::new(&other.text());
-    Ok(names::subs(other).iter().find(|s| s.label == label).map(|s| sub_item(&view, &uri, &file, &text, s)).into_iter().collect())
+    let Home::File(home) = home else { return Ok(Vec::new()) };
+    let item = |sub: &names::Sub| sub_item(&view, &reach.files[home].uri, &reach.files[home].file, &Text::new(&reach.text(home)), sub);
+    Ok(reach.sub(home, &label).map(item).into_iter().collect())
 }
 
 fn label_of(name: &str) -> Option<Label> {
@@ -311,13 +454,6 @@ fn label_of(name: &str) -> Option<Label> {
         return Some(Label::Named(named.into()));
     }
     bare.parse().ok().map(Label::Number)
-}
-
-/// All programs that may call each other: this one first.
-fn programs(view: &mut View) -> Answer<Vec<(lsp::Uri, std::sync::Arc<gr_gcode::File>)>> {
-    let own = view.program()?.map(|t| (view.uri.clone(), t.0));
-    let others = view.other_programs().into_iter().map(|(_, uri, file)| (uri, file));
-    Ok(own.into_iter().chain(others).collect())
 }
 
 /// Who calls it.
@@ -333,21 +469,20 @@ pub fn incoming(mut view: View, of: &lsp::CallHierarchyItem) -> Answer<Vec<lsp::
         };
         return Ok(users.iter().filter_map(call).collect());
     }
-    let (Some(label), Kind::Gcode(_, dialect)) = (label_of(&of.name), view.kind) else { return Ok(Vec::new()) };
+    let (Some(label), Some(reach)) = (label_of(&of.name), Reach::of(&mut view)?) else { return Ok(Vec::new()) };
+    let Some(home) = reach.find(&of.uri) else { return Ok(Vec::new()) };
     let mut found = Vec::new();
-    for (uri, file) in programs(&mut view)? {
-        let doc = gcode::Doc { file: &file, dialect };
-        let calls: Vec<names::CallSite> = names::calls(doc).into_iter().filter(|c| c.label == label).collect();
+    for (i, file) in reach.files.iter().enumerate() {
+        let calls: Vec<&names::CallSite> = file.calls.iter().filter(|c| c.0.label == label && c.1 == Home::File(home)).map(|c| &c.0).collect();
         if calls.is_empty() {
             continue;
         }
-        let (text, subs) = (Text::new(&doc.text()), names::subs(doc));
-        let mut places: Vec<Option<usize>> = calls.iter().map(|c| c.from).collect();
-        places.dedup();
+        let text = Text::new(&reach.text(i));
+        let places: BTreeSet<Option<usize>> = calls.iter().map(|c| c.from).collect();
         for place in places {
-            let from = match place.and_then(|p| subs.get(p)) {
-                Some(sub) => sub_item(&view, &uri, &file, &text, sub),
-                None => main_item(&view, &uri, &text),
+            let from = match place.and_then(|p| file.subs.get(p)) {
+                Some(sub) => sub_item(&view, &file.uri, &file.file, &text, sub),
+                None => main_item(&view, &file.uri, &text),
             };
             let ranges = calls.iter().filter(|c| c.from == place).map(|c| text.range(c.span, view.columns)).collect();
             found.push(lsp::CallHierarchyIncomingCall { from, from_ranges: ranges });
@@ -374,31 +509,31 @@ pub fn outgoing(mut view: View, of: &lsp::CallHierarchyItem) -> Answer<Vec<lsp::
         }
         return Ok(found);
     }
-    let Kind::Gcode(_, dialect) = view.kind else { return Ok(Vec::new()) };
+    let Some(reach) = Reach::of(&mut view)? else { return Ok(Vec::new()) };
     let wanted = label_of(&of.name);
-    let all = programs(&mut view)?;
     let mut found: Vec<lsp::CallHierarchyOutgoingCall> = Vec::new();
-    let Some((uri, file)) = all.iter().find(|(uri, _)| *uri == of.uri) else { return Ok(found) };
-    let doc = gcode::Doc { file, dialect };
-    let (text, subs) = (Text::new(&doc.text()), names::subs(doc));
-    let from = wanted.and_then(|l| subs.iter().position(|s| s.label == l));
-    for call in names::calls(doc).into_iter().filter(|c| c.from == from) {
-        let range = text.range(call.span, view.columns);
+    let Some(at) = reach.find(&of.uri) else { return Ok(found) };
+    let text = Text::new(&reach.text(at));
+    let from = wanted.and_then(|l| reach.files[at].subs.iter().position(|s| s.label == l));
+    for (call, home) in reach.files[at].calls.iter().filter(|c| c.0.from == from) {
+        let Home::File(home) = *home else { continue };
+        let (range, file) = (text.range(call.span, view.columns), &reach.files[home]);
         let name = names::label_text(&call.label);
-        if let Some(known) = found.iter_mut().find(|f| f.to.name == name) {
+        if let Some(known) = found.iter_mut().find(|f| f.to.name == name && f.to.uri == file.uri) {
             known.from_ranges.push(range);
             continue;
         }
-        let here = subs.iter().find(|s| s.label == call.label).map(|s| sub_item(&view, uri, file, &text, s));
-        let to = here.or_else(|| {
-            let (uri, file, _) = sub_elsewhere(&view, &call.label, dialect)?;
-            let other = gcode::Doc { file: &file, dialect };
-            let text = Text::new(&other.text());
-            names::subs(other).iter().find(|s| s.label == call.label).map(|s| sub_item(&view, &uri, &file, &text, s))
-        });
-        if let Some(to) = to {
+        if let Some(sub) = reach.sub(home, &call.label) {
+            let to = sub_item(&view, &file.uri, &file.file, &Text::new(&reach.text(home)), sub);
             found.push(lsp::CallHierarchyOutgoingCall { to, from_ranges: vec![range] });
         }
     }
     Ok(found)
+}
+
+/// Labels that calls in other files name, of subroutines in this one.
+pub(super) fn calls_elsewhere(view: &View, tables: &(std::sync::Arc<gr_gcode::File>, &'static gr_spec::Dialect)) -> Vec<String> {
+    let reach = Reach::with(view, tables.clone());
+    let calls = reach.files.iter().skip(1).flat_map(|f| &f.calls).filter(|c| c.1 == Home::File(0));
+    calls.map(|c| names::label_text(&c.0.label)).collect()
 }

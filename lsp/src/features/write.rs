@@ -54,8 +54,13 @@ fn gcode_completion(view: &mut View, offset: u32) -> Answer<Vec<Completion>> {
     let state = if dialect.family == gr_spec::Family::Ufmg2008 { None } else { session.state_at(file, line)? };
     view.release();
     let subs = other_subs(view, dialect);
-    let setup = &view.station.setup;
-    let around = Around { modal: state.as_ref().map(|s| &s.before), tools: Some((&setup.tools, setup.machine_units)), subs: &subs };
+    let setup = view.station.setup_for(dialect);
+    let around = Around {
+        modal: state.as_ref().map(|s| &s.before),
+        setup: Some(&setup).filter(|_| dialect.family != gr_spec::Family::Ufmg2008),
+        tools: Some((&setup.tools, setup.machine_units)),
+        subs: &subs,
+    };
     Ok(gcode::complete::complete(doc(&tables), offset, around))
 }
 
@@ -65,6 +70,9 @@ fn other_subs(view: &View, dialect: &'static gr_spec::Dialect) -> Vec<(String, S
     for (path, _, file) in view.other_programs() {
         let place = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
         let subs = names::subs(gcode::Doc { file: &file, dialect });
+        // Only the subroutine that a file is named after is found from outside.
+        let named = path.file_stem().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+        let subs: Vec<_> = subs.into_iter().filter(|s| super::names::file_name(&s.label) == named).collect();
         found.extend(subs.iter().map(|s| (names::label_text(&s.label), place.clone())));
         if found.len() > 500 {
             break;

@@ -114,6 +114,10 @@ impl Host for Editor {
                 chosen.filter(|_| !said).unwrap_or_else(|| of.dialect_of(path, text))
             }),
             machine: shared.machine.clone().map(Arc::new),
+            step_units: shared.step_units.map(|u| match u {
+                gr_planner::Units::Iso => gr_lsp::host::StepUnits::Iso,
+                gr_planner::Units::StepModeler => gr_lsp::host::StepUnits::StepModeler,
+            }),
             files: shared.files.clone(),
             found: placed_found,
             said,

@@ -95,13 +95,14 @@ impl Client {
             capabilities: Value::Null,
         };
         let root = c.uri("");
+        let operations = if general["noFiles"] == true { json!([]) } else { json!(["create", "rename", "delete"]) };
         let mut options = c.settings.clone();
         options["pullDiagnostics"] = pulls.into();
         let mut hello = json!({
             "processId": null,
             "capabilities": {
                 "general": general,
-                "workspace": { "configuration": true, "didChangeWatchedFiles": { "dynamicRegistration": true }, "inlayHint": { "refreshSupport": true }, "diagnostics": { "refreshSupport": true } },
+                "workspace": { "configuration": true, "workspaceEdit": { "documentChanges": true, "resourceOperations": operations }, "didChangeWatchedFiles": { "dynamicRegistration": true }, "inlayHint": { "refreshSupport": true }, "diagnostics": { "refreshSupport": true } },
                 "textDocument": { "completion": { "completionItem": { "snippetSupport": true } }, "codeAction": { "dataSupport": true, "resolveSupport": { "properties": ["edit"] } } },
                 "window": { "workDoneProgress": true },
             },
@@ -279,6 +280,26 @@ impl Client {
     /// A text after the edits of a workspace edit.
     pub fn edited(&self, uri: &str, edit: &Value) -> String {
         apply(&self.texts[uri], &edit["changes"][uri])
+    }
+    /// The files of the folder after a workspace edit: texts changed, files renamed.
+    pub fn carried_out(&self, names: &[&str], edit: &Value) -> BTreeMap<String, String> {
+        let text = |name: &&str| self.texts.get(&self.uri(name)).cloned().unwrap_or_else(|| std::fs::read_to_string(self.path(name)).expect("a file"));
+        let mut files: BTreeMap<String, String> = names.iter().map(|n| (self.uri(n), text(n))).collect();
+        for (uri, edits) in edit["changes"].as_object().into_iter().flatten() {
+            let new = apply(&files[uri], edits);
+            files.insert(uri.clone(), new);
+        }
+        for one in edit["documentChanges"].as_array().into_iter().flatten() {
+            if one["kind"] == "rename" {
+                let text = files.remove(one["oldUri"].as_str().expect("a name")).expect("a file");
+                files.insert(one["newUri"].as_str().expect("a name").to_string(), text);
+            } else {
+                let uri = one["textDocument"]["uri"].as_str().expect("a name");
+                let new = apply(&files[uri], &one["edits"]);
+                files.insert(uri.to_string(), new);
+            }
+        }
+        files.into_iter().map(|(uri, text)| (uri.rsplit('/').next().unwrap_or("").to_string(), text)).collect()
     }
     pub fn shut_down(mut self) {
         assert_eq!(self.request("shutdown", Value::Null), Value::Null);

@@ -194,9 +194,14 @@ fn names_over_files() {
     let mut rename = at.clone();
     rename["newName"] = "slot".into();
     let edit = c.request("textDocument/rename", rename);
-    assert_eq!(edit["changes"].as_object().map(|o| o.len()), Some(3));
-    assert_eq!(c.edited(&uri, &edit), main.replace("pocket", "slot"));
-    assert_eq!(apply(sub, &edit["changes"][c.uri("pocket.ngc")]), sub.replace("pocket", "slot"));
+    let files = ["main.ngc", "other.ngc", "pocket.ngc"];
+    let after = c.carried_out(&files, &edit);
+    assert_eq!(after.keys().map(String::as_str).collect::<Vec<_>>(), ["main.ngc", "other.ngc", "slot.ngc"]);
+    assert_eq!((&after["main.ngc"], &after["slot.ngc"]), (&main.replace("pocket", "slot"), &sub.replace("pocket", "slot")));
+    let before = files.iter().map(|f| (f.to_string(), std::fs::read_to_string(c.path(f)).expect("a file"))).collect();
+    for program in ["main.ngc", "other.ngc"] {
+        assert_eq!(built(&before, program), built(&after, program));
+    }
     let links = c.request("textDocument/documentLink", json!({ "textDocument": { "uri": uri } }));
     assert_eq!(links[0]["target"], c.uri("pocket.ngc"));
     // Call hierarchy over files.
@@ -210,6 +215,130 @@ fn names_over_files() {
     assert_eq!(from, ["main.ngc 1", "other.ngc 2"]);
     let symbols = c.request("workspace/symbol", json!({ "query": "pok" }));
     assert_eq!(symbols[0]["name"], "o<pocket>");
+    c.shut_down();
+}
+
+/// What a program of some files does: the controller's calls, or that it fails.
+fn built(files: &std::collections::BTreeMap<String, String>, program: &str) -> (bool, String) {
+    let folder = tempfile::tempdir().expect("a folder");
+    for (name, text) in files {
+        std::fs::write(folder.path().join(name), text).expect("written");
+    }
+    let mut run = std::process::Command::new(env!("CARGO_BIN_EXE_gcc-robot"));
+    let out = run.args(["build", program, "--target", "canon", "-o", "-"]).current_dir(folder.path()).output().expect("it runs");
+    let text = String::from_utf8_lossy(&out.stdout);
+    (out.status.success(), text.lines().filter(|l| !l.contains("COMMENT")).map(|l| format!("{l}\n")).collect())
+}
+
+/// Renames what stands at a mark, and runs all programs before and after; none = refused, and why.
+fn renaming(files: &[(&str, &str)], settings: Value, at: &str, new: &str) -> Result<(), String> {
+    let mut c = Client::new(files, settings);
+    let uri = c.open(files[0].0, None);
+    let mut ask = c.at(&uri, at);
+    ask["newName"] = new.into();
+    let id = c.begin("textDocument/rename", ask);
+    let answer = c.answer(id);
+    if let Some(why) = answer["error"]["message"].as_str() {
+        return Err(why.to_string());
+    }
+    let names: Vec<&str> = files.iter().map(|f| f.0).collect();
+    let after = c.carried_out(&names, &answer["result"]);
+    let before: std::collections::BTreeMap<String, String> = files.iter().map(|f| (f.0.to_string(), f.1.to_string())).collect();
+    assert_ne!(before, after, "{at}");
+    for program in names.iter().filter(|n| after.contains_key(**n)) {
+        assert_eq!(built(&before, program), built(&after, program), "{at} → {new}: {after:?}");
+    }
+    Ok(())
+}
+
+#[test]
+fn a_new_name_changes_nothing_or_is_refused() {
+    let p = "G21 G90 G17 F100\n";
+    let with = |rest: &str| format!("{p}{rest}");
+    let pocket = ("pocket.ngc", "o<pocket> sub\nG1 X#1 Z#<_depth> Y#101\no<pocket> endsub\n");
+    let calls = with("#<_depth>=3\n#101=4\no<pocket> call [1]\nM2\n");
+    let good: [(&[(&str, &str)], &str, &str); 10] = [
+        (&[("main.ngc", &calls), pocket], "o<poc|ket>", "slot"),
+        (&[("main.ngc", &calls), pocket], "#<_de|pth>", "_deep"),
+        (&[("main.ngc", &calls), pocket], "#1|01=", "102"),
+        (&[("main.ngc", &with("o1000 call\nM98 P1000 L2\nM2\n")), ("1000.ngc", "o1000 sub\nG91 G1 X5\nG90\nM99\n")], "P1|000", "1001"),
+        (&[("main.ngc", &with("#<a>=3\no1 if [EXISTS[#<a>]]\nG1 X-#<a> Y[ # <a> ]\no1 endif\nM2\n"))], "#<a|>=", "zz"),
+        (&[("main.ngc", &with("#101 =3\nG1 X# 101 Y #101.0 Z#0101\nM2\n"))], "#1|01 =", "103"),
+        (&[("main.ngc", &with("#<a>=3 #<b>=4\no<s> sub\n#<a>=9\nG1 X#<a>\no<s> endsub\no<s> call\nG1 Y#<a>\nM2\n"))], "#<a|>=3", "q"),
+        // Each program has its own.
+        (&[("a.ngc", &with("o100 sub\nG1 X#1\no100 endsub\no100 call [3]\nM2\n")), ("b.ngc", &with("o100 sub\nG1 Y#1\no100 endsub\no101 sub\nG1 Z#1\no101 endsub\no100 call [3]\no101 call [4]\nM2\n"))], "o1|00 sub", "101"),
+        (&[("a.ngc", &with("o<p> sub\nG1 X#1\no<p> endsub\no<p> call [1]\nM2\n")), ("p.ngc", "o<p> sub\nG1 Y#1\no<p> endsub\n"), ("b.ngc", &with("o<p> call [4]\nM2\n"))], "o<|p> sub", "q"),
+        (&[("a.ngc", &with("o101 while [#5 LT 2]\no102 if [#5 EQ 1]\no101 break\no102 endif\n#5=[#5+1]\nG1 X#5\no101 continue\no101 endwhile\nM2\n"))], "o1|01 break", "7"),
+    ];
+    for (files, at, new) in good {
+        assert_eq!(renaming(files, json!({}), at, new), Ok(()), "{at}");
+    }
+    let slot = ("slot.ngc", "o<slot> sub\nG1 Z-#1\no<slot> endsub\n");
+    let bad: [(&[(&str, &str)], &str, &str, &str); 13] = [
+        (&[("main.ngc", &calls), pocket, slot], "o<poc|ket>", "slot", "already a file slot.ngc"),
+        (&[("main.ngc", &with("#101=3\no<p> call\nG1 Y#101\nM2\n")), ("p.ngc", "o<p> sub\n#200=4\nG1 Z#200\no<p> endsub\n")], "#1|01=", "200", "taken"),
+        (&[("main.ngc", &with("#101=3\nG1 X#101\nM2\n"))], "#1|01=", "5", "from 31 to 5000"),
+        (&[("main.ngc", &with("#101=3\nG1 X#101\nM2\n"))], "#1|01=", "5221", "from 31 to 5000"),
+        (&[("main.ngc", &with("#5221=3\nG1 X#5221\nM2\n"))], "#5|221=", "101", "controller's own"),
+        (&[("main.ngc", &with("#<a>=3\nG1 X#<a>\nM2\n"))], "#<a|>=", "_x", "controller's own"),
+        (&[("main.ngc", &with("#<_a>=3\no<s> sub\nG1 X#<_a>\no<s> endsub\no<s> call\nM2\n"))], "#<_|a>=", "a", "begins with _"),
+        (&[("main.ngc", &with("#101=102\n#102=7\nG1 X##101\nM2\n"))], "#1|02=7", "103", "computed"),
+        (&[("main.ngc", &with("o100 sub\nG1 X#1\no100 endsub\n#5=100\no#5 call [2]\nM2\n"))], "o1|00 sub", "101", "computed"),
+        (&[("main.ngc", &with("o100 sub\nG1 X#1\no100 endsub\no100 call [2]\nM2\n"))], "X#|1", "2", "called with"),
+        (&[("main.ngc", &with("#101=3\nG1 X#101\nM2\n")), ("z.ngc", &with("G1 X#101\nM2\n"))], "#1|01=", "102", "z.ngc reads it too"),
+        (&[("main.ngc", &with("o100 sub\no101 if [#1 GT 0]\nG1 X#1\no101 endif\no100 endsub\no100 call [2]\nM2\n"))], "o1|01 if", "100", "taken"),
+        (&[("main.ngc", &with("#<a>=3\n#<b>=4\nG1 X#<a>\nM2\n"))], "#<a|>=3", "b", "taken"),
+    ];
+    for (files, at, new, why) in bad {
+        let told = renaming(files, json!({}), at, new).expect_err(at);
+        assert!(told.contains(why), "{at}: {told}");
+    }
+    // Macro B: calls by G65, computed jumps.
+    let fanuc = json!({ "dialect": "fanuc-mill" });
+    let macros = "O0001\nG21 G90 F100\nG65 P2000 A1.\nM98 P2000\nM30\nO2000\nG1 X5.\nM99\n";
+    assert_eq!(renaming(&[("m.nc", macros)], fanuc.clone(), "O2|000", "2001"), Ok(()));
+    let told = renaming(&[("m.nc", "#101=20\nGOTO #101\nN20 G1 X1 F100\nM30\n")], fanuc, "N2|0", "30").expect_err("a computed jump");
+    assert!(told.contains("computed"), "{told}");
+    // An editor that renames no files.
+    let mut c = Client::with(&[("main.ngc", &calls), pocket], json!({}), json!({ "noFiles": true }));
+    let uri = c.open("main.ngc", None);
+    let mut ask = c.at(&uri, "o<poc|ket>");
+    ask["newName"] = "slot".into();
+    let id = c.begin("textDocument/rename", ask);
+    assert!(c.answer(id)["error"]["message"].as_str().is_some_and(|m| m.contains("pocket.ngc would have to be renamed too")));
+    c.shut_down();
+}
+
+#[test]
+fn names_mean_what_the_controller_takes_them_for() {
+    let own = "G21 G90 F100\no100 sub\nG1 X#1\no100 endsub\no100 call [3]\nM2\n";
+    let mut c = Client::new(&[("a.ngc", own), ("b.ngc", &own.replace("X#1", "Y#1"))], json!({}));
+    let uri = c.open("a.ngc", None);
+    let mut ask = c.at(&uri, "o1|00 sub");
+    ask["context"] = json!({ "includeDeclaration": true });
+    let found = c.request("textDocument/references", ask.clone());
+    assert_eq!(c.places(&found), ["a.ngc:2 100", "a.ngc:4 100", "a.ngc:5 100"]);
+    let lenses = c.request("textDocument/codeLens", json!({ "textDocument": { "uri": uri } }));
+    assert!(lenses.as_array().is_some_and(|l| l.iter().any(|l| l["command"]["title"] == "1 call")), "{lenses}");
+    let item = c.request("textDocument/prepareCallHierarchy", ask)[0].clone();
+    let calls = c.request("callHierarchy/incomingCalls", json!({ "item": item }));
+    assert_eq!(calls.as_array().map(Vec::len), Some(1));
+    // Where a value comes from is told when it is known.
+    let text = "G21 G90 F100\n#101=1\no1 if [0]\n#101=5\no1 endif\nG1 X#101\no2 if [1]\n#<k>=2\no2 endif\nY#<k>\nM2\n";
+    let uri = c.open("w.ngc", Some(text));
+    assert!(!c.hover(&uri, "X#1|01").contains("Last set"));
+    assert!(c.hover(&uri, "Y#<|k>").contains("Last set in line 8"), "{}", c.hover(&uri, "Y#<|k>"));
+    // Moves of rotary axes and splines are no rapids and no straight lines.
+    let uri = c.open("r.ngc", Some("G21 G90 F100\nG0 X0 Y0\nG1 A90\nG5 X10 Y10 I2 J2 P-2 Q-2\nM2\n"));
+    assert!(c.hover(&uri, "G1 A|90").contains("**feed of the other axes**"), "{}", c.hover(&uri, "G1 A|90"));
+    assert!(c.hover(&uri, "G5 X|10").contains("**spline at feed**"), "{}", c.hover(&uri, "G5 X|10"));
+    c.shut_down();
+    // Tool and offset of a lathe in one word.
+    let mut c = Client::new(&[("t.nc", "G21\nT0101\nG0 X10.\nM30\n"), ("t.tbl", "T1 P1 D6 ;roughing\n")], json!({ "dialect": "fanuc-turn", "tools": "t.tbl" }));
+    let uri = c.open("t.nc", None);
+    let found = c.diagnostics(&uri);
+    assert!(found.iter().all(|d| d["code"] != "E0243"), "{found:?}");
+    assert!(c.hover(&uri, "T01|01").contains("roughing"), "{}", c.hover(&uri, "T01|01"));
     c.shut_down();
 }
 
@@ -505,6 +634,7 @@ fn doing(c: &mut Client, text: &str) -> (Vec<f64>, Vec<f32>) {
     c.notify("textDocument/didClose", json!({ "textDocument": { "uri": c.uri("doing.ngc") } }));
     let uri = c.open("doing.ngc", Some(text));
     let p = c.request("gccRobot/preview", json!({ "textDocument": { "uri": uri } }));
+    c.notify("textDocument/didClose", json!({ "textDocument": { "uri": uri } }));
     let number = |v: &Value| v.as_f64().unwrap_or(f64::NAN);
     let mut sums: Vec<f64> = ["cutLength", "rapidLength", "seconds", "rapidSeconds"].iter().map(|k| number(&p[*k])).collect();
     for corner in p["bounds"].as_array().into_iter().flatten().chain(p["cut"].as_array().into_iter().flatten()) {
@@ -540,6 +670,96 @@ const HARD: [&str; 18] = [
     // Units: feed beside the unit, moves before it, surface speed.
     "G0 X3\nG20 G90 F10\nG1 X1\nG64 P0.01\nG2 X2 Y0 I0.5 J0\nG21 F100\nG1 X5\nM2\n",
 ];
+
+/// Programs of the documentation and of the corpus that are short enough to be rewritten at every line.
+fn corpus() -> Vec<(String, String)> {
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let folders = ["docs/examples", "tests/corpus/accepted", "tests/corpus/regressions"];
+    let mut found = Vec::new();
+    for entry in folders.iter().flat_map(|f| std::fs::read_dir(root.join(f)).expect("a folder")).flatten() {
+        let path = entry.path();
+        if path.extension().is_some_and(|e| e == "ngc")
+            && let Ok(text) = std::fs::read_to_string(&path)
+            && text.lines().count() <= 40
+        {
+            found.push((path.file_name().expect("a name").to_string_lossy().into_owned(), text));
+        }
+    }
+    found.sort();
+    found
+}
+
+/// Whether two programs do the same, as far as the preview shows it.
+fn same(old: &(Vec<f64>, Vec<f32>), new: &(Vec<f64>, Vec<f32>)) -> bool {
+    let near = |a: &f64, b: &f64| (a - b).abs() < 0.01 + 1e-3 * b.abs() || a.is_nan() && b.is_nan();
+    let points = new.1.len() != old.1.len() || new.1.iter().zip(&old.1).all(|(a, b)| (a - b).abs() < 0.02 || a.is_nan() && b.is_nan());
+    new.0.len() == old.0.len() && new.0.iter().zip(&old.0).all(|(a, b)| near(a, b)) && points
+}
+
+#[test]
+fn rewritings_of_the_corpus_do_the_same() {
+    let mut c = Client::new(&[], json!({}));
+    let (mut wrong, mut count) = (String::new(), 0);
+    for (name, text) in corpus() {
+        let uri = c.open("part.ngc", Some(&text));
+        let old = doing(&mut c, &text);
+        for (line, shown) in text.lines().enumerate() {
+            let at = json!({ "line": line, "character": 0 });
+            let only = if line == 0 { json!(["refactor", "source"]) } else { json!(["refactor"]) };
+            let ask = json!({ "textDocument": { "uri": uri }, "range": { "start": at, "end": at }, "context": { "diagnostics": [], "only": only } });
+            for action in c.request("textDocument/codeAction", ask).as_array().expect("a list") {
+                let title = action["title"].as_str().unwrap_or("");
+                // Lines get the numbers that jumps name: no part of what is done.
+                let new = c.edited(&uri, &action["edit"]);
+                count += 1;
+                if !same(&old, &doing(&mut c, &new)) {
+                    wrong += &format!("{name}:{}: {title} at `{shown}`:\n{new}\n", line + 1);
+                }
+            }
+        }
+        c.notify("textDocument/didClose", json!({ "textDocument": { "uri": uri } }));
+    }
+    assert!(count > 100, "{count}");
+    assert!(wrong.is_empty(), "{wrong}");
+    c.shut_down();
+}
+
+#[test]
+fn new_names_in_the_corpus_do_the_same() {
+    let mut c = Client::new(&[], json!({}));
+    let (mut wrong, mut given, mut refused) = (String::new(), 0, 0);
+    for (name, text) in corpus() {
+        let uri = c.open("part.ngc", Some(&text));
+        let old = doing(&mut c, &text);
+        let starts = text.match_indices(['#', 'o', 'O', 'N', 'n']).map(|(i, _)| i);
+        for at in starts {
+            let rest = &text[at + 1..];
+            let new = match rest.strip_prefix('<') {
+                Some(n) if n.starts_with('_') => "_zz9",
+                Some(_) => "zz9",
+                None if text[at..].starts_with('#') && rest.bytes().take_while(u8::is_ascii_digit).count() < 3 => "28",
+                None => "4711",
+            };
+            let mut ask = json!({ "textDocument": { "uri": uri }, "position": crate::client::position(&text, at + 1) });
+            ask["newName"] = new.into();
+            let id = c.begin("textDocument/rename", ask);
+            let answer = c.answer(id);
+            if answer.get("error").is_some() || answer["result"].is_null() {
+                refused += usize::from(answer.get("error").is_some());
+                continue;
+            }
+            given += 1;
+            let new_text = c.edited(&uri, &answer["result"]);
+            if new_text == text || !same(&old, &doing(&mut c, &new_text)) {
+                wrong += &format!("{name}: {new} at `{}`:\n{new_text}\n", rest.lines().next().unwrap_or(""));
+            }
+        }
+        c.notify("textDocument/didClose", json!({ "textDocument": { "uri": uri } }));
+    }
+    assert!(given > 50 && refused > 10, "{given} {refused}");
+    assert!(wrong.is_empty(), "{wrong}");
+    c.shut_down();
+}
 
 #[test]
 fn rewritings_do_the_same() {

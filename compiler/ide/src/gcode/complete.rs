@@ -2,7 +2,7 @@
 
 use gr_canon::Units;
 use gr_gcode::{Form, Parameter};
-use gr_interp::{Modal, ToolTable};
+use gr_interp::{Modal, Params, Setup, State, ToolTable};
 use gr_spec::{CodeDef, Dialect};
 use gr_text::Span;
 
@@ -16,6 +16,8 @@ use crate::{Completion, CompletionKind, Signature};
 pub struct Around<'a> {
     /// State before the line; none when execution never comes there.
     pub modal: Option<&'a Modal>,
+    /// What the program is run with: codes that the controller would refuse in this state are left out.
+    pub setup: Option<&'a Setup>,
     /// Tool table and its unit.
     pub tools: Option<(&'a ToolTable, Units)>,
     /// Subroutines of other files: name and where.
@@ -31,29 +33,42 @@ pub fn complete(doc: Doc<'_>, offset: u32, around: Around<'_>) -> Vec<Completion
     let start = line.span().start;
     let before = line.text().get(..(offset.max(start) - start) as usize).unwrap_or(line.text());
     if let Some(inside) = open_comment(before) {
-        return comments(inside, offset);
+        let prints = ["debug,", "print,", "log,"].iter().any(|word| inside.trim_start().to_ascii_lowercase().starts_with(word));
+        return match open_parameter(inside).filter(|_| prints) {
+            Some(hash) => parameters(doc, &inside[hash..], Span::new(offset - (inside.len() - hash) as u32, offset), &line),
+            None => comments(inside, offset),
+        };
     }
     if let Some(hash) = open_parameter(before) {
-        return parameters(doc, &before[hash..], Span::new(start + hash as u32, offset), &around, &line);
+        return parameters(doc, &before[hash..], Span::new(start + hash as u32, offset), &line);
     }
     if let Some(found) = label(doc, &line, before, offset, &around) {
+        return found;
+    }
+    if let Some(found) = jump(doc, before, offset) {
         return found;
     }
     let outside = |(_, c): &(usize, char)| !c.is_ascii_alphanumeric() && *c != '.';
     let word = before.char_indices().rev().find(outside).map_or(0, |(at, c)| at + c.len_utf8());
     let typed = &before[word..];
+    let behind = line.text().get(before.len()..).unwrap_or("");
     let replace = Span::new(start + word as u32, offset);
     if depth(before) > 0 {
-        return functions(typed, replace);
+        let letters = behind.bytes().take_while(u8::is_ascii_alphabetic).count();
+        let open = behind[letters..].trim_start().starts_with('[');
+        return functions(typed, Span::new(replace.start, offset + letters as u32), open);
     }
     // Behind `#1 =` comes a value, not a word.
     if before[..word].trim_end().ends_with('=') {
-        let mut found = functions(typed, replace);
+        let mut found = functions(typed, replace, false);
         if typed.is_empty() {
-            found.extend(parameters(doc, "#", replace, &around, &line));
+            found.extend(parameters(doc, "#", replace, &line));
         }
         return found;
     }
+    // The number of a word that was begun is part of it.
+    let digits = if typed.is_empty() { 0 } else { behind.bytes().take_while(|b| b.is_ascii_digit() || *b == b'.').count() };
+    let replace = Span::new(replace.start, offset + digits as u32);
     let mut letters = typed.chars();
     match (letters.next().map(|c| c.to_ascii_uppercase()), letters.as_str()) {
         (Some(letter @ ('T' | 'H' | 'D')), digits) if digits.bytes().all(|b| b.is_ascii_digit()) => tools(letter, digits, replace, &around),
@@ -103,11 +118,41 @@ fn open_parameter(before: &str) -> Option<usize> {
     (named || rest.bytes().all(|b| b.is_ascii_digit())).then_some(hash)
 }
 
-fn parameters(doc: Doc<'_>, typed: &str, replace: Span, around: &Around<'_>, line: &LineOf<'_>) -> Vec<Completion> {
+/// Bytes of a name behind the cursor that belong to it, a bracket that the editor closed by itself included.
+fn rest_of_name(behind: &str, named: bool) -> usize {
+    if !named {
+        return behind.bytes().take_while(u8::is_ascii_digit).count();
+    }
+    let name = behind.bytes().take_while(|b| b.is_ascii_alphanumeric() || matches!(b, b'_' | b'-' | b'.')).count();
+    if behind[name..].starts_with('>') { name + 1 } else { 0 }
+}
+
+/// Line numbers behind `GOTO`.
+fn jump(doc: Doc<'_>, before: &str, offset: u32) -> Option<Vec<Completion>> {
+    let typed = &before[before.trim_end_matches(|c: char| c.is_ascii_digit()).len()..];
+    let goto = before[..before.len() - typed.len()].trim_end().to_ascii_uppercase().ends_with("GOTO");
+    if doc.dialect.family != gr_spec::Family::Fanuc || !goto {
+        return None;
+    }
+    let replace = Span::new(offset - typed.len() as u32, offset);
+    let numbered = doc.lines(0..doc.count()).filter_map(|l| Some((l, l.literal(b'n')?.value as i64)));
+    let item = |(l, n): (LineOf<'_>, i64)| Completion {
+        label: n.to_string(),
+        insert: n.to_string(),
+        snippet: false,
+        detail: l.text().trim().to_string(),
+        documentation: String::new(),
+        kind: CompletionKind::Reference,
+        rank: 0,
+        replace,
+    };
+    Some(numbered.map(item).filter(|c| c.label.starts_with(typed)).take(MOST_NAMES).collect())
+}
+
+fn parameters(doc: Doc<'_>, typed: &str, replace: Span, line: &LineOf<'_>) -> Vec<Completion> {
     let lower = typed.to_lowercase();
-    // What stands behind of the name is replaced too, with the bracket that the editor closed by itself.
     let behind = line.slice(Span::new(replace.end, line.span().end));
-    let replace = Span::new(replace.start, replace.end + rest_of_name(behind, typed.starts_with("#<")));
+    let replace = Span::new(replace.start, replace.end + rest_of_name(behind, lower.starts_with("#<") || lower == "#" && behind.starts_with('>')) as u32);
     let item = |label: String, detail: &str, documentation: &str, rank: u8| Completion {
         insert: label.clone(),
         label,
@@ -131,7 +176,6 @@ fn parameters(doc: Doc<'_>, typed: &str, replace: Span, around: &Around<'_>, lin
             found.push(item(label, def.map_or(what, |d| d.title), def.map_or("", |d| d.what), 0));
         }
     }
-    let _ = around;
     let hash_only = lower == "#" || lower.starts_with("#<");
     for def in gr_spec::parameters().iter().filter(|d| if d.name.is_empty() { !hash_only || lower == "#" } else { hash_only }) {
         let label = if def.name.is_empty() { format!("#{}", def.first) } else { format!("#<{}>", def.name) };
@@ -141,16 +185,6 @@ fn parameters(doc: Doc<'_>, typed: &str, replace: Span, around: &Around<'_>, lin
         }
     }
     found
-}
-
-/// Bytes behind the cursor that belong to the name in which it stands.
-fn rest_of_name(behind: &str, named: bool) -> u32 {
-    let letters = if named {
-        behind.bytes().take_while(|b| b.is_ascii_alphanumeric() || matches!(b, b'_' | b'.' | b'-')).count()
-    } else {
-        behind.bytes().take_while(u8::is_ascii_digit).count()
-    };
-    letters as u32 + u32::from(named && behind[letters..].starts_with('>'))
 }
 
 /// Parameters that the file sets or reads, each once, in order of names.
@@ -181,14 +215,11 @@ fn label(doc: Doc<'_>, line: &LineOf<'_>, before: &str, offset: u32, around: &Ar
         (digits > 0 && rest.len() > digits).then_some(digits)
     };
     let Some(end) = complete_label else {
-        // The rest of the label, and the keyword that stands there already.
-        let behind = line.slice(Span::new(offset, line.span().end));
-        let mut end = offset + rest_of_name(behind, rest.starts_with('<'));
-        let after = line.slice(Span::new(end, line.span().end));
-        if after.trim_start().get(..4).is_some_and(|k| k.eq_ignore_ascii_case("call")) {
-            end += (after.len() - after.trim_start().len()) as u32 + 4;
-        }
-        let replace = Span::new(start + from as u32 - 1, end);
+        let behind = line.text().get(before.len()..).unwrap_or("");
+        let more = rest_of_name(behind, rest.starts_with('<'));
+        let replace = Span::new(start + from as u32 - 1, offset + more as u32);
+        // The word behind a label that is there already.
+        let keyword = behind[more..].trim_start().starts_with(|c: char| c.is_ascii_alphabetic());
         let local: Vec<(String, String)> = names::subs(doc)
             .iter()
             .filter(|s| s.first != line.line)
@@ -198,7 +229,7 @@ fn label(doc: Doc<'_>, line: &LineOf<'_>, before: &str, offset: u32, around: &Ar
         let fits = local.iter().chain(around.subs).filter(|(name, _)| name.starts_with(&typed));
         let items = fits.map(|(name, place)| Completion {
             label: format!("{name} call"),
-            insert: format!("{name} call"),
+            insert: if keyword { name.clone() } else { format!("{name} call") },
             snippet: false,
             detail: place.clone(),
             documentation: String::new(),
@@ -228,19 +259,19 @@ fn label(doc: Doc<'_>, line: &LineOf<'_>, before: &str, offset: u32, around: &Ar
     Some(items.collect())
 }
 
-fn functions(typed: &str, replace: Span) -> Vec<Completion> {
+fn functions(typed: &str, replace: Span, open: bool) -> Vec<Completion> {
     let upper = typed.to_ascii_uppercase();
     let fit = |name: &str| name.starts_with(&upper);
     let functions = gr_spec::functions().iter().filter(|f| fit(f.name)).map(|f| (f, true));
     let operators = gr_spec::operators().iter().filter(|f| f.name.chars().all(char::is_alphabetic) && fit(f.name)).map(|f| (f, false));
     let item = |(f, function): (&gr_spec::WordingDef, bool)| Completion {
         label: f.name.into(),
-        insert: match (function, f.name) {
+        insert: match (function && !open, f.name) {
             (true, "ATAN") => "ATAN[${1:y}]/[${2:x}]".into(),
             (true, name) => format!("{name}[$1]"),
             (false, name) => name.into(),
         },
-        snippet: function,
+        snippet: function && !open,
         detail: f.form.into(),
         documentation: f.what.into(),
         kind: CompletionKind::Function,
@@ -272,13 +303,12 @@ fn codes(doc: Doc<'_>, line: Option<&LineOf<'_>>, typed: &str, replace: Span, ar
     let dialect = doc.dialect;
     let present: Vec<&CodeDef> = line.map(|l| codes_of(l, dialect, replace)).unwrap_or_default();
     let mut found: Vec<Completion> = Vec::new();
-    if let Some(line) = line {
-        found.extend(words(line, dialect, &upper, replace, &present, around));
-    }
+    found.extend(words(line, dialect, &upper, replace, &present, around));
+    let trial = around.modal.zip(around.setup).map(|(modal, setup)| Trial::new(modal, setup));
     let groups: Vec<&str> = present.iter().map(|c| c.group).filter(|g| !g.is_empty() && *g != "none").collect();
     for def in dialect.codes.iter().filter(|c| c.code.starts_with(&upper) && !c.code.contains('-')) {
         // Two codes of one group in a block are an error.
-        if groups.contains(&def.group) {
+        if groups.contains(&def.group) || trial.as_ref().is_some_and(|t| t.refuses(def)) {
             continue;
         }
         let active = around.modal.is_some_and(|m| super::modes::codes(m).iter().any(|c| c == def.code));
@@ -298,6 +328,53 @@ fn codes(doc: Doc<'_>, line: Option<&LineOf<'_>>, typed: &str, replace: Span, ar
         }
     }
     found
+}
+
+/// Runs blocks in a state, to learn what the controller refuses in it.
+struct Trial<'a> {
+    here: State,
+    /// The same without what makes codes impossible: compensation, inverse time, other planes, no feed.
+    elsewhere: State,
+    setup: &'a Setup,
+}
+
+impl<'a> Trial<'a> {
+    fn new(modal: &Modal, setup: &'a Setup) -> Trial<'a> {
+        let mut here = State::start(setup);
+        let mut elsewhere = State::start(setup);
+        // Feed and spindle speed can be written in the same block.
+        let fed = |m: &Modal| Modal { feed: if m.feed > 0.0 { m.feed } else { 100.0 }, ..*m };
+        here.modal = fed(modal);
+        elsewhere.modal = Modal { comp_side: 0, comp_radius: 0.0, feed_mode: 0, plane: elsewhere.modal.plane, ..fed(modal) };
+        Trial { here, elsewhere, setup }
+    }
+
+    /// The code is an error here, with whatever words, and would be none elsewhere.
+    fn refuses(&self, def: &CodeDef) -> bool {
+        let mut block = def.code.to_string();
+        let needed = def.args.iter().filter(|a| a.required).filter_map(|a| a.letters.chars().next());
+        let mut letters: Vec<char> = needed.chain(def.args.iter().any(|a| a.letters.contains('X')).then_some('X')).collect();
+        letters.sort_unstable();
+        letters.dedup();
+        for letter in letters {
+            // Far enough for any tool radius.
+            let value = match letter {
+                'X' => 1000,
+                'Z' => -1,
+                _ => 1,
+            };
+            block.push_str(&format!(" {letter}{value}"));
+        }
+        block.push('\n');
+        let scan = gr_gcode::scan(&block, self.setup.dialect);
+        let chunk = gr_gcode::Chunk { text: block.into(), scan: std::sync::Arc::new(scan) };
+        let faults = |state: &State| -> Vec<gr_spec::Code> {
+            let ran = gr_interp::run_chunk(&chunk, state, &Params::default(), self.setup, gr_canon::Discard);
+            ran.findings.iter().filter(|f| f.fault.rs.is_some()).map(|f| f.fault.code).collect()
+        };
+        let here = faults(&self.here);
+        !here.is_empty() && faults(&self.elsewhere) != here
+    }
 }
 
 /// Codes that stand in a line, the one being written left out.
@@ -330,9 +407,36 @@ fn snippet(def: &CodeDef, dialect: &Dialect, replace: Span) -> Completion {
     }
 }
 
+/// Whether a motion is at feed.
+fn feeds(def: &CodeDef) -> bool {
+    let number = def.code.strip_prefix('G').and_then(|n| n.parse::<f64>().ok()).unwrap_or(0.0);
+    (1.0..=6.0).contains(&number) && number != 4.0 || (38.0..39.0).contains(&number) || (73.0..=89.9).contains(&number) && number != 80.0
+}
+
+/// F, S, T and N: words that any block takes.
+fn common(dialect: &'static Dialect, used: &[u8], motion: Option<&CodeDef>, present: &[&'static CodeDef], modal: Option<&Modal>) -> Vec<(char, String, u8)> {
+    let has = |code: &str| present.iter().any(|c| c.code == code);
+    let inverse = has("G93") || modal.is_some_and(|m| m.feed_mode == 1) && !has("G94") && !has("G95");
+    let unfed = inverse || modal.is_some_and(|m| m.feed == 0.0);
+    let needs_feed = unfed && motion.is_some_and(feeds);
+    let title = |letter: char| dialect.word(letter).map(|d| d.title.to_string());
+    let mut found = Vec::new();
+    for letter in ['F', 'S', 'T', 'N'].into_iter().filter(|l| !used.contains(&(*l as u8))) {
+        let Some(title) = title(letter) else { continue };
+        match letter {
+            'F' if needs_feed && inverse => found.push((letter, format!("needed: {title}, one over the minutes of this move"), 0)),
+            'F' if needs_feed => found.push((letter, format!("needed: {title}, none is set so far"), 0)),
+            'N' if !used.is_empty() => {}
+            'N' | 'T' => found.push((letter, title, 4)),
+            _ => found.push((letter, title, 2)),
+        }
+    }
+    found
+}
+
 /// Words that the codes of the line, or the motion in force, still take.
 fn words(
-    line: &LineOf<'_>,
+    line: Option<&LineOf<'_>>,
     dialect: &'static Dialect,
     upper: &str,
     replace: Span,
@@ -341,7 +445,8 @@ fn words(
 ) -> Vec<Completion> {
     let modal = around.modal.filter(|m| m.motion >= 0).and_then(|m| dialect.code(&code_name(b'g', f64::from(m.motion) / 10.0)));
     let motion = if present.iter().any(|c| c.group == "motion") { None } else { modal };
-    let used: Vec<u8> = line.words().iter().filter(|w| line.tight(w).start != replace.start).map(|w| w.letter.to_ascii_uppercase()).collect();
+    let others = line.into_iter().flat_map(|l| l.words().iter().filter(|w| l.tight(w).start != replace.start));
+    let used: Vec<u8> = others.map(|w| w.letter.to_ascii_uppercase()).collect();
     let mut found: Vec<Completion> = Vec::new();
     for (def, implicit) in present.iter().map(|c| (*c, false)).chain(motion.map(|c| (c, true))) {
         for a in def.args {
@@ -362,6 +467,18 @@ fn words(
                     replace,
                 });
             }
+        }
+    }
+    let motion = present.iter().find(|c| matches!(c.group, "motion" | "cycle")).copied().or(motion);
+    for (letter, detail, rank) in common(dialect, &used, motion, present, around.modal) {
+        let label = letter.to_string();
+        if !label.starts_with(upper) {
+            continue;
+        }
+        // What is needed goes before a motion that has the word among others.
+        found.retain(|f| f.label != label || rank > 0);
+        if !found.iter().any(|f| f.label == label) {
+            found.push(Completion { insert: label.clone(), label, snippet: false, detail, documentation: String::new(), kind: CompletionKind::Word, rank, replace });
         }
     }
     found

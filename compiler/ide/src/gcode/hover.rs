@@ -98,7 +98,9 @@ fn explain(line: &LineOf<'_>, word: &Word, dialect: &'static Dialect, facts: &Fa
         text.push_str(&format!("\n\nHere: {meaning}"));
     }
     if matches!(letter, 'T' | 'H' | 'D') && word.form == Form::Literal {
-        text.push_str(&tool(facts, word.value as i32));
+        // T0101 of a lathe is tool 1 with offset 1.
+        let both = dialect.id == "fanuc-turn" && letter == 'T' && word.value >= 100.0;
+        text.push_str(&tool(facts, if both { word.value as i32 / 100 } else { word.value as i32 }));
     }
     if letter == 'F'
         && let Some(run) = facts.run

@@ -132,8 +132,7 @@ fn all(doc: Doc<'_>, lines: Range<u32>, subs: &[Sub]) -> Vec<(Name, Occurrence, 
             for s in list.iter().filter(|s| fits(s.line)) {
                 let line = s.line + first;
                 let Some(of) = doc.line(line) else { continue };
-                let span = parameter_span(&of, s.span.shifted(base));
-                found.push((Name::Parameter(s.what.clone()), Occurrence { span, role }, line));
+                found.extend(parameter(&of, &s.what, s.span.shifted(base), role));
             }
         }
     }
@@ -188,54 +187,97 @@ fn last_number(doc: Doc<'_>, line: u32, statement: Span) -> Option<Span> {
     (digits > 0).then(|| Span::new(end - digits, end))
 }
 
-/// The name or number of `#<name>`, `#12` or `#12=…`.
-fn parameter_span(line: &LineOf<'_>, span: Span) -> Span {
-    let text = line.slice(span);
-    // The name follows the sign at once; a value may hold others.
-    let open = text.find(|c: char| c != '#' && c != ' ' && c != '\t').filter(|at| text[*at..].starts_with('<'));
-    if let Some(open) = open {
-        let close = text[open..].find('>').map_or(text.len(), |c| open + c);
-        return Span::new(span.start + open as u32 + 1, span.start + close as u32);
-    }
-    let lead = text.bytes().take_while(|b| !b.is_ascii_digit()).count();
-    let digits = text.bytes().skip(lead).take_while(u8::is_ascii_digit).count();
-    Span::new(span.start + lead as u32, span.start + (lead + digits) as u32)
+fn parameter(line: &LineOf<'_>, what: &Parameter, span: Span, role: Role) -> Option<(Name, Occurrence, u32)> {
+    let span = parameter_span(line, span).filter(|s| !is_remark(line, *s))?;
+    Some((Name::Parameter(what.clone()), Occurrence { span, role }, line.line))
 }
 
-/// N words, tools, `M98 P`.
+/// The name or number of the first `#<name>`, `#12` or `#12=…` of some bytes.
+fn parameter_span(line: &LineOf<'_>, span: Span) -> Option<Span> {
+    let text = line.slice(span);
+    let sign = text.find('#')?;
+    let rest = text[sign + 1..].trim_start_matches([' ', '\t']);
+    let start = text.len() - rest.len();
+    let (start, length) = match rest.strip_prefix('<') {
+        Some(name) => (start + 1, name.find('>')?),
+        None => (start, rest.bytes().take_while(u8::is_ascii_digit).count()),
+    };
+    (length > 0).then(|| Span::new(span.start + start as u32, span.start + (start + length) as u32))
+}
+
+/// Whether bytes of a line are no program: a comment that prints no parameters.
+fn is_remark(line: &LineOf<'_>, span: Span) -> bool {
+    let holds = |w: &&gr_gcode::Word| w.form == Form::Comment && line.span_of(w).start <= span.start && span.start < line.span_of(w).end;
+    let Some(word) = line.words().iter().find(holds) else { return false };
+    let text: String = line.slice(line.span_of(word)).trim_start_matches(['(', ';']).chars().filter(|c| !c.is_whitespace()).take(6).collect();
+    !["debug,", "print,", "log,"].iter().any(|word| text.to_ascii_lowercase().starts_with(word))
+}
+
+/// N words, tools, `M98 P`, `G65 P`, contours of lathe cycles.
 fn plain_words(doc: Doc<'_>, lines: Range<u32>, found: &mut Vec<(Name, Occurrence, u32)>) {
     for line in doc.lines(lines) {
-        let calls = line.has_code(b'm', 980);
-        let jumps = line.has_code(b'm', 990);
+        let named = NamedBy::of(&line, doc.dialect);
         for w in line.words().iter().filter(|w| w.form == Form::Literal) {
             let name = match w.letter {
                 b'n' => (Name::Line(w.value as i64), Role::Definition),
+                // T0101 of a lathe is tool 1 with offset 1.
+                b't' if doc.dialect.id == "fanuc-turn" && w.value >= 100.0 => (Name::Tool(w.value as i64 / 100), Role::Read),
                 b't' => (Name::Tool(w.value as i64), Role::Read),
-                b'p' if calls => {
+                b'p' if named.calls => {
                     let (number, span) = called(doc, &line, w);
                     found.push((Name::Sub(Label::Number(number)), Occurrence { span, role: Role::Read }, line.line));
                     continue;
                 }
-                b'p' if jumps => (Name::Line(w.value as i64), Role::Read),
+                b'q' if named.profile => (Name::Sub(Label::Number(w.value as i64)), Role::Read),
+                b'p' if named.jumps => (Name::Line(w.value as i64), Role::Read),
+                b'p' | b'q' if named.contour => (Name::Line(w.value as i64), Role::Read),
                 _ => continue,
             };
-            let span = line.tight(w);
-            let text = line.slice(span);
-            let lead = 1 + text[1..].len() as u32 - text[1..].trim_start().len() as u32;
-            found.push((name.0, Occurrence { span: Span::new(span.start + lead, span.end), role: name.1 }, line.line));
+            found.push((name.0, Occurrence { span: number_of(&line, w), role: name.1 }, line.line));
+        }
+    }
+}
+
+/// The digits of a word.
+fn number_of(line: &LineOf<'_>, w: &gr_gcode::Word) -> Span {
+    let span = line.tight(w);
+    let text = line.slice(span);
+    let lead = 1 + text[1..].len() as u32 - text[1..].trim_start().len() as u32;
+    Span::new(span.start + lead, span.end)
+}
+
+/// What numbers of plain words name.
+struct NamedBy {
+    /// `M98 P1000`, `G65 P1000`, `G66 P1000`: a subroutine.
+    calls: bool,
+    /// `M99 P10`: a line.
+    jumps: bool,
+    /// `G71 P10 Q20` of lathes: lines.
+    contour: bool,
+    /// `G71 Q100` of LinuxCNC: a subroutine.
+    profile: bool,
+}
+
+impl NamedBy {
+    fn of(line: &LineOf<'_>, dialect: &gr_spec::Dialect) -> NamedBy {
+        let cycle = |from: f64, to: f64| line.words().iter().any(|w| w.letter == b'g' && w.form == Form::Literal && (from..=to).contains(&w.value));
+        let fanuc = dialect.family == gr_spec::Family::Fanuc;
+        NamedBy {
+            calls: line.has_code(b'm', 980) || fanuc && (line.has_code(b'g', 650) || line.has_code(b'g', 660)),
+            jumps: line.has_code(b'm', 990),
+            contour: dialect.id == "fanuc-turn" && cycle(70.0, 73.0),
+            profile: dialect.family == gr_spec::Family::Linuxcnc && cycle(70.0, 72.9),
         }
     }
 }
 
 /// The program that P of an M98 names, and its digits.
 fn called(doc: Doc<'_>, line: &LineOf<'_>, p: &Word) -> (i64, Span) {
-    let span = line.tight(p);
-    let text = line.slice(span);
-    let lead = 1 + text[1..].len() as u32 - text[1..].trim_start().len() as u32;
-    let whole = Span::new(span.start + lead, span.end);
-    if doc.dialect.family != gr_spec::Family::Fanuc {
+    let whole = number_of(line, p);
+    if doc.dialect.family != gr_spec::Family::Fanuc || !line.has_code(b'm', 980) {
         return (p.value as i64, whole);
     }
+    let (span, text) = (whole, line.slice(whole));
     let (number, repeats) = gr_gcode::fanuc_call(p.value as i64, line.literal(b'l').is_some());
     let digits = text.bytes().rev().take_while(u8::is_ascii_digit).count() as u32;
     let number_only = repeats.is_some() && digits > 4;
@@ -302,8 +344,7 @@ fn all_but_words(doc: Doc<'_>, lines: Range<u32>, subs: &[Sub]) -> Vec<(Name, Oc
         for (list, role) in [(&symbols.reads, Role::Read), (&symbols.writes, Role::Write)] {
             for s in list.iter().filter(|s| fits(s.line)) {
                 let Some(of) = doc.line(s.line + first) else { continue };
-                let span = parameter_span(&of, s.span.shifted(base));
-                found.push((Name::Parameter(s.what.clone()), Occurrence { span, role }, s.line + first));
+                found.extend(parameter(&of, &s.what, s.span.shifted(base), role));
             }
         }
     }
@@ -319,39 +360,117 @@ pub fn is_local(p: &Parameter) -> bool {
     }
 }
 
-/// Where a name is defined; for parameters, the last setting before a line, or the first one.
+/// Where a name is defined; for parameters, the setting that the value at a line comes from, or all that it may come from.
 pub fn definitions(doc: Doc<'_>, name: &Name, line: Option<u32>) -> Vec<Span> {
-    let found = occurrences(doc, name, line);
-    if matches!(name, Name::Parameter(_)) {
-        let writes: Vec<Span> = found.iter().filter(|o| o.role == Role::Write).map(|o| o.span).collect();
-        let limit = line.and_then(|l| doc.line(l)).map_or(u32::MAX, |l| l.span().start);
-        let before = writes.iter().rev().find(|s| s.start < limit);
-        return before.or(writes.first()).copied().into_iter().collect();
+    if let Name::Parameter(p) = name {
+        let all = writes(doc, name, line);
+        let last = line.and_then(|line| last_write(doc, p, line)).filter(|w| w.certain);
+        let on = |w: LastWrite| all.iter().rev().find(|s| doc.line_at(s.start).is_some_and(|l| l.line == w.line)).copied();
+        return match last.and_then(on) {
+            Some(span) => vec![span],
+            None => all,
+        };
     }
+    let found = occurrences(doc, name, line);
     found.iter().filter(|o| o.role == Role::Definition).map(|o| o.span).collect()
+}
+
+/// Why a name can't have another one at all.
+pub fn fixed(name: &Name) -> Option<String> {
+    match name {
+        Name::Parameter(Parameter::Number(n)) if !is_free(*n) => Some(format!("#{n} is the controller's own")),
+        Name::Parameter(Parameter::Named(n)) if is_predefined(n) => Some(format!("#<{n}> is the controller's own")),
+        Name::Sub(Label::Dynamic) | Name::Block(Label::Dynamic, ..) => Some("a computed label can't be renamed".into()),
+        Name::Tool(_) => Some("a tool's number stands in the tool table".into()),
+        _ => None,
+    }
+}
+
+/// Numbered parameters that programs may use as they like: those behind them mean something to the controller.
+fn is_free(n: u32) -> bool {
+    (1..=5000).contains(&n)
+}
+
+/// Known to the controller: `#<_x>`, `#<_ini[…]…>`, `#<_hal[…]>`.
+fn is_predefined(name: &str) -> bool {
+    let bare: String = name.chars().filter(|c| !c.is_whitespace()).collect::<String>().to_lowercase();
+    bare.starts_with("_ini[") || bare.starts_with("_hal[") || gr_spec::parameter(&bare).is_some_and(|d| !d.name.is_empty())
 }
 
 /// Whether a name can be renamed, and to this. `Err` says why not.
 pub fn check_new_name(name: &Name, new: &str) -> Result<String, String> {
+    if let Some(why) = fixed(name) {
+        return Err(why);
+    }
     let new = new.trim();
-    let number = |low: u64, high: u64, what: &str| match new.parse::<u64>() {
+    let number = |text: &str, low: u64, high: u64, what: &str| match text.parse::<u64>() {
         Ok(n) if (low..=high).contains(&n) => Ok(n.to_string()),
         _ => Err(format!("{what} is a whole number from {low} to {high}")),
     };
     match name {
-        Name::Parameter(Parameter::Number(_)) => number(1, 5602, "a numbered parameter"),
-        Name::Line(_) => number(0, 999_999_999, "a line number"),
-        Name::Tool(_) => number(0, 999_999, "a tool"),
-        Name::Sub(Label::Number(_)) | Name::Block(Label::Number(_), ..) => number(0, 999_999_999, "this label"),
-        Name::Sub(Label::Dynamic) | Name::Block(Label::Dynamic, ..) => Err("a computed label can't be renamed".into()),
-        Name::Parameter(Parameter::Named(old)) => {
-            if gr_spec::parameter(old).is_some() {
-                return Err(format!("#<{old}> is the controller's own"));
-            }
-            plain_name(new)
+        Name::Parameter(Parameter::Number(n)) => {
+            let bare = new.trim_start_matches('#');
+            if is_local(&Parameter::Number(*n)) { number(bare, 1, 30, "a parameter of this subroutine alone") } else { number(bare, 31, 5000, "a numbered parameter for all subroutines") }
         }
-        Name::Sub(Label::Named(_)) | Name::Block(Label::Named(_), ..) => plain_name(new),
+        Name::Line(_) => number(new.trim_start_matches(['N', 'n']), 0, 999_999_999, "a line number"),
+        Name::Sub(Label::Number(_)) | Name::Block(Label::Number(_), ..) => number(new.trim_start_matches(['O', 'o']), 0, 999_999_999, "this label"),
+        Name::Parameter(Parameter::Named(old)) => {
+            let new = plain_name(new)?;
+            if is_predefined(&new) {
+                return Err(format!("#<{new}> is the controller's own"));
+            }
+            match (old.starts_with('_'), new.starts_with('_')) {
+                (true, false) => Err("the name of a parameter for all subroutines begins with _".into()),
+                (false, true) => Err("a name that begins with _ would be the same in all subroutines".into()),
+                _ => Ok(new),
+            }
+        }
+        Name::Sub(_) | Name::Block(..) => plain_name(new),
+        Name::Tool(_) => Err("a tool's number stands in the tool table".into()),
     }
+}
+
+/// What speaks against a new name in one of the files it concerns. `line`: where it was asked for, in that file alone.
+pub fn objection(doc: Doc<'_>, name: &Name, line: Option<u32>) -> Option<String> {
+    let numbered = matches!(name, Name::Parameter(Parameter::Number(_)));
+    let label = matches!(name, Name::Sub(Label::Number(_)) | Name::Block(Label::Number(_), ..));
+    for (symbols, first, _) in tables(doc) {
+        if numbered && (symbols.reads_dynamic || symbols.writes_dynamic) {
+            return Some("a parameter whose number is computed may be this one".into());
+        }
+        let computed = |s: &&gr_gcode::Symbol<gr_gcode::Statement>| {
+            let jump = matches!(s.what.keyword, Keyword::MacroGoto | Keyword::MacroIfGoto);
+            s.what.label == Label::Dynamic && if jump { matches!(name, Name::Line(_)) } else { label && s.what.keyword != Keyword::MacroIfThen }
+        };
+        if let Some(s) = symbols.statements.iter().find(computed) {
+            return Some(format!("the number computed in line {} may be this one", s.line + first + 1));
+        }
+    }
+    let computed_call = || doc.lines(0..doc.count()).find(|l| {
+        let named = NamedBy::of(l, doc.dialect);
+        let by_value = |letter| l.words().iter().any(|w| w.letter == letter && w.form == Form::Expr);
+        named.calls && by_value(b'p') && label || (named.jumps && by_value(b'p') || named.contour && (by_value(b'p') || by_value(b'q'))) && matches!(name, Name::Line(_))
+    });
+    if label || matches!(name, Name::Line(_)) {
+        if let Some(l) = computed_call() {
+            return Some(format!("the number computed in line {} may be this one", l.line + 1));
+        }
+    }
+    match (name, line) {
+        (Name::Parameter(p @ Parameter::Number(_)), Some(line)) if is_local(p) => argument(doc, name, line),
+        _ => None,
+    }
+}
+
+/// Numbered parameters up to 30 are what a subroutine is called with.
+fn argument(doc: Doc<'_>, name: &Name, line: u32) -> Option<String> {
+    let fanuc = doc.dialect.family == gr_spec::Family::Fanuc;
+    if fanuc && !calls(doc).is_empty() {
+        return Some("subprograms may use the same parameter".into());
+    }
+    let inside = subs(doc).iter().any(|s| (s.first..=s.last).contains(&line));
+    let first = occurrences(doc, name, Some(line)).into_iter().next()?;
+    (inside && first.role == Role::Read).then(|| "it is what the subroutine is called with".to_string())
 }
 
 fn plain_name(new: &str) -> Result<String, String> {
@@ -365,11 +484,11 @@ pub fn rename(doc: Doc<'_>, name: &Name, line: Option<u32>, new: &str) -> Vec<Ed
     occurrences(doc, name, line).into_iter().map(|o| Edit { span: o.span, text: new.to_string() }).collect()
 }
 
-/// Whether a name of this kind stands already under the new name in the file.
-pub fn is_taken(doc: Doc<'_>, name: &Name, line: Option<u32>, new: &str) -> bool {
-    let lower: Box<str> = new.to_lowercase().into();
+/// The name of the same kind with other letters or digits.
+pub fn renamed(name: &Name, new: &str) -> Name {
+    let lower: Box<str> = new.chars().filter(|c| !c.is_whitespace()).collect::<String>().to_lowercase().into();
     let digits = new.parse::<i64>().ok();
-    let other = match name {
+    match name {
         Name::Sub(Label::Named(_)) => Name::Sub(Label::Named(lower)),
         Name::Block(Label::Named(_), a, b) => Name::Block(Label::Named(lower), *a, *b),
         Name::Parameter(Parameter::Named(_)) => Name::Parameter(Parameter::Named(lower)),
@@ -377,9 +496,27 @@ pub fn is_taken(doc: Doc<'_>, name: &Name, line: Option<u32>, new: &str) -> bool
         Name::Block(_, a, b) => Name::Block(Label::Number(digits.unwrap_or(-1)), *a, *b),
         Name::Parameter(_) => Name::Parameter(Parameter::Number(digits.unwrap_or(0) as u32)),
         Name::Line(_) => Name::Line(digits.unwrap_or(-1)),
-        Name::Tool(_) => return false,
+        Name::Tool(_) => Name::Tool(digits.unwrap_or(-1)),
+    }
+}
+
+/// Whether a name of this kind stands already under the new name in the file.
+pub fn is_taken(doc: Doc<'_>, name: &Name, line: Option<u32>, new: &str) -> bool {
+    let other = renamed(name, new);
+    if other == *name {
+        return false;
+    }
+    // Labels of subroutines, branches and loops are told apart by the word behind them alone.
+    let label = match &other {
+        Name::Sub(label) | Name::Block(label, ..) => Some(label),
+        _ => None,
     };
-    other != *name && !occurrences(doc, &other, line).is_empty()
+    let labelled = label.is_some_and(|label| tables(doc).any(|(t, ..)| t.statements.iter().any(|s| s.what.label == *label && !is_macro(s.what.keyword))));
+    labelled && matches!(name, Name::Sub(_)) || (labelled && subs(doc).iter().any(|s| Some(&s.label) == label)) || !occurrences(doc, &other, line).is_empty()
+}
+
+fn is_macro(k: Keyword) -> bool {
+    matches!(k, Keyword::MacroIfGoto | Keyword::MacroIfThen | Keyword::MacroGoto | Keyword::MacroWhile | Keyword::MacroDo | Keyword::MacroEnd)
 }
 
 /// Labels that are edited together: those of the same branch, loop or subroutine in this file.
@@ -420,11 +557,19 @@ pub fn calls(doc: Doc<'_>) -> Vec<CallSite> {
             }
         }
     }
-    for chunk in doc.file.chunks.iter().enumerate().filter(|(_, c)| memchr::memmem::find(c.text.as_bytes(), b"98").is_some()) {
+    let numbers: &[&[u8]] = if doc.dialect.family == gr_spec::Family::Fanuc { &[b"98", b"65", b"66"] } else { &[b"98", b"7"] };
+    let some = |text: &str| numbers.iter().any(|n| memchr::memmem::find(text.as_bytes(), n).is_some());
+    for chunk in doc.file.chunks.iter().enumerate().filter(|(_, c)| some(&c.text)) {
         let first = doc.file.first_lines[chunk.0];
-        for line in doc.lines(first..first + chunk.1.scan.lines.len() as u32).filter(|l| l.has_code(b'm', 980)) {
-            if let Some(p) = line.literal(b'p') {
-                let (number, span) = called(doc, &line, p);
+        for line in doc.lines(first..first + chunk.1.scan.lines.len() as u32) {
+            let named = NamedBy::of(&line, doc.dialect);
+            let letter = match (named.calls, named.profile) {
+                (true, _) => b'p',
+                (_, true) => b'q',
+                _ => continue,
+            };
+            if let Some(w) = line.literal(letter) {
+                let (number, span) = if letter == b'p' { called(doc, &line, w) } else { (w.value as i64, number_of(&line, w)) };
                 take(Label::Number(number), span, line.line);
             }
         }
@@ -433,9 +578,49 @@ pub fn calls(doc: Doc<'_>) -> Vec<CallSite> {
     found
 }
 
-/// The last setting of a parameter before a line: its line.
-pub fn last_write(doc: Doc<'_>, p: &Parameter, line: u32) -> Option<u32> {
-    let at = definitions(doc, &Name::Parameter(p.clone()), Some(line)).first()?.start;
-    let found = doc.line_at(at)?.line;
-    (found < line).then_some(found)
+/// Whether a file calls subroutines whose number is computed.
+pub fn calls_by_value(doc: Doc<'_>) -> bool {
+    let computed = tables(doc).any(|(t, ..)| t.statements.iter().any(|s| s.what.keyword == Keyword::Call && s.what.label == Label::Dynamic));
+    let by_value = |l: &LineOf<'_>| l.words().iter().any(|w| w.letter == b'p' && w.form == Form::Expr) && NamedBy::of(l, doc.dialect).calls;
+    computed || doc.file.chunks.iter().any(|c| !c.scan.nodes.is_empty()) && doc.lines(0..doc.count()).any(|l| by_value(&l))
+}
+
+/// A setting that the value of a parameter may come from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LastWrite {
+    /// Its line.
+    pub line: u32,
+    /// The program runs straight through: it is this one. Else it is the only setting of the program, and it is this one
+    /// when it is carried out and the value is still the one it gave.
+    pub certain: bool,
+}
+
+/// The setting that the value of a parameter at a line comes from, as far as the text tells it.
+pub fn last_write(doc: Doc<'_>, p: &Parameter, line: u32) -> Option<LastWrite> {
+    let name = Name::Parameter(p.clone());
+    if fixed(&name).is_some() {
+        return None;
+    }
+    let computed = tables(doc).any(|(t, ..)| t.writes_dynamic);
+    let places: Vec<LineOf<'_>> = writes(doc, &name, Some(line)).iter().filter_map(|s| doc.line_at(s.start)).collect();
+    let skipped = places.iter().any(|l| l.chunk.scan.lines.get(l.at as usize).is_some_and(|l| l.deleted));
+    if skipped || (computed && matches!(p, Parameter::Number(_))) {
+        return None;
+    }
+    let last = places.iter().rev().map(|l| l.line).find(|l| *l < line)?;
+    if is_straight(doc) {
+        return Some(LastWrite { line: last, certain: true });
+    }
+    let own: Vec<Label> = subs(doc).into_iter().map(|s| s.label).collect();
+    let elsewhere = !is_local(p) && (calls_by_value(doc) || calls(doc).iter().any(|c| !own.contains(&c.label)));
+    (places.len() == 1 && !elsewhere).then_some(LastWrite { line: last, certain: false })
+}
+
+/// No branches, loops, jumps, calls.
+fn is_straight(doc: Doc<'_>) -> bool {
+    doc.file.chunks.iter().all(|c| c.scan.controls.is_empty()) && calls(doc).is_empty()
+}
+
+fn writes(doc: Doc<'_>, name: &Name, line: Option<u32>) -> Vec<Span> {
+    occurrences(doc, name, line).iter().filter(|o| o.role == Role::Write).map(|o| o.span).collect()
 }

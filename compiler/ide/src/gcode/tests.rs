@@ -1,6 +1,6 @@
 use std::sync::Arc;
 
-use gr_gcode::{Chunk, File};
+use gr_gcode::{Chunk, File, Parameter};
 use gr_spec::Dialect;
 use proptest::prelude::*;
 
@@ -74,6 +74,119 @@ fn codes_and_parameters() {
     assert!(!labels("G90 G9").contains(&"G91".to_string()), "a second code of a group is an error");
     assert!(labels("G1 X#<_x").contains(&"#<_x>".to_string()));
     assert!(labels("").len() > 50);
+}
+
+/// A program after a proposal was accepted at the mark.
+fn accepted(text: &str, label: &str) -> String {
+    let at = text.find('|').expect("a mark");
+    let text = text.replace('|', "");
+    let f = file(&text);
+    let found = complete(doc(&f), at as u32, Around::default());
+    let one = found.iter().find(|c| c.label == label).unwrap_or_else(|| panic!("{label} is not proposed"));
+    let mut out = text.clone();
+    out.replace_range(one.replace.range(), &one.insert);
+    out
+}
+
+#[test]
+fn accepted_proposals_replace_the_name() {
+    let sub = "o<hole> sub\no<hole> endsub\n";
+    assert_eq!(accepted(&format!("{sub}o<ho|>\n"), "o<hole> call"), format!("{sub}o<hole> call\n"));
+    assert_eq!(accepted(&format!("{sub}o<ho|> call [1]\n"), "o<hole> call"), format!("{sub}o<hole> call [1]\n"));
+    assert_eq!(accepted(&format!("{sub}o<h|ole> call [1]\n"), "o<hole> call"), format!("{sub}o<hole> call [1]\n"));
+    assert_eq!(accepted(&format!("{sub}o<|\n"), "o<hole> call"), format!("{sub}o<hole> call\n"));
+    assert_eq!(accepted("o100 sub\no100 endsub\no1|00 call\n", "o100 call"), "o100 sub\no100 endsub\no100 call\n");
+    assert_eq!(accepted("#<depth>=5\nG1 X#<de|pth>\n", "#<depth>"), "#<depth>=5\nG1 X#<depth>\n");
+    assert_eq!(accepted("#<depth>=5\nG1 X#<d|> Y1\n", "#<depth>"), "#<depth>=5\nG1 X#<depth> Y1\n");
+    assert_eq!(accepted("#<depth>=5\nG1 X#<d|Y1\n", "#<depth>"), "#<depth>=5\nG1 X#<depth>Y1\n");
+    assert_eq!(accepted("#101=5\nG1 X#1|01\n", "#101"), "#101=5\nG1 X#101\n");
+    assert_eq!(accepted("#<depth>=5\n(debug, it is #<|)\n", "#<depth>"), "#<depth>=5\n(debug, it is #<depth>)\n");
+    assert_eq!(accepted("G1 X[S|I[30]]\n", "SIN"), "G1 X[SIN[30]]\n");
+    assert_eq!(accepted("G|1 X5\n", "G2"), "G2 X5\n");
+}
+
+#[test]
+fn places_of_parameters() {
+    let text = "#<a>=3\no1 if [EXISTS[#<a>]]\nG0 X [ # <a> ] Y[# 101]\n(debug, #<a> and #101)\n(note #<a> #101)\no1 endif\n";
+    let f = file(text);
+    let of = |p: Parameter| occurrences(doc(&f), &super::names::Name::Parameter(p), None).iter().map(|o| &text[o.span.range()]).collect::<Vec<_>>();
+    assert_eq!(of(Parameter::Named("a".into())), ["a"; 4]);
+    assert_eq!(of(Parameter::Number(101)), ["101"; 2]);
+}
+
+#[test]
+fn names_that_stay() {
+    use super::names::{Name, check_new_name, objection};
+    let number = |n| Name::Parameter(Parameter::Number(n));
+    let named = |n: &str| Name::Parameter(Parameter::Named(n.into()));
+    for (name, new) in [(number(5221), "101"), (number(101), "5221"), (number(101), "5420"), (number(101), "5"), (number(5), "101"), (named("a"), "_x"), (named("_a"), "a"), (named("_x"), "_b"), (named("a"), "_b"), (named("_ini[a]b"), "_c")] {
+        assert!(check_new_name(&name, new).is_err(), "{name:?} {new}");
+    }
+    assert_eq!(check_new_name(&number(101), "#102").as_deref(), Ok("102"));
+    let against = |text: &str, name: Name| objection(doc(&file(text)), &name, Some(0)).is_some();
+    assert!(against("#102=7\nG1 X##101\n", number(102)) && !against("#102=7\nG1 X#101\n", number(102)));
+    let sub = Name::Sub(gr_gcode::Label::Number(100));
+    assert!(against("o100 sub\no100 endsub\no#5 call\n", sub.clone()) && !against("o100 sub\no100 endsub\n", sub));
+    assert!(against("o1 sub\nG1 X#1\no1 endsub\n", number(1)) && !against("o1 sub\n#5=1\nG1 X#5\no1 endsub\n", number(5)));
+}
+
+#[test]
+fn the_last_setting_is_told_when_it_is_known() {
+    use super::names::last_write;
+    let told = |text: &str, line: u32| last_write(doc(&file(text)), &Parameter::Number(101), line).map(|w| (w.line, w.certain));
+    assert_eq!(told("#101=1\n#101=2\nG1 X#101\n", 2), Some((1, true)));
+    assert_eq!(told("#101=1\n/#101=2\nG1 X#101\n", 2), None);
+    assert_eq!(told("#101=1\no1 if [0]\n#101=5\no1 endif\nG1 X#101\n", 4), None);
+    assert_eq!(told("#101=1\no1 if [0]\no1 endif\nG1 X#101\n", 3), Some((0, false)));
+    assert_eq!(told("#101=1\no<p> call\nG1 X#101\n", 2), None);
+    assert_eq!(told("#101=1\n#[#5]=2\nG1 X#101\n", 2), None);
+}
+
+fn proposed(text: &str, modal: impl Fn(&mut gr_interp::Modal)) -> Vec<(String, u8)> {
+    let setup = gr_interp::Setup::default();
+    let mut state = gr_interp::State::start(&setup).modal;
+    modal(&mut state);
+    let f = file(text);
+    let around = Around { modal: Some(&state), setup: Some(&setup), ..Around::default() };
+    complete(doc(&f), text.len() as u32, around).into_iter().map(|c| (c.label, c.rank)).collect()
+}
+
+#[test]
+fn what_the_controller_would_refuse_is_not_proposed() {
+    let has = |list: &[(String, u8)], label: &str| list.iter().any(|l| l.0 == label);
+    let compensated = proposed("", |m| (m.comp_side, m.comp_radius, m.feed) = (2, 3.0, 100.0));
+    for code in ["G81", "G5.1", "G28", "G18", "G42", "G33"] {
+        assert!(!has(&compensated, code), "{code}");
+    }
+    let free = proposed("", |m| m.feed = 100.0);
+    for code in ["G1", "G2", "G40", "G4", "M3", "G53"] {
+        assert!(has(&compensated, code) && has(&free, code), "{code}");
+    }
+    for code in ["G81", "G28", "G18", "G42"] {
+        assert!(has(&free, code), "{code}");
+    }
+    let inverse = proposed("", |m| (m.feed_mode, m.feed) = (1, 2.0));
+    assert!(!has(&inverse, "G81") && has(&inverse, "G94"));
+}
+
+#[test]
+fn words_that_are_needed_come_first() {
+    let rank = |list: &[(String, u8)], label: &str| list.iter().find(|l| l.0 == label).map(|l| l.1);
+    assert_eq!(rank(&proposed("G1 X5 ", |_| {}), "F"), Some(0));
+    assert_eq!(rank(&proposed("G1 X5 ", |m| (m.feed_mode, m.feed) = (1, 3.0)), "F"), Some(0));
+    assert_eq!(rank(&proposed("G1 X5 ", |m| m.feed = 100.0), "F"), Some(2));
+    assert_eq!(rank(&proposed("G0 X5 ", |_| {}), "F"), Some(2));
+    let empty = proposed("", |m| (m.motion, m.feed) = (10, 100.0));
+    for word in ["F", "S", "T", "N", "X", "Y", "Z"] {
+        assert!(rank(&empty, word).is_some(), "{word}");
+    }
+    let jumps = |text: &str| {
+        let chunk = Chunk { text: text.into(), scan: Arc::new(gr_gcode::scan(text, Dialect::find("fanuc-mill").expect("there"))) };
+        let f = File::new("a", vec![chunk]);
+        let d = Doc { file: &f, dialect: Dialect::find("fanuc-mill").expect("there") };
+        complete(d, text.len() as u32, Around::default()).into_iter().map(|c| c.label).collect::<Vec<_>>()
+    };
+    assert_eq!(jumps("N10 G21\nN20 M3\nN100 M5\nIF [#1 EQ 2] GOTO 1"), ["10", "100"]);
 }
 
 proptest! {

@@ -157,7 +157,7 @@ pub fn signature(doc: Doc<'_>, offset: u32) -> Option<Signature> {
         let from = label.len() as u32;
         label.push_str(a.name);
         let optional = if a.optional { ", optional" } else { "" };
-        let unit = super::unit(a);
+        let unit = super::unit(a, doc.units);
         let unit = if unit.is_empty() { String::new() } else { format!(", {unit}") };
         parameters.push((from..label.len() as u32, format!("{}{unit}{optional}", a.written)));
     }

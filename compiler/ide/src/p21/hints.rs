@@ -21,7 +21,7 @@ pub fn hints(doc: Doc<'_>, span: Span) -> Vec<Hint> {
             }
             let tooltip = format!("{} of {}: {}", a.name, words(node.keyword()), a.written);
             found.push(Hint { at, text: format!("{}:", a.name), kind: HintKind::Attribute, tooltip });
-            let value_unit = unit(a);
+            let value_unit = unit(a, doc.units);
             if !value_unit.is_empty() && v.real().is_some() && v.span().end <= span.end {
                 found.push(Hint { at: v.span().end, text: format!(" {value_unit}"), kind: HintKind::Type, tooltip: String::new() });
             }

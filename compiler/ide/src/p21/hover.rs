@@ -27,7 +27,7 @@ pub fn hover(doc: Doc<'_>, offset: u32) -> Option<Hover> {
         return None;
     }
     let real = doc.file.real(doc.text, value);
-    let mut text = attribute(node, place).map_or(String::new(), |a| about(node, a, real));
+    let mut text = attribute(node, place).map_or(String::new(), |a| about(doc, node, a, real));
     if let Some(target) = doc.file.reference(doc.text, value) {
         let found = model.get(target).map_or(format!("**#{target}**: the file has no such instance."), |t| entity(doc, t));
         if !text.is_empty() {
@@ -43,11 +43,11 @@ fn contains(span: Span, at: u32) -> bool {
 }
 
 /// An attribute with its value here.
-fn about(node: Node<'_>, a: &'static gr_step::Attribute, value: Option<f64>) -> String {
+fn about(doc: Doc<'_>, node: Node<'_>, a: &'static gr_step::Attribute, value: Option<f64>) -> String {
     let optional = if a.optional { ", optional" } else { "" };
     let mut text = format!("**{}** of {}: {}{optional}", a.name, words(node.keyword()), a.written);
     if let Some(value) = value {
-        text.push_str(&format!("\n\n{}", in_units(node, a, value)));
+        text.push_str(&format!("\n\n{}", in_units(doc, node, a, value)));
     }
     if let Type::Enumeration(names) = &a.ty {
         let names: Vec<String> = names.iter().map(|n| format!("`.{}.`", n.to_uppercase())).collect();
@@ -57,18 +57,11 @@ fn about(node: Node<'_>, a: &'static gr_step::Attribute, value: Option<f64>) -> 
 }
 
 /// A value with its unit, and in the one that machinists use.
-fn in_units(node: Node<'_>, a: &gr_step::Attribute, value: f64) -> String {
-    match unit(a) {
-        "1/s" => {
-            let turn = if !node.is_a("milling_technology") {
-                ""
-            } else if value < 0.0 {
-                ", clockwise as M3: negative is the usual direction of cutting"
-            } else {
-                ""
-            };
-            format!("{} 1/s = {} rpm{turn}", number(value, 6), number(value.abs() * 60.0, 2))
-        }
+fn in_units(doc: Doc<'_>, node: Node<'_>, a: &gr_step::Attribute, value: f64) -> String {
+    let turn = if value < 0.0 && node.is_a("milling_technology") { ", clockwise as M3: negative is the usual direction of cutting" } else { "" };
+    match unit(a, doc.units) {
+        "1/s" => format!("{} 1/s = {} rpm{turn}", number(value, 6), number(value.abs() * 60.0, 2)),
+        "rpm" => format!("{} rpm{turn}", number(value.abs(), 2)),
         "m/s" => format!("{} m/s = {} mm/min = {} m/min", number(value, 6), number(value * 60_000.0, 2), number(value * 60.0, 3)),
         "" => number(value, 6),
         unit => format!("{} {unit}", number(value, 6)),
@@ -88,7 +81,7 @@ fn entity(doc: Doc<'_>, node: Node<'_>) -> String {
     if !node.complex() && !row.attributes.is_empty() {
         text.push_str("\n\n| attribute | value | |\n|---|---|---|\n");
         for (a, v) in row.attributes.iter().zip(node.parameters()).take(MOST_ROWS) {
-            text.push_str(&format!("| {} | {} | {} |\n", a.name, value(v), unit(a)));
+            text.push_str(&format!("| {} | {} | {} |\n", a.name, value(v), unit(a, doc.units)));
         }
     }
     let users = super::names::users(doc, node.id(), 200);

@@ -21,6 +21,28 @@ pub struct Doc<'a> {
     pub text: &'a [u8],
     /// Tables.
     pub file: &'a Exchange,
+    /// In which units speeds and angles are.
+    pub units: Units,
+}
+
+/// Units of speeds and angles.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Units {
+    /// m/s, 1/s, degrees: as the standard says.
+    #[default]
+    Iso,
+    /// m/min, rpm, mm per revolution, radians: as STEP Modeler writes them.
+    StepModeler,
+}
+
+impl Units {
+    /// As the file is read when nobody says how: by the program that wrote it.
+    pub fn of(text: &[u8], file: &Exchange) -> Units {
+        let model = Model::new(text, file);
+        let name = model.header("FILE_NAME");
+        let by = name.is_some_and(|n| n.parameters().any(|v| v.string().is_some_and(|s| s.contains("ST-GENERATOR"))));
+        if by { Units::StepModeler } else { Units::Iso }
+    }
 }
 
 impl<'a> Doc<'a> {
@@ -86,15 +108,20 @@ pub fn commas(text: &[u8]) -> Option<usize> {
 }
 
 /// Unit of an attribute by its type: ISO 14649-10, clause on measures: mm, degree, s, m/s, 1/s.
-pub fn unit(attribute: &Attribute) -> &'static str {
+pub fn unit(attribute: &Attribute, units: Units) -> &'static str {
     let ty = attribute.written;
     let has = |part: &str| ty.contains(part);
+    let iso = units == Units::Iso;
     if has("rot_speed_measure") {
-        "1/s"
+        if iso { "1/s" } else { "rpm" }
     } else if has("speed_measure") {
-        "m/s"
+        match (iso, attribute.name) {
+            (true, _) => "m/s",
+            (_, "feedrate") => "mm per revolution",
+            _ => "m/min",
+        }
     } else if has("plane_angle_measure") {
-        "degrees"
+        if iso { "degrees" } else { "radians" }
     } else if has("length_measure") {
         "mm"
     } else if has("time_measure") {

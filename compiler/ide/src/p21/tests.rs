@@ -7,7 +7,7 @@ proptest! {
     fn nothing_fails_on_any_text(body in "[#=();,'$*.A-C0-9 \n/é]{0,80}", at in 0u32..120) {
         let text = format!("ISO-10303-21;\nDATA;\n#1=PROJECT('a',#2);{body}\nENDSEC;");
         let file = gr_p21::parse(text.as_bytes());
-        let d = Doc { text: text.as_bytes(), file: &file };
+        let d = Doc { text: text.as_bytes(), file: &file, units: super::Units::default() };
         let lines = gr_text::LineIndex::new(text.as_bytes());
         let span = gr_text::Span::new(at, at + 10);
         let _ = (super::hover::hover(d, at), super::complete::complete(d, at), super::complete::signature(d, at));
@@ -26,4 +26,20 @@ fn every_meaning_is_of_an_entity() {
         let (keyword, text) = row.split_once('\t').expect("two columns");
         assert!(!gr_step::schema().find(keyword).is_empty() && text.ends_with('.'), "{row}");
     }
+}
+
+#[test]
+fn units_are_those_of_the_file() {
+    let text = "ISO-10303-21;\nDATA;\n#31=MILLING_TECHNOLOGY(0.24,.TCP.,$,-9000.,$,.F.,.F.,.F.,$);\nENDSEC;";
+    let file = gr_p21::parse(text.as_bytes());
+    let at = |what: &str| text.find(what).expect("there") as u32;
+    let told = |units, what: &str| super::hover::hover(Doc { text: text.as_bytes(), file: &file, units }, at(what)).map(|h| h.text).unwrap_or_default();
+    assert!(told(super::Units::Iso, "0.24").contains("0.24 m/s = 14400 mm/min"));
+    assert!(told(super::Units::StepModeler, "0.24").contains("0.24 mm per revolution"));
+    assert!(told(super::Units::StepModeler, "-9000").contains("9000 rpm, clockwise"));
+    let hints = super::hints::hints(Doc { text: text.as_bytes(), file: &file, units: super::Units::StepModeler }, gr_text::Span::new(0, text.len() as u32));
+    assert!(hints.iter().any(|h| h.text == " rpm") && hints.iter().all(|h| h.text != " 1/s"));
+    let guessed = |by: &str| super::Units::of(by.as_bytes(), &gr_p21::parse(by.as_bytes()));
+    assert_eq!(guessed(text), super::Units::Iso);
+    assert_eq!(guessed("ISO-10303-21;\nHEADER;\nFILE_NAME('a','',(''),(''),'ST-GENERATOR','','');\nENDSEC;\nDATA;\nENDSEC;"), super::Units::StepModeler);
 }
