@@ -53,6 +53,8 @@ struct Backend {
     goodbye: Arc<AtomicBool>,
     /// Folders that are open.
     folders: Arc<Mutex<Vec<lsp::Uri>>>,
+    /// One asks for settings at a time: an older answer must not come last.
+    asking: Arc<tokio::sync::Mutex<()>>,
     /// Texts of big documents on their way here.
     texts: Arc<BigTexts>,
 }
@@ -88,7 +90,7 @@ impl Backend {
         });
         let abilities: Arc<Mutex<Abilities>> = Arc::default();
         tokio::spawn(speak(client.clone(), abilities.clone(), outbox));
-        Backend { queue, client, abilities, mistakes: Arc::default(), goodbye, folders: Arc::default(), texts }
+        Backend { queue, client, abilities, mistakes: Arc::default(), goodbye, folders: Arc::default(), asking: Arc::default(), texts }
     }
 
     fn tell(&self, message: Message) {
@@ -139,6 +141,7 @@ impl Backend {
         if !self.abilities().configuration {
             return;
         }
+        let _turn = self.asking.lock().await;
         let folders = self.folders.lock().unwrap_or_else(PoisonError::into_inner).clone();
         let several = if folders.len() > 1 { folders } else { Vec::new() };
         let scopes = std::iter::once(None).chain(several.iter().cloned().map(Some));

@@ -281,7 +281,7 @@ fn a_new_name_changes_nothing_or_is_refused() {
         (&[("main.ngc", &with("#101=3\nG1 X#101\nM2\n"))], "#1|01=", "5221", "from 31 to 5000"),
         (&[("main.ngc", &with("#5221=3\nG1 X#5221\nM2\n"))], "#5|221=", "101", "controller's own"),
         (&[("main.ngc", &with("#<a>=3\nG1 X#<a>\nM2\n"))], "#<a|>=", "_x", "controller's own"),
-        (&[("main.ngc", &with("#<_a>=3\no<s> sub\nG1 X#<_a>\no<s> endsub\no<s> call\nM2\n"))], "#<_|a>=", "a", "begins with _"),
+        (&[("main.ngc", &with("#<_deep>=3\no<s> sub\nG1 X#<_deep>\no<s> endsub\no<s> call\nM2\n"))], "#<_|deep>=", "deep", "begins with _"),
         (&[("main.ngc", &with("#101=102\n#102=7\nG1 X##101\nM2\n"))], "#1|02=7", "103", "computed"),
         (&[("main.ngc", &with("o100 sub\nG1 X#1\no100 endsub\n#5=100\no#5 call [2]\nM2\n"))], "o1|00 sub", "101", "computed"),
         (&[("main.ngc", &with("o100 sub\nG1 X#1\no100 endsub\no100 call [2]\nM2\n"))], "X#|1", "2", "called with"),

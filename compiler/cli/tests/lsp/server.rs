@@ -136,7 +136,7 @@ fn big_files_show_progress() {
 #[test]
 fn several_folders() {
     let other = tempfile::tempdir().expect("a folder");
-    std::fs::write(other.path().join("lib.ngc"), "o<far> sub\no<far> endsub\n").expect("written");
+    std::fs::write(other.path().join("far.ngc"), "o<far> sub\no<far> endsub\n").expect("written");
     let mut c = Client::new(&[("a.ngc", "o<far> call\nM2\n")], json!({}));
     let uri = c.open("a.ngc", None);
     let at = c.at(&uri, "o<f|ar> call");
@@ -144,7 +144,7 @@ fn several_folders() {
     let folder = format!("file://{}", other.path().display());
     c.notify("workspace/didChangeWorkspaceFolders", json!({ "event": { "added": [{ "uri": folder, "name": "lib" }], "removed": [] } }));
     let found = c.request("textDocument/definition", at.clone());
-    assert!(found[0]["uri"].as_str().is_some_and(|u| u.ends_with("lib.ngc")), "{found}");
+    assert!(found[0]["uri"].as_str().is_some_and(|u| u.ends_with("far.ngc")), "{found}");
     c.notify("workspace/didChangeWorkspaceFolders", json!({ "event": { "added": [], "removed": [{ "uri": folder, "name": "lib" }] } }));
     assert_eq!(c.request("textDocument/definition", at), json!([]));
     c.shut_down();

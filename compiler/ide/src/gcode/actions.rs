@@ -81,13 +81,46 @@ fn other_arc_form(line: &LineOf<'_>, before: &Modal, after: &Modal, program: &Pr
     Some(Action { title: title.into(), kind: ActionKind::Rewrite, edits })
 }
 
+/// Whether a block behind a line goes on with its cycle, or takes over words of it: depth, R, P or Q.
+fn is_leant_on(doc: Doc<'_>, line: u32) -> bool {
+    let (mut said, mut over) = (std::collections::BTreeSet::new(), false);
+    for l in doc.lines(line + 1..doc.count()) {
+        let codes = || l.words().iter().filter(|w| w.letter == b'g' && w.form == Form::Literal).map(|w| w.value);
+        let is_cycle = |v: &f64| *v == 73.0 || *v == 74.0 || (81.0..90.0).contains(v);
+        let Some(cycle) = codes().find(is_cycle) else {
+            over |= codes().any(|v| v == 80.0 || (0.0..4.0).contains(&v));
+            if !over && l.words().iter().any(|w| matches!(w.letter, b'x' | b'y' | b'z' | b'r')) {
+                return true;
+            }
+            continue;
+        };
+        over = true;
+        said.extend(l.words().iter().map(|w| w.letter));
+        let turned = doc.lines(line + 1..l.line + 1).any(|l| [180, 190].iter().any(|c| l.has_code(b'g', *c)));
+        let more: &[u8] = match (cycle as i64, turned) {
+            (_, true) => b"rxyzpq",
+            (73 | 83, _) => b"rzq",
+            (82 | 86 | 88 | 89, _) => b"rzp",
+            _ => b"rz",
+        };
+        if !more.iter().all(|w| said.contains(w)) {
+            return true;
+        }
+    }
+    false
+}
+
 /// Writes the moves that a cycle makes.
 fn expand(doc: Doc<'_>, line: &LineOf<'_>, before: &Modal, after: &Modal, program: &Program) -> Option<Action> {
     let cycle = (730..=899).contains(&after.motion) && after.motion != 800;
     let moves = program.steps().filter(|s| s.op.moves()).count();
     // A setting in the block would be lost with its words.
     let sets = line.words().iter().any(|w| matches!(w.form, Form::Setting | Form::Control | Form::Bad));
-    if moves == 0 || moves > MOST_MOVES || !cycle || sets || is_shifted(before) || is_shifted(after) {
+    if moves == 0 || moves > MOST_MOVES || !cycle || sets || is_shifted(before) || is_shifted(after) || is_leant_on(doc, line.line) {
+        return None;
+    }
+    // A block that goes on with a cycle takes more from it than its words.
+    if !line.words().iter().any(|w| w.letter == b'g' && w.form == Form::Literal && (w.value == 73.0 || w.value == 74.0 || (81.0..90.0).contains(&w.value))) {
         return None;
     }
     let title = format!("Write out this {}", code_name(b'g', f64::from(after.motion) / 10.0));

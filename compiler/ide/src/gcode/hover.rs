@@ -238,6 +238,7 @@ pub fn block(run: &Run) -> String {
         let what = match (run.cycle, m.totals.moves, m.arc) {
             (true, n, _) => format!("{} in {n} moves", code_name(b'g', f64::from(a.motion) / 10.0)),
             (_, 1, Some(arc)) => format!("{} arc", if arc.sweep < 0.0 { "clockwise" } else { "counter-clockwise" }),
+            (_, 1, None) if m.totals.feed_nm == 0 && one_move(&run.program) == "straight feed" => "feed of the other axes".into(),
             (_, 1, None) => one_move(&run.program).into(),
             (_, n, _) => format!("{n} moves"),
         };
@@ -272,8 +273,8 @@ fn one_move(program: &gr_ir::Program) -> &'static str {
     use gr_ir::Op;
     match program.steps().find(|s| s.op.moves()).map(|s| s.op) {
         Some(Op::Rapid) => "rapid",
-        Some(Op::Nurbs { .. }) => "spline",
-        Some(Op::Probe(_)) => "probe",
+        Some(Op::Nurbs { .. }) => "spline at feed",
+        Some(Op::Probe(_)) => "probing move",
         Some(Op::RigidTap { .. }) => "rigid tapping",
         _ => "straight feed",
     }
