@@ -300,7 +300,9 @@ fn leg_lengths_as_published() {
     plain.shape.platform = [[0.0, 200.0, 0.0], [0.0, -200.0, 0.0]];
     let h = plain.lengths([605.0, 0.0, 0.0]);
     assert!((h[0] - 637.201).abs() < 5e-4 && (h[1] - 637.201).abs() < 5e-4);
-    let h = plain.lengths([libm::hypot(505.0, 205.0), libm::atan2(205.0, 505.0), 0.0]);
+    let (reach, turn) = (libm::hypot(505.0, 205.0), libm::atan2(205.0, 505.0));
+    assert!((reach - 545.023).abs() < 5e-4 && (turn.to_degrees() - 22.094).abs() < 5e-4);
+    let h = plain.lengths([reach, turn, 0.0]);
     assert!((h[0] - 429.883).abs() < 5e-4 && (h[1] - 716.100).abs() < 5e-4);
     // A plunge of 100 mm lengthens both legs.
     let h = m.lengths([800.0, 0.0, 100.0]);
@@ -308,6 +310,32 @@ fn leg_lengths_as_published() {
     // Too far out: the arm is named, whatever the legs say.
     let h = m.lengths([1100.0, 0.0, 0.0]);
     assert!(m.violations(&h).iter().any(|v| v.name == "arm-long"));
+}
+
+/// The published example of the forward problem has six roots, R = ±1, ±0.504 and ±0.993i: its equation in x = R², with
+/// the lengths that the inverse gives at R = 1 and 30 degrees.
+#[test]
+fn roots_as_published() {
+    let Chain::TwoLegs(m) = builtin("usp/2ups-prp").unwrap().chain else { panic!("two legs") };
+    let mut plain = (*m).clone();
+    let (a, b) = (0.5, 1.0);
+    plain.shape.base = [[0.0, b, 0.0], [0.0, -b, 0.0]];
+    plain.shape.platform = [[0.0, a, 0.0], [0.0, -a, 0.0]];
+    let h = plain.lengths([1.0, 30f64.to_radians(), 0.0]);
+    assert!((h[0] - 0.620).abs() < 5e-4 && (h[1] - 1.544).abs() < 5e-4, "{h:?}");
+    let (d, m2) = (h[1] * h[1] - h[0] * h[0], 2.0 * (a * a + b * b) - h[0] * h[0] - h[1] * h[1]);
+    let f = |x: f64| (2.0 * x + m2).powi(2) * x * b * b + d * d * a * a * b * b - 16.0 * a * a * b * b * x * b * b;
+    let root = |mut low: f64, mut high: f64| {
+        assert!(f(low) * f(high) < 0.0);
+        for _ in 0..80 {
+            let mid = (low + high) / 2.0;
+            if f(low) * f(mid) <= 0.0 { high = mid } else { low = mid }
+        }
+        low
+    };
+    assert!((root(0.9, 1.5).sqrt() - 1.0).abs() < 1e-9);
+    assert!((root(0.1, 0.5).sqrt() - 0.503618).abs() < 5e-7);
+    assert!(((-root(-3.0, -0.1)).sqrt() - 0.993).abs() < 5e-4);
 }
 
 #[test]
