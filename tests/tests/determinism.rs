@@ -28,13 +28,17 @@ fn programs(dir: &Path) -> Vec<String> {
     names
 }
 
+/// Every file of a folder and of those in it, in order of names.
 fn files(dir: &Path) -> Vec<(PathBuf, Vec<u8>)> {
-    let mut all: Vec<(PathBuf, Vec<u8>)> = std::fs::read_dir(dir)
-        .map(|entries| entries.filter_map(|e| e.ok()).filter(|e| e.path().is_file()).collect::<Vec<_>>())
-        .unwrap_or_default()
-        .into_iter()
-        .map(|e| (e.file_name().into(), std::fs::read(e.path()).expect("readable")))
-        .collect();
+    let mut all = Vec::new();
+    for entry in std::fs::read_dir(dir).into_iter().flatten().filter_map(Result::ok) {
+        let name = PathBuf::from(entry.file_name());
+        if entry.path().is_dir() {
+            all.extend(files(&entry.path()).into_iter().map(|(inner, bytes)| (name.join(inner), bytes)));
+        } else {
+            all.push((name, std::fs::read(entry.path()).expect("readable")));
+        }
+    }
     all.sort();
     all
 }
@@ -103,8 +107,8 @@ fn robots_and_process_plans_twice() {
         !made[0].2.is_empty()
     };
     let languages = ["rapid", "krl", "fanuc-ls", "urscript", "inform", "val3", "vplus", "kawasaki-as", "pdl2", "delmia-xml", "melfa", "spel", "nachi", "denso-pac", "setpoints"];
-    let made = languages.iter().filter(|l| twice(&["build", "bracket.ngc", "--machine", "irb2400-cell.toml", "--target", l])).count();
-    assert!(made >= 3, "only {made} made something");
+    let made = languages.iter().filter(|l| twice(&["build", "bracket.ngc", "--machine", "irb2400-cell.toml", "--allow-unverified", "--target", l])).count();
+    assert!(made >= 4, "only {made} made something");
     for target in ["rs274ngc", "canon", "motion", "plan", "plan-json", "svg", "sheet", "sheet-html", "json", "csv"] {
         assert!(twice(&["build", "case-study.p21", "--target", target]), "{target}");
     }
