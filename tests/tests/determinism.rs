@@ -106,9 +106,10 @@ fn robots_and_process_plans_twice() {
         assert!(made[0] == made[1], "{args:?}: other bytes the second time");
         !made[0].2.is_empty()
     };
-    let languages = ["rapid", "krl", "fanuc-ls", "urscript", "inform", "val3", "vplus", "kawasaki-as", "pdl2", "delmia-xml", "melfa", "spel", "nachi", "denso-pac", "setpoints"];
+    let languages = ["rapid", "krl", "fanuc-ls", "urscript", "inform", "val3", "vplus", "kawasaki-as", "pdl2", "delmia-xml", "melfa", "spel", "nachi", "denso-pac"];
     let made = languages.iter().filter(|l| twice(&["build", "bracket.ngc", "--machine", "irb2400-cell.toml", "--allow-unverified", "--target", l])).count();
-    assert!(made >= 4, "only {made} made something");
+    assert!(made >= 3, "only {made} made something");
+    assert!(twice(&["build", "bracket.ngc", "--machine", "irb2400-cell.toml", "--target", "setpoints"]));
     for target in ["rs274ngc", "canon", "motion", "plan", "plan-json", "svg", "sheet", "sheet-html", "json", "csv"] {
         assert!(twice(&["build", "case-study.p21", "--target", target]), "{target}");
     }

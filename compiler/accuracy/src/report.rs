@@ -255,6 +255,8 @@ pub struct Row {
 pub struct Report {
     /// Operations that cut, in order.
     pub rows: Vec<Row>,
+    /// Joints that a program in words of the machine sends beyond their limits: each with the first place and its value.
+    pub outside: Vec<(Source, usize, f64)>,
 }
 
 /// Never further apart than this are the places looked at, mm.
@@ -337,6 +339,8 @@ struct Walk<'a> {
     last: Option<(usize, V3)>,
     /// The operation whose stretch over the tolerance is going on.
     over: Option<usize>,
+    /// Joints beyond their limits.
+    outside: Vec<(Source, usize, f64)>,
 }
 
 impl<'a> Walk<'a> {
@@ -350,11 +354,11 @@ impl<'a> Walk<'a> {
         let rows = operations.list.iter().map(|o| row(o.clone())).collect();
         let (frame, tool) = (Frame::IDENTITY, Frame::IDENTITY);
         let measured = crate::compensate::deviations(machine);
-        Walk { machine, operations, budget, material, kinematics, measured, frame, tool, rows, last: None, over: None }
+        Walk { machine, operations, budget, material, kinematics, measured, frame, tool, rows, last: None, over: None, outside: Vec::new() }
     }
 
     fn finish(self) -> Report {
-        Report { rows: self.rows.into_iter().filter(|r| r.places > 0).collect() }
+        Report { rows: self.rows.into_iter().filter(|r| r.places > 0).collect(), outside: self.outside }
     }
 
     /// What happens at a place of the source, where it is not too near to the one before.

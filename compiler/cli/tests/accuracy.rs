@@ -182,6 +182,18 @@ const KINDS: [(&str, &str, [f64; 3], &str); 9] = [
     ("generic/mill5-cb-head", "", [0.0, 0.0, 0.0], "X60 B20"),
 ];
 
+/// A mill with the part beyond its travel: the joint and its limit are told where it first goes there.
+#[test]
+fn limits_of_a_mill() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("m.toml"), with_data("generic/mill3", "", [0.0; 3])).unwrap();
+    std::fs::write(folder.path().join("p.ngc"), "G21 G90 G94 F600\nT1 M6\nG43 H1\nG0 X0 Y0\nG1 X50\nG1 X60\nM2\n").unwrap();
+    let at = |part: &str| run(folder.path(), &["accuracy", "p.ngc", "--machine=m.toml", "--message-format=short", part]);
+    let far = whole(&at("--part=380,0,-100"));
+    assert!(far.contains("p.ngc:5:1: error[E0507]: joint X") && far.matches("E0507").count() == 1 && far.starts_with("exit 1"), "{far}");
+    assert!(!whole(&at("--part=300,0,-100")).contains("E0507"));
+}
+
 /// A file with an error of 5 µm or 0.01° in every joint, IT7, and springs of 10 kN/mm or 1e9 N·mm/rad.
 fn with_data(id: &str, more: &str, [x, y, z]: [f64; 3]) -> String {
     let base = gr_machine::builtin(id).unwrap();

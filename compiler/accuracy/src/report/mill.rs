@@ -86,6 +86,11 @@ impl Mill<'_> {
         let kinematics: &dyn Kinematics = self.walk.kinematics;
         let Ok(joints) = slid(kinematics, &begun, &self.sliding, &asked) else { return };
         let Ok(real) = kinematics.forward_frame(&joints) else { return };
+        for (joint, value) in machine.outside(&joints) {
+            if self.walk.outside.iter().all(|(_, known, _)| *known != joint) {
+                self.walk.outside.push((view.source, joint, value));
+            }
+        }
         let lever = sub(real.then(&Frame::shift(asked.tool.position)).position, real.position);
         let feed = rotate(&crate::words::frame(machine, state).turn, feed);
         let axis = real.turn.map(|r| r[2]);

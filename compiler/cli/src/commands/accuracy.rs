@@ -211,6 +211,17 @@ fn predict(
             report(&planned.program, &operations, &budget, material, &tell)
         }
     };
+    // Without a place of the part nobody knows where its zero was touched.
+    for (source, joint, value) in report.outside.iter().filter(|_| args.part.is_some()) {
+        let (file, span) = place(motion, *source);
+        let Some(j) = machine.joints.get(*joint) else { continue };
+        let bound = if j.max.is_some_and(|m| *value > m) { j.max } else { j.min };
+        let told = [j.name.clone(), j.show(*value), bound.map_or(String::new(), |b| j.show(b))];
+        found.push(Diagnostic::new(code::ROBOT_JOINT_LIMIT, file, span, &told));
+    }
+    if found.iter().any(|d| d.code == code::ROBOT_JOINT_LIMIT) {
+        return Err(found);
+    }
     for row in &report.rows {
         judge(&mut found, row, material, motion);
         lawless(&mut found, row, machine, motion);
