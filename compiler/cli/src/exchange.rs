@@ -119,47 +119,57 @@ fn add(found: &mut Vec<Diagnostic>, more: Vec<Diagnostic>, levels: &Levels) {
     found.dedup_by(|b, a| a.code == b.code && a.message == b.message && a.primary() == b.primary());
 }
 
+/// What syntax, schema, rules and lints say, but for what the options have settled.
+fn told(unit: &Unit) -> Vec<Diagnostic> {
+    let mut found = gr_step::diagnostics(&unit.text, FILE);
+    let modeler = unit.step_units == Some(Units::StepModeler);
+    // What a number is in the standard's unit is of no interest when the project says that it is in another.
+    let of_units = [code::STEP_FEED_UNIT, code::STEP_SPINDLE_UNIT, code::STEP_CUTSPEED_UNIT, code::STEP_NEGATIVE_SPINDLE];
+    found.retain(|d| match d.code {
+        code::STEP_OVERLAP => unit.step_overlap.is_none() && !modeler,
+        other => !(modeler && of_units.contains(&other)),
+    });
+    found
+}
+
 /// Syntax, schema, rules and lints; the plan follows only where there are no errors.
 fn syntax(unit: &Unit) -> Vec<Diagnostic> {
-    let mut found = gr_step::diagnostics(&unit.text, FILE);
-    if unit.step_overlap.is_some() || unit.step_units == Some(Units::StepModeler) {
-        found.retain(|d| d.code != code::STEP_OVERLAP);
-    }
-    // What a number is in the standard's unit is of no interest when the project says that it is in another.
-    if unit.step_units == Some(Units::StepModeler) {
-        let of_units = [code::STEP_FEED_UNIT, code::STEP_SPINDLE_UNIT, code::STEP_CUTSPEED_UNIT, code::STEP_NEGATIVE_SPINDLE];
-        found.retain(|d| !of_units.contains(&d.code));
-    }
     let mut all = Vec::new();
-    add(&mut all, found, &unit.lints);
+    add(&mut all, told(unit), &unit.lints);
     all
 }
 
-/// A file that is only listed, or read as a published system read it: what its units leave open is a warning.
+type Read = (Option<Process>, Vec<Tool>, Vec<Diagnostic>);
+
+/// A process with what was found; none where there is an error.
+fn checked(unit: &Unit, mut found: Vec<Diagnostic>, (process, tools, more): Read) -> Result<(Process, Vec<Tool>, Checked), Checked> {
+    if !bad(&found) {
+        add(&mut found, more, &unit.lints);
+    }
+    let process = process.filter(|_| !bad(&found));
+    let checked = with_source(&unit.name(), unit, found);
+    match process {
+        Some(process) => Ok((process, tools, checked)),
+        None => Err(checked),
+    }
+}
+
+/// A file that is only listed, or read as a published system read it: where its units are left open they are taken as
+/// STEP Modeler's, with a warning.
 fn leniently(unit: &Unit) -> Result<(Process, Vec<Tool>, Checked), Checked> {
     let text = unit.text.as_bytes();
-    let mut found = gr_step::diagnostics(&unit.text, FILE);
-    let units = unit.step_units.unwrap_or_else(|| gr_planner::evident_units(text));
-    let (process, tools, more) = gr_planner::process(text, FILE, Some(units));
-    let open = gr_planner::process(text, FILE, unit.step_units).2.into_iter().find(|d| d.code == code::PLAN_UNITS_OPEN);
-    found.extend(open);
-    found.retain(|d| d.code != code::STEP_OVERLAP || unit.step_overlap.is_none());
-    for d in &mut found {
-        if [code::STEP_OVERLAP, code::PLAN_UNITS_OPEN].contains(&d.code) {
-            d.severity = Severity::Warning;
-        }
+    let mut found = told(unit);
+    let mut read = gr_planner::process(text, FILE, unit.step_units);
+    if let Some(open) = read.2.iter().find(|d| d.code == code::PLAN_UNITS_OPEN).cloned() {
+        found.push(open);
+        read = gr_planner::process(text, FILE, Some(Units::StepModeler));
+    }
+    for d in found.iter_mut().filter(|d| d.code == code::PLAN_UNITS_OPEN) {
+        d.severity = Severity::Warning;
     }
     let mut all = Vec::new();
     add(&mut all, found, &unit.lints);
-    if !bad(&all) {
-        add(&mut all, more, &unit.lints);
-    }
-    let failed = bad(&all);
-    let checked = with_source(&unit.name(), unit, all);
-    match process {
-        Some(process) if !failed => Ok((process, tools, checked)),
-        _ => Err(checked),
-    }
+    checked(unit, all, read)
 }
 
 /// What the control calls the tools of a file.
@@ -211,18 +221,9 @@ fn moving(unit: &Unit, program: gr_ir::Program, plan: Plan) -> Motion {
 
 /// The process of a file, with errors of reading it only.
 pub fn process(unit: &Unit) -> Result<(Process, Vec<Tool>, Checked), Checked> {
-    let mut found = syntax(unit);
-    if bad(&found) {
-        return Err(with_source(&unit.name(), unit, found));
-    }
-    let (process, tools, more) = gr_planner::process(unit.text.as_bytes(), FILE, unit.step_units);
-    add(&mut found, more, &unit.lints);
-    let failed = bad(&found);
-    let checked = with_source(&unit.name(), unit, found);
-    match process {
-        Some(process) if !failed => Ok((process, tools, checked)),
-        _ => Err(checked),
-    }
+    let found = syntax(unit);
+    let read = if bad(&found) { Read::default() } else { gr_planner::process(unit.text.as_bytes(), FILE, unit.step_units) };
+    checked(unit, found, read)
 }
 
 /// The table of workingsteps, as text or JSON.

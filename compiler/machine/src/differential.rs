@@ -2,7 +2,7 @@
 
 use crate::kinematics::{Kinematics, KinematicsError, checked};
 use crate::math::{
-    Frame, V3, cross, eigenvalues, product, rot_z, rotate, rotation_vector, scale, solve, sub, transpose,
+    Frame, V3, cross, eigenvalues, jacobi_turn, product, rot_z, rotate, rotation_vector, scale, solve, sub, transpose,
 };
 use crate::{Chain, Joint, JointKind, Machine, Opw};
 
@@ -190,19 +190,7 @@ fn extremes(mut a: [[f64; 6]; 6], n: usize) -> (f64, f64) {
         }
         for p in 0..n {
             for q in p + 1..n {
-                if a[p][q] == 0.0 {
-                    continue;
-                }
-                let theta = (a[q][q] - a[p][p]) / (2.0 * a[p][q]);
-                let t = theta.signum() / (theta.abs() + libm::sqrt(theta * theta + 1.0));
-                let c = 1.0 / libm::sqrt(t * t + 1.0);
-                let s = t * c;
-                for row in a.iter_mut().take(n) {
-                    (row[p], row[q]) = (c * row[p] - s * row[q], s * row[p] + c * row[q]);
-                }
-                for k in 0..n {
-                    (a[p][k], a[q][k]) = (c * a[p][k] - s * a[q][k], s * a[p][k] + c * a[q][k]);
-                }
+                jacobi_turn(&mut a[..n], p, q);
             }
         }
     }

@@ -240,21 +240,25 @@ pub fn eigenvalues(mut a: Vec<Vec<f64>>) -> Vec<f64> {
     out
 }
 
-fn jacobi_turn(a: &mut [Vec<f64>], p: usize, q: usize) {
-    if a[p][q] == 0.0 {
+/// One turn of Jacobi's method, which makes the element `p`, `q` of a symmetric matrix zero; columns behind its size stay.
+pub(crate) fn jacobi_turn<R: AsMut<[f64]>>(a: &mut [R], p: usize, q: usize) {
+    let n = a.len();
+    let [pp, pq] = [p, q].map(|k| a[p].as_mut()[k]);
+    if pq == 0.0 {
         return;
     }
-    let theta = (a[q][q] - a[p][p]) / (2.0 * a[p][q]);
+    let theta = (a[q].as_mut()[q] - pp) / (2.0 * pq);
     let t = theta.signum() / (theta.abs() + libm::sqrt(theta * theta + 1.0));
     let c = 1.0 / libm::sqrt(t * t + 1.0);
     let s = t * c;
-    for row in a.iter_mut() {
+    for row in a.iter_mut().map(AsMut::as_mut) {
         let (x, y) = (row[p], row[q]);
         (row[p], row[q]) = (c * x - s * y, s * x + c * y);
     }
-    for k in 0..a.len() {
-        let (x, y) = (a[p][k], a[q][k]);
-        (a[p][k], a[q][k]) = (c * x - s * y, s * x + c * y);
+    for k in 0..n {
+        let (x, y) = (a[p].as_mut()[k], a[q].as_mut()[k]);
+        a[p].as_mut()[k] = c * x - s * y;
+        a[q].as_mut()[k] = s * x + c * y;
     }
 }
 

@@ -15,6 +15,8 @@ pub struct Exchange {
     pub keywords: Vec<Box<str>>,
     /// What is wrong, by place.
     pub faults: Vec<Fault>,
+    /// The text ends within a section: what is referred to may have stood behind the end.
+    pub cut: bool,
     pub(crate) ids: Ids,
 }
 

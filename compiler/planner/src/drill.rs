@@ -206,7 +206,7 @@ fn beyond(e: &mut Emit<'_>, step: &Workingstep, feature: &Feature, depth: f64) {
 
 /// Height of a tool's point.
 fn tip(tool: &Tool) -> f64 {
-    let tip = tool.tip_angle.filter(|_| tool.pointed()).map_or(0.0, |a| tool.diameter / 2.0 / libm::tan(a));
+    let tip = tool.tip_angle.filter(|_| tool.is_pointed()).map_or(0.0, |a| tool.diameter / 2.0 / libm::tan(a));
     if tip.is_finite() && tip > 0.0 { tip } else { 0.0 }
 }
 

@@ -30,12 +30,6 @@ pub fn process(text: &[u8], file: FileId, units: Option<Units>) -> (Option<Proce
     read::read(&model, file, units)
 }
 
-/// How the published systems read a file: as the standard says where its speeds allow that, as STEP Modeler otherwise.
-pub fn evident_units(text: &[u8]) -> Units {
-    let open = |d: &Diagnostic| d.code == gr_text::code::PLAN_UNITS_OPEN;
-    if process(text, FileId(0), None).2.iter().any(open) { Units::StepModeler } else { Units::Iso }
-}
-
 /// The tools as LinuxCNC's tool table, in mm: number, pocket, length, diameter, and what the tool is.
 pub fn tool_table(tools: &[Tool]) -> String {
     let line = |t: &Tool| {

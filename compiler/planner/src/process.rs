@@ -542,9 +542,24 @@ pub struct Tool {
 }
 
 impl Tool {
-    /// Its tip is a point, if it has an angle: drills, countersinks, reamers, taps.
-    pub fn pointed(&self) -> bool {
-        ["DRILL", "COUNTERS", "SPOT", "REAMER", "TAP"].iter().any(|k| self.kind.contains(k)) && !self.kind.starts_with("TAPERED_END")
+    fn is_one_of(&self, kinds: &[&str]) -> bool {
+        kinds.iter().any(|k| self.kind.contains(k)) && !self.kind.starts_with("TAPERED_END")
+    }
+    /// Its tip is a point, if it has an angle.
+    pub fn is_pointed(&self) -> bool {
+        self.is_one_of(&["DRILL", "COUNTERS", "SPOT", "REAMER", "TAP"])
+    }
+    /// It cuts below what it passes, or its shape is not known.
+    pub fn undercuts(&self) -> bool {
+        self.is_one_of(&["T_SLOT_MILL", "WOODRUFF", "DOVETAIL", "BORING", "SIDE_MILL", "THREAD_MILL", "USER"])
+    }
+    /// It goes into the side of a slot.
+    pub fn is_disc(&self) -> bool {
+        self.is_one_of(&["T_SLOT_MILL", "WOODRUFF"])
+    }
+    /// A cylinder, cone or ball that mills with its side and its face.
+    pub fn mills(&self) -> bool {
+        !self.is_pointed() && !self.is_disc() && !self.is_one_of(&["BORING", "DOVETAIL", "THREAD_MILL"])
     }
 }
 

@@ -23,13 +23,12 @@ pub(crate) struct Cutter {
 }
 
 impl Cutter {
-    /// None for tools that cut below what they pass: T slot cutters, Woodruff cutters, back boring bars.
+    /// None for tools that cut below what they pass.
     pub fn of(tool: &Tool) -> Option<Cutter> {
-        let undercuts = ["T_SLOT", "WOODRUFF", "DOVETAIL", "BORING", "SIDE_MILL", "THREAD", "USER"];
-        if undercuts.iter().any(|k| tool.kind.contains(k)) || !(tool.diameter > 0.0 && tool.diameter < 1e6) {
+        if tool.undercuts() || !(tool.diameter > 0.0 && tool.diameter < 1e6) {
             return None;
         }
-        let rise = tool.tip_angle.filter(|_| tool.pointed()).map_or(0.0, |a| 1.0 / libm::tan(a));
+        let rise = tool.tip_angle.filter(|_| tool.is_pointed()).map_or(0.0, |a| 1.0 / libm::tan(a));
         let radius = tool.diameter / 2.0;
         let rise = if rise.is_finite() && rise > 0.0 { rise } else { 0.0 };
         Some(Cutter { radius, edge: tool.edge_radius.clamp(0.0, radius), rise })

@@ -24,6 +24,19 @@ fn says(p: &Part, code: Code, words: &str) {
     assert!(out.iter().any(|d| d.code == code && d.message.contains(words)), "{words}: {out:#?}");
 }
 
+/// Through-holes of 5 mm, each drilled.
+fn drilled(places: &[[f64; 2]]) -> Part {
+    let mut p = Part::new(BLOCK);
+    let drill = p.tool("TWIST_DRILL", 5.0, 0.0, Some(59.0));
+    let op = p.drill("DRILLING", drill, None, "");
+    let size = p.length(5.0);
+    let bottom = p.add("THROUGH_BOTTOM_CONDITION()".into());
+    for [x, y] in places {
+        p.machine("ROUND_HOLE", &[op], [*x, *y, 12.0], Some(12.0), &format!(",#{size},$,#{bottom}"));
+    }
+    p
+}
+
 fn silent(p: &Part, code: Code) {
     let (_, out) = planned(p);
     assert!(out.iter().all(|d| d.code != code), "{out:#?}");
@@ -229,14 +242,7 @@ fn a_retract_plane_in_the_material_is_told() {
 /// Another setup has another origin: its first way names Z, then X and Y, even where the numbers are the same.
 #[test]
 fn another_setup_names_its_first_place() {
-    let mut p = Part::new(BLOCK);
-    let drill = p.tool("TWIST_DRILL", 5.0, 0.0, Some(59.0));
-    let op = p.drill("DRILLING", drill, None, "");
-    let size = p.length(5.0);
-    let bottom = p.add("THROUGH_BOTTOM_CONDITION()".into());
-    for x in [30.0, 10.0] {
-        p.machine("ROUND_HOLE", &[op], [x, 20.0, 12.0], Some(12.0), &format!(",#{size},$,#{bottom}"));
-    }
+    let mut p = drilled(&[[30.0, 20.0], [10.0, 20.0]]);
     let [a, b] = [p.steps[0], p.steps[1]];
     let place = p.place([0.0; 3]);
     let plane = p.add(format!("PLANE('security',#{place})"));
@@ -262,13 +268,7 @@ fn another_setup_names_its_first_place() {
 /// Where the machine stands at the beginning nobody knows: the first way names X and Y, whatever they are.
 #[test]
 fn the_first_place_is_named() {
-    let mut p = Part::new(BLOCK);
-    let drill = p.tool("TWIST_DRILL", 5.0, 0.0, Some(59.0));
-    let op = p.drill("DRILLING", drill, None, "");
-    let size = p.length(5.0);
-    let bottom = p.add("THROUGH_BOTTOM_CONDITION()".into());
-    p.machine("ROUND_HOLE", &[op], [0.0, 0.0, 12.0], Some(12.0), &format!(",#{size},$,#{bottom}"));
-    let (p, _) = planned(&p);
+    let (p, _) = planned(&drilled(&[[0.0, 0.0]]));
     let options = gr_backends::rs274ngc::Options::default();
     let text = gr_backends::rs274ngc::emit(&p.program, &options, &gr_backends::NoSources).expect("written").text;
     let first_cut = text.lines().position(|l| l.starts_with("G1")).expect("a cut");

@@ -8,7 +8,7 @@ const PART1: &str = include_str!("../../../tests/golden/ufsc2016/example1.p21");
 const PART2: &str = include_str!("../../../tests/golden/ufsc2016/example2_3caras.p21");
 
 fn run(text: &str) -> (gr_planner::Process, Vec<Point>) {
-    let (process, _, faults) = process(text.as_bytes(), FileId(0), Some(gr_planner::evident_units(text.as_bytes())));
+    let (process, _, faults) = process(text.as_bytes(), FileId(0), text.contains("ST-GENERATOR").then_some(gr_planner::Units::StepModeler));
     let errors: Vec<_> = faults.iter().filter(|d| d.severity == gr_text::Severity::Error).collect();
     assert!(errors.is_empty(), "{errors:#?}");
     let process = process.expect("a process");

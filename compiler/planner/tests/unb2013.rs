@@ -13,7 +13,7 @@ const TABLE: &str = include_str!("../../../tests/golden/unb2013/figB-13_tool.tbl
 const LIST: &str = include_str!("../../../tests/golden/unb2013/fig4-47_listaDadosTrocaFerra.txt");
 
 fn read(text: &str) -> (gr_planner::Process, Vec<gr_planner::Tool>) {
-    let (process, tools, faults) = process(text.as_bytes(), FileId(0), Some(gr_planner::evident_units(text.as_bytes())));
+    let (process, tools, faults) = process(text.as_bytes(), FileId(0), Some(gr_planner::Units::StepModeler));
     let errors: Vec<_> = faults.iter().filter(|d| d.severity == gr_text::Severity::Error).collect();
     assert!(errors.is_empty(), "{errors:#?}");
     (process.expect("a process"), tools)

@@ -35,6 +35,10 @@ pub fn diagnostics_of(text: &[u8], exchange: &Exchange, file: FileId) -> Vec<Dia
     } else {
         out.dangling();
     }
+    if exchange.cut {
+        // What was cut off is referred to: that is the same mistake.
+        out.list.retain(|d| d.code != code::P21_DANGLING_REFERENCE);
+    }
     out.list.sort_by_key(|d| (d.primary().1.start, d.primary().1.end));
     out.list
 }

@@ -3,7 +3,7 @@
 mod examples;
 
 use examples::{data, diagnostics};
-use gr_text::{Diagnostic, LineIndex, Severity};
+use gr_text::{Diagnostic, FileId, LineIndex, Severity, code};
 use std::collections::BTreeMap;
 
 /// Statements by their first word (`#17`), one per line.
@@ -211,5 +211,19 @@ fn one_wrong_byte_in_a_statement_loses_no_other() {
             let found = broken.find(i.id).unwrap_or_else(|| panic!("#{} is lost by byte {n}", i.id));
             assert!(!broken.instances[found as usize].damaged, "#{} is damaged by byte {n} ({k} of {count})", i.id);
         }
+    }
+}
+
+/// A file that was cut off in its data: what it refers to behind the cut is no mistake of its own.
+#[test]
+fn a_cut_file_is_told_once() {
+    let text = include_str!("../../../docs/examples/stepnc/case-study.p21");
+    let data = text.find("DATA;").expect("data") + 6;
+    let end = text.rfind("ENDSEC;").expect("an end");
+    for at in (data..end).step_by(53).filter(|at| text.is_char_boundary(*at)) {
+        let found = gr_step::diagnostics(&text[..at], FileId(0));
+        let errors: Vec<_> = found.iter().filter(|d| d.severity == Severity::Error).collect();
+        assert!(!errors.is_empty(), "cut at {at}");
+        assert!(errors.iter().all(|d| d.code != code::P21_DANGLING_REFERENCE), "cut at {at}: {errors:#?}");
     }
 }

@@ -73,8 +73,10 @@ pub(crate) fn mill(e: &mut Emit<'_>, step: &Workingstep, m: &Milling, feature: &
         }
         return thread::mill(e, step, m, feature, given.security);
     }
-    if let Some(why) = unsuited(&step.operation.tool, &feature.shape) {
-        return e.say(code::PLAN_CANNOT_CUT, step.origin, &[&format!("#{} {}", feature.origin.id, feature.keyword), &why]);
+    let tool = &step.operation.tool;
+    if !(tool.mills() || tool.is_disc() && matches!(feature.shape, Shape::Slot { .. })) {
+        let (what, why) = (format!("#{} {}", feature.origin.id, feature.keyword), format!("a {} does not mill it", tool.kind));
+        return e.say(code::PLAN_CANNOT_CUT, step.origin, &[&what, &why]);
     }
     let Some(job) = job(e, step, m, feature, given) else { return };
     let planned = match &feature.shape {
@@ -101,14 +103,6 @@ pub(crate) fn mill(e: &mut Emit<'_>, step: &Workingstep, m: &Milling, feature: &
     for frame in &feature.copies {
         write(e, step, frame, &moves, given.security);
     }
-}
-
-/// Tools that are no cylinders with a face that cuts: they would make another shape than the feature's.
-fn unsuited(tool: &Tool, shape: &Shape) -> Option<String> {
-    let slot = matches!(shape, Shape::Slot { .. });
-    let alien = ["DRILL", "TAP", "REAMER", "COUNTERS", "BORING", "DOVETAIL", "THREAD_MILL", "T_SLOT_MILL", "WOODRUFF"];
-    let kind = alien.into_iter().find(|k| tool.kind.contains(k) && !tool.kind.starts_with("TAPERED_END"))?;
-    (!(slot && matches!(kind, "T_SLOT_MILL" | "WOODRUFF"))).then(|| format!("a {} does not mill it", tool.kind))
 }
 
 fn job<'a>(e: &mut Emit<'_>, step: &'a Workingstep, m: &'a Milling, feature: &'a Feature, given: &Given) -> Option<Job<'a>> {

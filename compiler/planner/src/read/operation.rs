@@ -276,7 +276,7 @@ impl<'m> Reader<'m> {
             self.unused(node, "overall_assembly_length", "the length of its cutting edge counts");
         }
         let Some(d) = dimension else { return };
-        if !tool.pointed() && tool.tip_angle.is_some() {
+        if !tool.is_pointed() && tool.tip_angle.is_some() {
             self.unused(d, "tool_tip_half_angle", "its face is taken as flat");
         }
         if !tool.kind.starts_with("TAPERED") && d.real("tool_circumference_angle").is_some_and(|a| a != 0.0) {
