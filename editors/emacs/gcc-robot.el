@@ -13,6 +13,7 @@
 ;;   (require 'gcc-robot)
 ;;   (add-hook 'gcode-mode-hook #'eglot-ensure)
 ;;   (add-hook 'p21-mode-hook #'eglot-ensure)
+;;   (add-hook 'gcc-robot-file-mode-hook #'eglot-ensure)   ; project and machine files, tool tables, INI, parameters
 
 ;;; Code:
 
@@ -102,14 +103,37 @@
 ;;;###autoload
 (add-to-list 'magic-mode-alist '(gcc-robot--is-stepnc . p21-mode))
 
+;;;###autoload
+(define-derived-mode gcc-robot-file-mode conf-mode "gcc-robot"
+  "Files that programs are run with: project and machine files, tool tables, INI and parameter files."
+  (setq-local comment-start (if (string-suffix-p ".tbl" (or buffer-file-name "")) ";" "#")))
+
+;;;###autoload
+(add-to-list 'auto-mode-alist '("\\(?:/gcc-robot\\.toml\\|\\.tbl\\|\\.var\\)\\'" . gcc-robot-file-mode))
+
+(defun gcc-robot--is-file-of-machine ()
+  "Whether the buffer is a machine file or an INI file of LinuxCNC."
+  (let ((name (or buffer-file-name "")))
+    (save-excursion
+      (cond
+       ((string-suffix-p ".toml" name)
+        (and (re-search-forward "^[ \t]*format[ \t]*=" nil t)
+             (progn (goto-char (point-min))
+                    (re-search-forward "^[ \t]*\\(?:\\[kinematics\\]\\|extends\\|\\[\\[joint\\]\\]\\)" nil t))))
+       ((string-suffix-p ".ini" name)
+        (re-search-forward "^[ \t]*\\[\\(?:RS274NGC\\|EMC\\|EMCIO\\|TRAJ\\|KINS\\)\\]" nil t))))))
+
+;;;###autoload
+(add-to-list 'magic-mode-alist '(gcc-robot--is-file-of-machine . gcc-robot-file-mode))
+
 (defun gcc-robot--contact (_interactive)
   "How eglot starts the server."
   (list gcc-robot-program "lsp" :initializationOptions (or gcc-robot-settings eglot--{})))
 
-(add-to-list 'eglot-server-programs '((gcode-mode p21-mode) . gcc-robot--contact))
+(add-to-list 'eglot-server-programs '((gcode-mode p21-mode gcc-robot-file-mode) . gcc-robot--contact))
 
 (defun gcc-robot-explain (name)
-  "Explain NAME: a diagnostic, a code or a word."
+  "Explain NAME: a diagnostic, a code, a word or an entity of STEP-NC."
   (interactive (list (read-string "Explain: " (thing-at-point 'word t))))
   (with-help-window "*gcc-robot explain*"
     (princ (with-temp-buffer

@@ -388,7 +388,7 @@ impl Analysis {
     fn look_again(&mut self, uri: &lsp::Uri) {
         let Some(document) = self.documents.get_mut(uri) else { return };
         let head = document.text.slice(Span::new(0, HEAD));
-        let config = matches!(document.kind, Kind::Config(_) | Kind::Other);
+        let config = matches!(document.kind, Kind::Config(_) | Kind::Ini | Kind::Other);
         let head = if config { document.text.to_string() } else { head };
         let new = kind_of(&document.path, &document.language, &head);
         match (document.kind, new) {

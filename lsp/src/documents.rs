@@ -18,13 +18,16 @@ use gr_spec::Dialect;
 use gr_text::{Diagnostic, FileId, LineIndex, Span};
 use tower_lsp::ls_types as lsp;
 
-use crate::host::{Host, Station};
+use crate::host::{Host, Station, StepUnits};
 use crate::settings::Settings;
 use crate::text::{Columns, Text};
 use crate::workspace::Workspace;
 
 /// Larger open documents are not searched for names from other documents, bytes.
 const MOST_SEARCHED: u32 = 2_000_000;
+
+/// Of larger exchange files it is not looked into which units fit, bytes.
+const MOST_READ: u32 = 8_000_000;
 
 /// What a document is.
 #[derive(Clone, Copy, Debug)]
@@ -37,6 +40,10 @@ pub enum Kind {
     Config(Schema),
     /// A tool table.
     Tools,
+    /// An INI file of LinuxCNC.
+    Ini,
+    /// A parameter file.
+    Vars,
     /// Nothing of ours.
     Other,
 }
@@ -49,8 +56,6 @@ pub struct Exchange {
     pub tables: gr_p21::Exchange,
     /// Its lines.
     pub lines: LineIndex,
-    /// In which units its speeds and angles are.
-    pub units: gr_ide::p21::Units,
 }
 
 /// A program that was run as a whole.
@@ -136,6 +141,7 @@ pub type Planning = Result<Planned, Vec<Diagnostic>>;
 #[derive(Default)]
 pub struct Derived {
     exchange: OnceLock<Arc<Exchange>>,
+    units: OnceLock<StepUnits>,
     /// Of an exchange file.
     motion: OnceLock<Option<Arc<Motion>>>,
     /// Of the motion that it was made of.
@@ -270,10 +276,15 @@ impl View {
             let text = self.text.to_string();
             let tables = gr_p21::parse(text.as_bytes());
             let lines = LineIndex::new(text.as_bytes());
-            let units = self.station.step_units.unwrap_or_else(|| gr_ide::p21::Units::of(text.as_bytes(), &tables));
-            Arc::new(Exchange { text, tables, lines, units })
+            Arc::new(Exchange { text, tables, lines })
         });
         made.clone()
+    }
+    /// In which units the speeds and angles of an exchange file are: as the project says, or as a build would take them.
+    pub fn step_units(&self) -> StepUnits {
+        let open = || self.text.len() > MOST_READ || self.host.units_are_open(&self.exchange().text);
+        let found = || if open() { StepUnits::Open } else { StepUnits::Iso };
+        self.station.step_units.unwrap_or_else(|| *self.derived.units.get_or_init(found))
     }
     /// The program's motion. Of G-code the database remembers it: release it afterwards.
     pub fn motion(&self) -> Result<Option<Arc<Motion>>, Cancelled> {
@@ -290,7 +301,7 @@ impl View {
             files: std::iter::once(main).chain(others.iter().copied()).map(name).collect(),
             subs: others.iter().filter_map(text).collect(),
             rates: gr_driver::rates(&self.station.setup_for(dialect)),
-            stock: None,
+            stock: self.station.stock,
             tools: Vec::new(),
             program,
         })))
@@ -303,7 +314,7 @@ impl View {
             files: vec![self.path.to_string_lossy().into()],
             subs: Vec::new(),
             rates: gr_driver::rates(&self.station.setup_for(Dialect::linuxcnc())),
-            stock: plan.stock,
+            stock: plan.stock.or(self.station.stock),
             tools: plan.tools,
         })
     }
@@ -464,7 +475,13 @@ pub fn kind_of(path: &Path, language: &str, text: &str) -> Option<Kind> {
     if ending == "toml" || language == "toml" {
         return Some(Schema::of(&name, text).map_or(Kind::Other, Kind::Config));
     }
-    if matches!(ending.as_str(), "ini" | "var" | "md" | "txt" | "json") && language != "gcode" {
+    if ending == "var" && language != "gcode" {
+        return Some(Kind::Vars);
+    }
+    if ending == "ini" && language != "gcode" {
+        return Some(if gr_ide::config::linuxcnc::is_machine_ini(text) { Kind::Ini } else { Kind::Other });
+    }
+    if matches!(ending.as_str(), "md" | "txt" | "json") && language != "gcode" {
         return Some(Kind::Other);
     }
     None

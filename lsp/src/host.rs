@@ -35,6 +35,8 @@ pub struct Station {
     pub machine: Option<Arc<gr_machine::Machine>>,
     /// Units of STEP-NC files; none = by the program that wrote them.
     pub step_units: Option<StepUnits>,
+    /// Raw part of programs that state none: smallest and largest X Y Z, mm.
+    pub stock: Option<[[f64; 3]; 2]>,
     /// Files it was made of: when they change it is made anew.
     pub files: Vec<PathBuf>,
     /// What is wrong with those files: the file, its text, the finding.
@@ -56,6 +58,7 @@ impl Default for Station {
             dialect_of: Arc::new(|_, _| Dialect::linuxcnc()),
             machine: None,
             step_units: None,
+            stock: None,
             files: Vec::new(),
             found: Vec::new(),
             said: Vec::new(),
@@ -145,6 +148,11 @@ pub trait Host: Send + Sync {
     fn check_exchange(&self, path: &Path, text: &str, station: &Station) -> Vec<Diagnostic>;
     /// The motion of a STEP-NC file, and its raw part's box in mm.
     fn plan(&self, path: &Path, text: &str, station: &Station) -> Option<Plan>;
+    /// Whether the speeds of a STEP-NC file contradict each other in the units of the standard, so that a build asks which
+    /// units are meant.
+    fn units_are_open(&self, _text: &str) -> bool {
+        false
+    }
     /// Whether nobody says what control a `.gcode` file is for.
     fn undeclared(&self, path: &Path, text: &str, settings: &Settings) -> bool;
     /// Makes a target. `Err`: the request can't be met.

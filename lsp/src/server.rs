@@ -38,6 +38,7 @@ struct Abilities {
     /// Of code actions, what they do.
     resolves: bool,
     snippets: bool,
+    pages: bool,
     /// An edit may rename files.
     moves_files: bool,
 }
@@ -345,6 +346,7 @@ impl LanguageServer for Backend {
             pulls,
             resolves: wire.pointer("/textDocument/codeAction/resolveSupport/properties").and_then(Value::as_array).is_some_and(|p| p.iter().any(|p| p == "edit"))
                 && can("/textDocument/codeAction/dataSupport"),
+            pages: options.get("explainPages").and_then(Value::as_bool).unwrap_or(false),
             snippets: can("/textDocument/completion/completionItem/snippetSupport"),
             moves_files: can("/workspace/workspaceEdit/documentChanges")
                 && wire.pointer("/workspace/workspaceEdit/resourceOperations").and_then(Value::as_array).is_some_and(|o| o.iter().any(|o| o == "rename")),
@@ -431,7 +433,8 @@ impl LanguageServer for Backend {
     }
     async fn goto_definition(&self, p: lsp::GotoDefinitionParams) -> Result<Option<lsp::GotoDefinitionResponse>> {
         let at = p.text_document_position_params;
-        let found = self.ask_again(at.text_document.uri, move |v| features::definition(v, at.position)).await?;
+        let pages = self.abilities().pages;
+        let found = self.ask_again(at.text_document.uri, move |v| features::definition(v, at.position, pages)).await?;
         Ok(found.map(lsp::GotoDefinitionResponse::Array))
     }
     async fn references(&self, p: lsp::ReferenceParams) -> Result<Option<Vec<lsp::Location>>> {

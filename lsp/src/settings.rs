@@ -143,7 +143,7 @@ const KEYS: &[(&str, &str)] = &[
 ];
 
 /// Keys that the client keeps in the same section for itself.
-const OF_CLIENTS: &[&str] = &["pullDiagnostics", "server", "preview", "trace"];
+const OF_CLIENTS: &[&str] = &["pullDiagnostics", "explainPages", "server", "preview", "trace"];
 
 /// What a client sent, and what could not be understood.
 #[derive(Clone, Debug, PartialEq, Default)]
@@ -161,6 +161,8 @@ impl Settings {
         let mut mistakes = Vec::new();
         let good = match section {
             Value::Null => Map::new(),
+            // An empty table of Lua is sent as a list.
+            Value::Array(none) if none.is_empty() => Map::new(),
             Value::Object(keys) => understood(keys, "", &mut mistakes),
             other => {
                 mistakes.push(format!("the settings `gccRobot` must be an object, not {}", shown(other)));
@@ -188,6 +190,7 @@ fn understood(keys: &Map<String, Value>, within: &str, mistakes: &mut Vec<String
         };
         let value = match value {
             Value::Object(inner) if matches!(&*name, "lints" | "hints") => Value::Object(understood(inner, &format!("{name}."), mistakes)),
+            Value::Array(none) if none.is_empty() && matches!(&*name, "lints" | "hints") => Value::Object(Map::new()),
             other => other.clone(),
         };
         if takes(&name, &value) {
@@ -255,6 +258,9 @@ mod tests {
             ]
         );
         assert_eq!(read.settings, Settings { block_delete: true, ..Settings::default() });
+        let empty = Settings::read(&json!({ "gccRobot": [] }));
+        assert_eq!((empty.settings, empty.mistakes.len()), (Settings::default(), 0));
+        assert_eq!(Settings::read(&json!({ "gccRobot": { "hints": [] } })).mistakes.len(), 0);
         assert_eq!(Settings::read(&json!([1])).mistakes, ["the settings `gccRobot` must be an object, not [1]"]);
     }
 

@@ -447,7 +447,7 @@ pub fn picture(program: &Program, trace: Option<&Trace>, kind: &str, options: &g
 pub fn traced(motion: &Motion, unit: &Unit, machine: Option<&Machine>) -> Trace {
     let options = TraceOptions { tools: tool_rows(motion, unit), rates: gr_driver::rates(&unit.setup), ..TraceOptions::default() };
     let mut trace = Trace::new(&motion.program, &options);
-    trace.stock = motion.plan.as_ref().and_then(|p| p.stock);
+    trace.stock = motion.plan.as_ref().and_then(|p| p.stock).or(unit.stock);
     trace.machine = machine.map(|m| {
         let planned = is_planned(m).then(|| gr_robot::plan(&motion.program, m, &texts(motion), &gr_robot::Options::default()));
         let planned = planned.as_ref().map(|p| p.as_ref().map_err(|found| gr_lsp::machine::reason(found)));

@@ -32,6 +32,8 @@ pub struct Unit {
     pub step_units: Option<gr_planner::Units>,
     /// How its overlaps are read; none: as its units say.
     pub step_overlap: Option<gr_planner::Overlap>,
+    /// Raw part, if the project states one: smallest and largest X Y Z, mm.
+    pub stock: Option<[[f64; 3]; 2]>,
     /// Name of the machine's tool table; none: every tool exists.
     pub tools: Option<String>,
 }
@@ -48,6 +50,7 @@ impl Unit {
             lints: station.lints.clone(),
             step_units: station.step_units,
             step_overlap: station.step_overlap,
+            stock: station.stock,
             tools: station.tools.as_ref().map(|p| p.display().to_string()),
         }
     }

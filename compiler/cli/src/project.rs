@@ -48,6 +48,7 @@ pub struct Section {
     pub ini: Option<PathBuf>,
     pub machine_units: Option<crate::options::UnitArg>,
     pub block_delete: bool,
+    pub stock: Option<[[f64; 3]; 2]>,
     pub subs: Vec<PathBuf>,
     pub step_units: Option<crate::options::StepUnits>,
     pub step_overlap: Option<crate::options::StepOverlap>,

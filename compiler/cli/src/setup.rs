@@ -22,6 +22,8 @@ pub struct Station {
     pub step_units: Option<gr_planner::Units>,
     /// How their overlaps are read; none: as their units say.
     pub step_overlap: Option<gr_planner::Overlap>,
+    /// Raw part of G-code programs: smallest and largest X Y Z, mm, for pictures.
+    pub stock: Option<[[f64; 3]; 2]>,
     /// The machine's tool table, if one was named.
     pub tools: Option<PathBuf>,
     /// Asked for by an option.
@@ -124,8 +126,9 @@ pub fn assembled(args: &SetupArgs, lints: &LintArgs, from: &Path, sources: &mut 
     let lints = reader.levels(lints, project.as_ref());
     let step_units = args.step_units.or(section.and_then(|s| s.step_units)).map(gr_planner::Units::from);
     let step_overlap = args.step_overlap.or(section.and_then(|s| s.step_overlap)).map(gr_planner::Overlap::from);
+    let stock = section.and_then(|s| s.stock).map(|[a, b]| [std::array::from_fn(|i| a[i].min(b[i])), std::array::from_fn(|i| a[i].max(b[i]))]);
     let Reader { files, .. } = reader;
-    Station { setup, step_units, step_overlap, tools, dialect, machine, files, project, lints }
+    Station { setup, stock, step_units, step_overlap, tools, dialect, machine, files, project, lints }
 }
 
 fn units(args: &SetupArgs, section: Option<&crate::project::Section>) -> Option<Units> {

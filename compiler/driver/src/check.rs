@@ -364,10 +364,11 @@ impl Source {
         for (place, text) in places.filter(|(place, _)| place.end <= span.start || place.start >= span.end) {
             d = d.label(file, place, text);
         }
-        d.fixes.extend(self.fix(found, span).map(|(title, span, text)| Fix { title, edits: vec![(file, span, text)] }));
+        let fixes = self.fix(found, span).map_or_else(|| self.readings(found, span), |one| vec![one]);
+        d.fixes.extend(fixes.into_iter().map(|(title, span, text)| Fix { title, edits: vec![(file, span, text)] }));
         d
     }
-    /// What puts a slip of the pen right, where there is one way only.
+    /// What puts a slip of the pen right, where there is one way only, or what the row of the registry tells first.
     fn fix(&self, found: &Found, span: Span) -> Option<(String, Span, String)> {
         let written = |s: Span| self.chunk.text.get((s.start.checked_sub(self.start)?) as usize..s.end.checked_sub(self.start)? as usize);
         let end = self.line_span().end;
@@ -387,8 +388,42 @@ impl Source {
                 };
                 (format!("write the digit {digit}"), span, digit.into())
             }
+            code::COMMENT_NESTED if written(span)?.starts_with('(') => {
+                ("remove the inner `(`".into(), Span::new(span.start, span.start + 1), String::new())
+            }
+            code::TEXT_BYTE_ORDER_MARK if written(span)? == "\u{FEFF}" => ("remove the byte order mark".into(), span, String::new()),
+            code::WORD_UNUSED => {
+                let before = self.chunk.text.get(..span.start.checked_sub(self.start)? as usize)?;
+                let blanks = before.len() - before.trim_end_matches([' ', '\t']).len();
+                let word = written(span).filter(|w| w.len() > 1)?;
+                (format!("remove {word}"), Span::new(span.start - blanks as u32, span.end), String::new())
+            }
+            code::OWORD_TRAILING_TEXT if !written(span)?.contains(['\n', '\r']) => {
+                ("put the rest on its own line".into(), Span::new(span.start, span.start), self.line_end().into())
+            }
             _ => return None,
         })
+    }
+    /// Where the row of the registry names two ways out: both.
+    fn readings(&self, found: &Found, span: Span) -> Vec<(String, Span, String)> {
+        let line = self.line_start();
+        let block = |code: &str, what: &str| (format!("write {code} before this block: {what}"), Span::new(line, line), format!("{code}{}", self.line_end()));
+        match found.code {
+            code::UNITS_NOT_STATED => vec![block("G21", "lengths are in mm"), block("G20", "lengths are in inch")],
+            code::COOLANT_NONE => vec![block("M8", "flood"), block("M7", "mist")],
+            code::AXIS_NO_CODE => {
+                let first = b"xyzabcuvw".iter().filter_map(|l| self.word(*l)).map(|s| s.start).min();
+                let at = first.filter(|at| (span.start..=span.end).contains(at));
+                let write = |at: u32, code: &str, what: &str| (format!("write {code}: {what}"), Span::new(at, at), format!("{code} "));
+                at.map_or_else(Vec::new, |at| vec![write(at, "G0", "a rapid"), write(at, "G1", "at the feed")])
+            }
+            _ => Vec::new(),
+        }
+    }
+    /// How the line ends.
+    fn line_end(&self) -> &'static str {
+        let end = self.scan().line_span(&self.chunk.text, self.line).end as usize;
+        if self.chunk.text.get(end..).is_some_and(|rest| rest.starts_with("\r\n")) { "\r\n" } else { "\n" }
     }
     /// From the first to the last word with one of these letters.
     fn words(&self, letters: &[u8]) -> Option<Span> {

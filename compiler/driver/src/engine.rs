@@ -454,7 +454,10 @@ pub(crate) fn finish(context: &Finish<'_>) -> Vec<Found> {
         Some(_) => {}
         None => {
             found.extend(left_on(modal, place(last_line), &options.rules));
-            found.extend(no_end(options, layout.only_subs, place(last_line)));
+            // A file of a subroutine that others call needs none.
+            if !(layout.only_subs && layout.own_sub) {
+                found.extend(no_end(options, layout.only_subs, place(last_line)));
+            }
         }
     }
     found.extend(layout.labels.iter().cloned());
@@ -472,7 +475,7 @@ pub(crate) fn joins_lines(dialect: &gr_spec::Dialect) -> bool {
     dialect.family == gr_spec::Family::Linuxcnc
 }
 
-/// The file ended without M2, M30 or `%`. A file of subroutines needs none.
+/// The file ended without M2, M30 or `%`: what is only a library of subroutines need not be whole.
 fn no_end(options: &Options, only_subs: bool, place: Where) -> Option<Found> {
     let strict = options.setup.dialect.needs_end && !only_subs;
     let code = if strict { code::PROGRAM_ENDS_EARLY } else { code::PROGRAM_END_MISSING };

@@ -49,8 +49,10 @@ pub(crate) struct Layout {
     pub(crate) unclosed: Box<[Found]>,
     /// What the labels tell about each other.
     pub(crate) labels: Box<[Found]>,
-    /// The file begins with a subroutine.
+    /// There are subroutines and nothing else.
     pub(crate) only_subs: bool,
+    /// One of them is the one that other programs look for in a file of this name.
+    pub(crate) own_sub: bool,
 }
 
 /// First line of each chunk, and after the last one the number of lines.
@@ -153,7 +155,9 @@ pub(crate) fn layout(db: &dyn Db, document: Document) -> Layout {
     }
     starts.push(first_line);
     let mut labels = Vec::new();
-    crate::lints::labels(&shapes, &starts, options, &mut labels);
+    let path = db.disk().path(main).unwrap_or_default();
+    let stem = crate::lints::called_as(&path);
+    crate::lints::labels(&shapes, &starts, stem, options, &mut labels);
     labels.iter_mut().for_each(|f| f.place.file = main);
     let starts = Arc::new(Starts { lines: starts.into(), order: order(db, document).clone() });
     db.present().set(main.0, starts.clone());
@@ -168,7 +172,8 @@ pub(crate) fn layout(db: &dyn Db, document: Document) -> Layout {
         lone_return,
         unclosed: gr_interp::unclosed(statements, main, true).iter().filter_map(|f| engine::of_finding(f, options)).collect(),
         labels: labels.into(),
-        only_subs: shapes.iter().flat_map(|s| s.outline.iter()).next() == Some(&Outline::Sub),
+        only_subs: shapes.iter().flat_map(|s| s.outline.iter()).next() == Some(&Outline::Sub) && !crate::lints::has_main(&shapes),
+        own_sub: crate::lints::holds_own_sub(&shapes, stem),
     }
 }
 

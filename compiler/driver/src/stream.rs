@@ -163,7 +163,7 @@ fn says_nothing(lints: Lints<'_>, files: &Loaded, setup: &Setup, rules: &Rules) 
     let options = Options { setup: setup.clone(), rules: rules.clone(), chunk_lines: None };
     let shapes: Vec<Shape> = file.chunks.iter().map(|c| shape_of(&c.scan, &c.text, &options.setup)).collect();
     let mut found = Vec::new();
-    crate::lints::labels(&shapes.iter().collect::<Vec<_>>(), &file.first_lines, &options, &mut found);
+    crate::lints::labels(&shapes.iter().collect::<Vec<_>>(), &file.first_lines, crate::lints::called_as(files.main.path()), &options, &mut found);
     found.is_empty()
 }
 

@@ -72,3 +72,50 @@ fn errors_have_a_trace_and_loops_tell_once() {
     assert!(!d.trace.is_empty(), "{d:#?}");
     assert!(d.labels.len() > 1, "{d:#?}");
 }
+
+/// Rows whose finding can be mended by an edit: each edit takes the finding away.
+#[test]
+fn fixes_mend_what_they_are_offered_for() {
+    let mut mended = Vec::new();
+    for code in gr_spec::Code::all() {
+        let def = code.def();
+        let (Some(bad), Some(dialect)) = (def.bad, gr_spec::Dialect::find(def.dialect.unwrap_or("linuxcnc"))) else { continue };
+        let check = |text: &str| {
+            let mut session = Session::new();
+            let mut options = Options::new(Setup { dialect, ..Setup::default() });
+            options.rules.set(code, gr_driver::Level::Warning);
+            let file = session.open("part.ngc", text, options);
+            session.check(file).diagnostics
+        };
+        let of = |found: &[gr_text::Diagnostic]| found.iter().filter(|d| d.code == code).count();
+        let found = check(bad);
+        for fix in found.iter().filter(|d| d.code == code).flat_map(|d| &d.fixes) {
+            let mut new = bad.to_string();
+            for (_, span, with) in fix.edits.iter().rev() {
+                new.replace_range(span.start as usize..span.end as usize, with);
+            }
+            assert!(of(&check(&new)) < of(&found), "{} `{}`:\n{new}", def.code, fix.title);
+            mended.push(format!("{} {}", def.code, fix.title));
+        }
+    }
+    mended.dedup();
+    insta::assert_snapshot!(mended.join("\n"));
+}
+
+#[test]
+fn a_file_that_is_named_after_its_subroutine_is_called_from_elsewhere() {
+    let of = |name: &str, text: &str| {
+        let mut session = Session::new();
+        let file = session.open(name, text, Options::new(Setup::default()));
+        session.check(file).diagnostics.iter().map(|d| d.code.def().slug).collect::<Vec<_>>()
+    };
+    let alone = "o<pocket> sub\nG21 G0 X1\no<pocket> endsub\n";
+    assert_eq!(of("subs/pocket.ngc", alone), Vec::<&str>::new());
+    assert_eq!(of("subs/pocket.ngc", &format!("{alone}M2\n")), Vec::<&str>::new());
+    assert_eq!(of("subs/other.ngc", alone), ["program/end-missing"]);
+    assert_eq!(of("subs/other.ngc", &format!("{alone}M2\n")), ["sub/unused"]);
+    // What follows the subroutine is a program: it has to end, as on the control.
+    assert_eq!(of("subs/pocket.ngc", &format!("{alone}G21 G0 X2\n")), ["program/ends-early"]);
+    let numbered = "o1000 sub\nG21 G0 X1\no1000 endsub\nM2\n";
+    assert_eq!(of("1000.ngc", numbered), Vec::<&str>::new());
+}

@@ -59,6 +59,9 @@ fn understood(model: &Model<'_>, kind: Dialect) -> bool {
     }
 }
 
+/// Of more choices than these none is proposed.
+const MOST_CHOICES: usize = 4;
+
 struct Out<'a> {
     text: &'a [u8],
     exchange: &'a Exchange,
@@ -82,11 +85,59 @@ impl Out<'_> {
         if let Some((span, what)) = f.related {
             d = d.label(self.file, span, what);
         }
-        d.fixes.extend(self.mend(f));
+        d.fixes.extend(self.mends(f));
         self.list.push(d);
         if let Some(n) = self.statement(f.span.start) {
             self.faulty[n] = true;
         }
+    }
+
+    /// The edits that mend a fault, each by itself.
+    fn mends(&self, f: &Fault) -> Vec<Fix> {
+        let fix = |title: String, span: Span, new: String| Fix { title, edits: vec![(self.file, span, new)] };
+        let at = |offset: u32| Span::new(offset, offset);
+        let written = self.text.get(f.span.range()).and_then(|t| std::str::from_utf8(t).ok()).unwrap_or("");
+        let word = |w: &str| !w.is_empty() && w.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'_');
+        let c = f.code;
+        if c == code::P21_BARE_WORD && word(written) {
+            let upper = format!(".{}.", written.to_ascii_uppercase());
+            return vec![fix(format!("write {upper}: an enumeration"), f.span, upper), fix(format!("write '{written}': a string"), f.span, format!("'{written}'"))];
+        }
+        if c == code::P21_EMPTY_PARAMETER {
+            return vec![fix("write `$`: not given".into(), at(f.span.start), "$".into())];
+        }
+        if c == code::P21_MISSING_ENDSEC {
+            return vec![fix("write ENDSEC; before this line".into(), at(f.span.start), "ENDSEC;\n".into())];
+        }
+        if c == code::P21_IMPLEMENTATION_LEVEL {
+            let later = self.exchange.sections.iter().any(|s| matches!(s.name, "ANCHOR" | "REFERENCE"));
+            let level = if later { "'4;1'" } else { "'2;1'" };
+            return vec![fix(format!("write {level}"), f.span, level.into())];
+        }
+        if c == code::P21_BAD_NUMBER
+            && let Some(v) = written.parse::<f64>().ok().filter(|v| v.is_finite())
+            && let new = real(v)
+            && new.parse() == Ok(v)
+        {
+            return vec![fix(format!("write {new}"), f.span, new)];
+        }
+        if c == code::STEP_NEGATIVE_LENGTH
+            && let Some(positive) = written.strip_prefix('-')
+        {
+            return vec![fix("take the sign away".into(), f.span, positive.into())];
+        }
+        if c == code::STEP_UNKNOWN_CHOICE {
+            let choices = f.args.get(3).map_or("", String::as_str);
+            let names: Vec<&str> = choices.split([' ', ',']).map(str::trim).filter(|n| n.starts_with('.') && n.ends_with('.') && word(n.trim_matches('.'))).collect();
+            let some = if names.len() <= MOST_CHOICES { names.as_slice() } else { &[] };
+            return some.iter().map(|n| fix(format!("write {n}"), f.span, (*n).to_string())).collect();
+        }
+        if c == code::STEP_SHORT_CUTTING_COMPONENT {
+            let end = self.statement(f.span.start).map_or(f.span.end, |n| self.exchange.instances[n].end) as usize;
+            let close = self.text.get(f.span.start as usize..end).and_then(|t| t.iter().rposition(|b| *b == b')'));
+            return close.map(|p| fix("add `,$` at the end".into(), at(f.span.start + p as u32), ",$".into())).into_iter().collect();
+        }
+        self.mend(f).into_iter().collect()
     }
 
     /// The edit that mends a fault, where there is only one.
@@ -226,6 +277,9 @@ impl Out<'_> {
 
     /// The values that may have been meant, where a number is in another unit than the standard's.
     fn readings(&self, c: gr_spec::Code, span: Span, args: &[String]) -> Vec<Fix> {
+        if c == code::STEP_PROFILE_TWICE {
+            return vec![Fix { title: "write `$` for this placement".into(), edits: vec![(self.file, span, "$".into())] }];
+        }
         let of_tool = args.get(1).and_then(|a| a.parse::<f64>().ok());
         let written = self.text.get(span.range()).and_then(|t| std::str::from_utf8(t).ok()).and_then(|t| t.trim().parse::<f64>().ok());
         let Some(v) = written.filter(|v| v.is_finite()) else { return Vec::new() };
@@ -235,6 +289,9 @@ impl Out<'_> {
             code::STEP_CUTSPEED_UNIT => &[(v / 60.0, "m/min was meant")],
             code::STEP_SPINDLE_SIGN => &[(-v, "the tool turns clockwise (M3)")],
             code::STEP_OVERLAP => &[(of_tool.unwrap_or(0.0), "millimeters were meant"), (v / 100.0, "percent was meant")],
+            code::STEP_RATIO => &[(v / 100.0, "percent was meant")],
+            code::STEP_TOLERANCE => &[(v / 1000.0, "micrometers were meant")],
+            code::STEP_RADIANS => &[(v.to_degrees(), "radians were meant")],
             _ => &[],
         };
         // The share of a tool is a ratio.

@@ -19,5 +19,5 @@ pub use diagnose::{diagnostics, diagnostics_of};
 pub use dialect::{Dialect, dialect};
 pub use lint::{lint, short};
 pub use model::{Model, Node, Val};
-pub use rules::{Decided, Origin, RULES, Rule, broken};
+pub use rules::{Decided, Origin, RULES, Rule, broken, rules_of_entity};
 pub use schema::{Attribute, Edition, Entity, EntityId, Name, Schema, Type, schema};

@@ -315,6 +315,12 @@ pub fn broken<'m>(model: &'m Model<'m>) -> Vec<(Node<'m>, &'static Rule)> {
     out
 }
 
+/// The rules that instances of an entity are held to, its own and those that it inherits.
+pub fn rules_of_entity(keyword: &str) -> Vec<&'static Rule> {
+    let decided = RULES.iter().filter(|r| matches!(r.decided, Decided::By(_)));
+    decided.filter(|r| keyword.eq_ignore_ascii_case(r.entity) || crate::schema().is_a(keyword, r.entity)).collect()
+}
+
 fn rules_of(node: Node<'_>) -> Vec<&'static Rule> {
     RULES.iter().filter(|r| matches!(r.decided, Decided::By(_)) && node.is_a(r.entity)).collect()
 }

@@ -91,6 +91,21 @@
   (goto-char (point-min))
   (search-forward "\nG64 P0.02\n"))
 
+(check "files that programs are run with"
+  (open-copy "docs/examples/irb2400-cell.toml")
+  (cl-assert (eq major-mode 'gcc-robot-file-mode))
+  (with-temp-file (expand-file-name "mill.tbl" scratch) (insert "T1 P1 D6 ;end mill\n"))
+  (find-file (expand-file-name "mill.tbl" scratch))
+  (cl-assert (eq major-mode 'gcc-robot-file-mode))
+  (unless (eglot-managed-p)
+    (apply #'eglot--connect (eglot--guess-contact))
+    (eglot--maybe-activate-editing-mode))
+  (goto-char (point-min))
+  (has (format "%s" (ask :textDocument/hover)) "tool number")
+  (with-temp-file (expand-file-name "other.toml" scratch) (insert "[package]\nname = 1\n"))
+  (find-file (expand-file-name "other.toml" scratch))
+  (cl-assert (not (eq major-mode 'gcc-robot-file-mode))))
+
 (message "Emacs %s" emacs-version)
 (delete-directory scratch t)
 (kill-emacs 0)

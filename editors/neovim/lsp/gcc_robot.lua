@@ -4,6 +4,6 @@ local program = require("gcc-robot.program")
 
 return {
   cmd = { program.find(robot.options.program) or "gcc-robot", "lsp" },
-  filetypes = robot.filetypes,
-  root_markers = robot.root_markers,
+  filetypes = robot.all_filetypes(),
+  root_dir = robot.root_dir,
 }

@@ -364,6 +364,50 @@ test("health names program and server", function()
   contains(text, "running in ")
 end)
 
+test("files that programs are run with", function()
+  local function opened(name, lines)
+    vim.fn.writefile(lines, scratch .. "/" .. name)
+    vim.cmd("edit " .. scratch .. "/" .. name)
+    return vim.api.nvim_get_current_buf()
+  end
+  local function told(buffer, line)
+    local at = { textDocument = { uri = vim.uri_from_bufnr(buffer) }, position = { line = line, character = 1 } }
+    local found = request(buffer, "textDocument/hover", at)
+    return found and found.contents.value or ""
+  end
+  local function ready(buffer)
+    wait("the server", function()
+      local c = clients(buffer)[1]
+      return c and (c.initialized or c.server_capabilities)
+    end)
+    return buffer
+  end
+  contains(told(ready(opened("mill.tbl", { "T1 P1 D6 ;end mill" })), 0), "tool number")
+  contains(told(ready(opened("mill.var", { "5221\t12.5" })), 0), "#5221")
+  contains(told(ready(opened("mill.ini", { "[TRAJ]", "LINEAR_UNITS = mm" })), 1), "unit of length")
+  contains(told(ready(opened("gcc-robot.toml", { "schema = 1", "[project]", "sources = []" })), 2), "Programs")
+  local machine = vim.fn.readfile(top .. "/docs/examples/irb2400-cell.toml")
+  ready(opened("cell.toml", machine))
+  -- Files of others are left alone.
+  equal(#clients(opened("other.toml", { "[package]", 'name = "x"' })), 0)
+  equal(#clients(opened("other.ini", { "[core]", "x = 1" })), 0)
+  vim.fn.delete(scratch .. "/gcc-robot.toml")
+end)
+
+test("names of STEP-NC lead to their pages", function()
+  local buffer = open("tests/golden/ufsc2016/example1.p21")
+  local line
+  for n, text in ipairs(vim.api.nvim_buf_get_lines(buffer, 0, -1, false)) do
+    line = line or (text:match("^#%d+=MACHINING_WORKINGSTEP") and n)
+  end
+  local column = vim.api.nvim_buf_get_lines(buffer, line - 1, line, false)[1]:find("MACHINING")
+  local at = { textDocument = { uri = vim.uri_from_bufnr(buffer) }, position = { line = line - 1, character = column } }
+  local found = request(buffer, "textDocument/definition", at)
+  equal(found[1].uri, "gcc-robot-explain:/MACHINING_WORKINGSTEP.md")
+  vim.lsp.util.jump_to_location(found[1], "utf-16")
+  contains(table.concat(vim.api.nvim_buf_get_lines(0, 0, -1, false), "\n"), "`its_feature`")
+end)
+
 -- Neovim 0.11 is not packaged by Debian 12: its way of starting servers is recorded.
 test("0.11: vim.lsp.config and vim.lsp.enable", function()
   local config, enable = vim.lsp.config, vim.lsp.enable
@@ -377,8 +421,15 @@ test("0.11: vim.lsp.config and vim.lsp.enable", function()
   equal(given.options.cmd, { vim.env.GCC_ROBOT_BIN, "lsp" })
   equal(given.options.settings, { gccRobot = { dialect = "fanuc-mill" } })
   local found = dofile(vim.api.nvim_get_runtime_file("lsp/gcc_robot.lua", false)[1])
-  equal(found.filetypes, { "gcode", "p21" })
-  equal(found.root_markers, { "gcc-robot.toml", ".git" })
+  equal(found.filetypes, { "gcode", "p21", "toml", "dosini", "tooltable", "cncparameters" })
+  local roots = {}
+  for _, path in ipairs({ "docs/examples/flange.ngc", "docs/examples/irb2400-cell.toml", "editors/neovim/test/init.lua" }) do
+    vim.cmd("edit " .. top .. "/" .. path)
+    found.root_dir(vim.api.nvim_get_current_buf(), function(root)
+      table.insert(roots, vim.fn.fnamemodify(root, ":t"))
+    end)
+  end
+  equal(#roots, 2, "buffers of ours")
   equal(found.cmd, { vim.env.GCC_ROBOT_BIN, "lsp" })
   require("gcc-robot").options.settings = {}
 end)

@@ -108,19 +108,21 @@ function underCursor(): string {
 
 const EXPLAIN = "gcc-robot-explain";
 
+/** Pages of diagnostics, codes and entities: `gcc-robot-explain:/E0203.md`. Names in STEP-NC files lead to them. */
 class Explanations implements vscode.TextDocumentContentProvider {
-  readonly texts = new Map<string, string>();
-  provideTextDocumentContent(uri: vscode.Uri): string {
-    return this.texts.get(uri.path) ?? "";
+  constructor(private readonly server: Server) {}
+  async provideTextDocumentContent(uri: vscode.Uri): Promise<string> {
+    const code = uri.path.replace(/^\//, "").replace(/\.md$/, "");
+    return (await this.server.running()?.sendRequest(explain, { code }))?.markdown ?? "";
   }
 }
 
-async function explainCode(server: Server, pages: Explanations) {
+async function explainCode(server: Server) {
   const client = server.running();
   if (!client) return;
   const code = await vscode.window.showInputBox({
     title: "Explain",
-    prompt: "A diagnostic (E0203), a code (G83) or a word (F)",
+    prompt: "A diagnostic (E0203), a code (G83), a word (F) or an entity (PLANE_MILLING)",
     value: underCursor(),
   });
   if (!code) return;
@@ -130,7 +132,6 @@ async function explainCode(server: Server, pages: Explanations) {
     return;
   }
   const uri = vscode.Uri.from({ scheme: EXPLAIN, path: `/${code.trim()}.md` });
-  pages.texts.set(uri.path, markdown);
   await vscode.commands.executeCommand("markdown.showPreviewToSide", uri);
 }
 
@@ -140,7 +141,7 @@ export function registerCommands(
   previews: Previews,
   outputs: Outputs,
 ) {
-  const pages = new Explanations();
+  const pages = new Explanations(server);
   const pick = async (key: string, kind: "machines" | "dialects", title: string, none: string) => {
     const chosen = await choose(server, kind, title, none);
     if (chosen) await set(key, chosen.id);
@@ -153,7 +154,7 @@ export function registerCommands(
     build: () => build(context, server),
     output: () => showOutput(server, outputs),
     outputOptions: () => outputOptions(outputs),
-    explain: () => explainCode(server, pages),
+    explain: () => explainCode(server),
     chooseMachine: () => pick("machine", "machines", "Machine or robot", "no machine: programs are checked alone"),
     chooseDialect: () => pick("dialect", "dialects", "Dialect", "by modeline, project and extension"),
     restart: () => server.start(),

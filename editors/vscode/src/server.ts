@@ -55,10 +55,10 @@ export class Server implements vscode.Disposable {
           ...LANGUAGES.map((language) => ({ scheme: "untitled", language })),
           // Machine files have any name: the server tells them from others by what is in them.
           { scheme: "file", pattern: "**/*.toml" },
-          { scheme: "file", pattern: "**/*.tbl" },
+          { scheme: "file", pattern: "**/*.{tbl,var,ini}" },
         ],
         // VS Code asks for diagnostics itself; sent ones too would be shown twice.
-        initializationOptions: { gccRobot: settings(), pullDiagnostics: true },
+        initializationOptions: { gccRobot: settings(), pullDiagnostics: true, explainPages: true },
         synchronize: {
           configurationSection: SECTION,
           fileEvents: vscode.workspace.createFileSystemWatcher("**/*.{ngc,nc,tbl,var,ini,toml,NGC,NC,TBL,VAR,INI}"),

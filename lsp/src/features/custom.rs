@@ -158,7 +158,7 @@ pub fn choices() -> Choices {
     Choices { targets: targets.collect(), machines: machines.collect(), dialects: dialects.collect() }
 }
 
-/// The long text of a diagnostic or a code.
+/// The long text of a diagnostic, a code, a word, or an entity of ISO 14649.
 pub fn explain(code: &str, dialect: Option<&str>) -> Explanation {
     if let Some(found) = gr_spec::Code::find(code) {
         let def = found.def();
@@ -171,7 +171,12 @@ pub fn explain(code: &str, dialect: Option<&str>) -> Explanation {
         return Explanation { markdown: Some(text) };
     }
     let dialect = dialect.and_then(gr_spec::Dialect::find).unwrap_or_else(gr_spec::Dialect::linuxcnc);
-    let def = dialect.code(&code.trim().to_uppercase());
-    Explanation { markdown: def.map(|d| gr_ide::gcode::hover::code(d, dialect)) }
+    let name = code.trim().to_uppercase();
+    let of_code = || dialect.code(&name).map(|d| gr_ide::gcode::hover::code(d, dialect));
+    let of_word = || {
+        let letter = name.chars().next().filter(|c| name.len() == c.len_utf8())?;
+        dialect.word(letter).map(|w| format!("**{}** {}\n\n{}\n", w.letter, w.title, w.what))
+    };
+    Explanation { markdown: of_code().or_else(of_word).or_else(|| gr_ide::p21::page::page(&name)) }
 }
 

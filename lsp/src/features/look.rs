@@ -13,7 +13,7 @@ use gr_robot::along::PathPoint;
 use gr_text::Span;
 use tower_lsp::ls_types as lsp;
 
-use super::{Answer, MOST_BLOCKS, MOST_BLOCKS_VISIBLE, doc, exchange_doc};
+use super::{Answer, MOST_BLOCKS, MOST_BLOCKS_VISIBLE, doc, exchange_doc, exchange_in_units};
 use crate::documents::{Kind, Motion, Pace, View};
 use crate::protocol::{TOKEN_TYPES, markdown, symbol, symbol_kind, token_type};
 use crate::text::Text;
@@ -23,9 +23,11 @@ pub fn hover(mut view: View, at: lsp::Position) -> Answer<Option<lsp::Hover>> {
     let offset = view.offset(at);
     let found = match view.kind {
         Kind::Gcode(..) => gcode_hover(&mut view, offset)?,
-        Kind::Exchange => p21::hover::hover(exchange_doc(&view.exchange()), offset),
+        Kind::Exchange => p21::hover::hover(exchange_in_units(&view, &view.exchange()), offset),
         Kind::Config(schema) => config::hover(schema, &view.text.to_string(), offset),
         Kind::Tools => config::tools::hover(&view.text.to_string(), offset, view.station.setup.machine_units),
+        Kind::Ini => config::linuxcnc::ini_hover(&view.text.to_string(), offset),
+        Kind::Vars => config::linuxcnc::vars_hover(&view.text.to_string(), offset),
         Kind::Other => None,
     };
     Ok(found.map(|h| lsp::Hover { contents: lsp::HoverContents::Markup(markdown(h.text)), range: Some(view.range(h.span)) }))
@@ -124,7 +126,7 @@ pub fn hints(mut view: View, range: lsp::Range) -> Answer<Vec<lsp::InlayHint>> {
             let ran: Vec<Ran<'_>> = traced.iter().map(ran).collect();
             gcode::hints::hints(doc(&tables), &ran, &kinds)
         }
-        Kind::Exchange if kinds.attributes => p21::hints::hints(exchange_doc(&view.exchange()), span),
+        Kind::Exchange if kinds.attributes => p21::hints::hints(exchange_in_units(&view, &view.exchange()), span),
         _ => Vec::new(),
     };
     Ok(found.into_iter().filter(|h| span.start <= h.at && h.at <= span.end).map(|h| hint(&view, h)).collect())
@@ -156,7 +158,8 @@ fn outline(view: &mut View) -> Answer<Vec<Item>> {
         Kind::Exchange => p21::outline::outline(exchange_doc(&view.exchange())),
         Kind::Config(_) => config::outline(&view.text.to_string()),
         Kind::Tools => config::tools::outline(&view.text.to_string()),
-        Kind::Other => Vec::new(),
+        Kind::Ini => config::linuxcnc::ini_outline(&view.text.to_string()),
+        Kind::Vars | Kind::Other => Vec::new(),
     })
 }
 
@@ -207,6 +210,7 @@ pub fn folds(mut view: View) -> Answer<Vec<lsp::FoldingRange>> {
             p21::outline::folds(exchange_doc(&exchange), &exchange.lines)
         }
         Kind::Config(_) => config::folds(&view.text.to_string()),
+        Kind::Ini => config::linuxcnc::ini_folds(&view.text.to_string()),
         _ => Vec::new(),
     };
     let range = |f: gr_ide::Fold| lsp::FoldingRange {

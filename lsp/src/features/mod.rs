@@ -102,6 +102,8 @@ pub fn diagnose(mut view: View) -> Answer<(Vec<Diagnostic>, Elsewhere)> {
             }
         }
         Kind::Tools => gr_interp::read_tools(&view.text.to_string(), FileId(0)).1,
+        Kind::Ini => gr_interp::read_ini(&view.text.to_string(), FileId(0), None, None).1,
+        Kind::Vars => gr_interp::read_parameters(&view.text.to_string(), FileId(0)).err().map(|d| *d).into_iter().collect(),
         Kind::Other => Vec::new(),
     };
     Ok((found.into_iter().filter_map(|d| view.station.harden(d)).collect(), others))
@@ -186,7 +188,12 @@ fn doc<'a>(tables: &'a (std::sync::Arc<gr_gcode::File>, &'static gr_spec::Dialec
 
 /// The exchange file of a view.
 fn exchange_doc(exchange: &crate::documents::Exchange) -> gr_ide::p21::Doc<'_> {
-    gr_ide::p21::Doc { text: exchange.text.as_bytes(), file: &exchange.tables, units: exchange.units }
+    gr_ide::p21::Doc { text: exchange.text.as_bytes(), file: &exchange.tables, units: gr_ide::p21::Units::default() }
+}
+
+/// The same where it is told how its speeds and angles are read.
+fn exchange_in_units<'a>(view: &View, exchange: &'a crate::documents::Exchange) -> gr_ide::p21::Doc<'a> {
+    gr_ide::p21::Doc { units: view.step_units(), ..exchange_doc(exchange) }
 }
 
 /// Edits of one file as the protocol has them.

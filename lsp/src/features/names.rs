@@ -39,6 +39,9 @@ fn location(uri: &lsp::Uri, file: &gr_gcode::File, span: Span, view: &View) -> l
     lsp::Location { uri: uri.clone(), range: Text::new(&text).range(span, view.columns) }
 }
 
+/// How addresses of pages begin that the client asks for by `gccRobot/explain`.
+const PAGES: &str = "gcc-robot-explain";
+
 /// Larger exchange files are not parsed to follow a reference, bytes.
 const BIG_EXCHANGE: u32 = 8_000_000;
 
@@ -56,10 +59,22 @@ fn quick_definition(view: &View, at: lsp::Position) -> Option<Span> {
     Some(Span::new(found, found + 1 + digits as u32))
 }
 
-/// Where the name under the cursor is defined.
-pub fn definition(mut view: View, at: lsp::Position) -> Answer<Vec<lsp::Location>> {
+/// The page of the entity whose name is under the cursor, for clients that can show one.
+fn entity_page(view: &View, at: lsp::Position) -> Option<lsp::Location> {
+    let (line, start) = view.text.line(at.line);
+    let (keyword, _) = p21::page::name_at(&line, (view.offset(at) - start) as usize)?;
+    let uri = format!("{PAGES}:/{keyword}.md").parse().ok()?;
+    Some(lsp::Location { uri, range: lsp::Range::default() })
+}
+
+/// Where the name under the cursor is defined. `pages`: the client shows pages of the standard's entities by
+/// `gccRobot/explain`.
+pub fn definition(mut view: View, at: lsp::Position, pages: bool) -> Answer<Vec<lsp::Location>> {
     let offset = view.offset(at);
     if matches!(view.kind, Kind::Exchange) {
+        if let Some(page) = entity_page(&view, at) {
+            return Ok(pages.then_some(page).into_iter().collect());
+        }
         let own = |span: Span| lsp::Location { uri: view.uri.clone(), range: view.range(span) };
         if view.text.len() > BIG_EXCHANGE {
             return Ok(quick_definition(&view, at).map(own).into_iter().collect());

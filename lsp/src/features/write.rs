@@ -19,7 +19,8 @@ pub fn completion(mut view: View, at: lsp::Position, snippets: bool) -> Answer<l
         Kind::Exchange => p21::complete::complete(exchange_doc(&view.exchange()), offset),
         Kind::Config(schema) => config::complete(schema, &view.text.to_string(), offset),
         Kind::Tools => config::tools::complete(&view.text.to_string(), offset),
-        Kind::Other => Vec::new(),
+        Kind::Ini => config::linuxcnc::ini_complete(&view.text.to_string(), offset),
+        Kind::Vars | Kind::Other => Vec::new(),
     };
     // A list that was cut must be asked for again when more is typed.
     let is_incomplete = found.len() >= 200;

@@ -1,4 +1,4 @@
-//! `gcc-robot explain E0203 | arc/radius-mismatch | G83 | F`
+//! `gcc-robot explain E0203 | arc/radius-mismatch | G83 | F | MILLING_TECHNOLOGY`
 
 use gr_spec::{ArgDef, Code, CodeDef, Dialect, Severity, WordDef, open};
 
@@ -51,7 +51,7 @@ fn explain(name: &str, dialect: &Dialect) -> Option<String> {
     let mut letters = name.chars();
     match (letters.next(), letters.next()) {
         (Some(letter), None) => dialect.word(letter.to_ascii_uppercase()).map(|w| word_letter(w, dialect)),
-        _ => None,
+        _ => gr_ide::p21::page::page(name),
     }
 }
 
@@ -153,6 +153,7 @@ mod tests {
         assert!(explain("arc/radius-mismatch", linuxcnc).unwrap().starts_with("E0203"));
         assert!(explain("g083", linuxcnc).unwrap().starts_with("G83 "));
         assert!(explain("f", linuxcnc).unwrap().contains("feed"));
+        assert!(explain("milling_technology", linuxcnc).unwrap().contains("`feedrate`"));
         assert!(explain("G1234", linuxcnc).is_none() && explain("", linuxcnc).is_none() && explain("é", linuxcnc).is_none());
     }
 }

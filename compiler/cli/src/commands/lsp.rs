@@ -118,6 +118,7 @@ impl Host for Editor {
                 gr_planner::Units::Iso => gr_lsp::host::StepUnits::Iso,
                 gr_planner::Units::StepModeler => gr_lsp::host::StepUnits::StepModeler,
             }),
+            stock: shared.stock,
             files: shared.files.clone(),
             found: placed_found,
             said,
@@ -159,6 +160,10 @@ impl Host for Editor {
         let (made, _) = motion(&unit, None).ok()?;
         let tools = crate::emit::tool_rows(&made, &unit);
         Some(Plan { tools, stock: made.plan.and_then(|p| p.stock), program: made.program })
+    }
+
+    fn units_are_open(&self, text: &str) -> bool {
+        gr_planner::process(text.as_bytes(), FileId(0), None).2.iter().any(|d| d.code == gr_spec::code::PLAN_UNITS_OPEN)
     }
 
     fn output(&self, job: &OutputJob<'_>) -> Result<Made, String> {

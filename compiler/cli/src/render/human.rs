@@ -84,8 +84,11 @@ fn report(
     if let Some(help) = &d.help {
         builder.add_help(printable(help));
     }
-    for fix in &d.fixes {
-        builder.add_help(format!("`gcc-robot` can {}", printable(&fix.title)));
+    // Of several readings none is the one; what the help says already is not said again.
+    if let [fix] = d.fixes.as_slice()
+        && !d.help.as_ref().is_some_and(|h| h.contains(&fix.title))
+    {
+        builder.add_help(printable(&fix.title));
     }
     let files = excerpts.iter().map(|(f, e)| {
         let source = Source::from(e.text.clone()).with_display_line_offset(e.first as usize);

@@ -98,6 +98,7 @@ impl Client {
         let operations = if general["noFiles"] == true { json!([]) } else { json!(["create", "rename", "delete"]) };
         let mut options = c.settings.clone();
         options["pullDiagnostics"] = pulls.into();
+        options["explainPages"] = true.into();
         let mut hello = json!({
             "processId": null,
             "capabilities": {
@@ -185,6 +186,7 @@ impl Client {
         let language = match Path::new(name).extension().and_then(|e| e.to_str()) {
             Some("p21" | "stpnc") => "p21",
             Some("toml") => "toml",
+            Some("ini" | "var") => "plaintext",
             _ => "gcode",
         };
         self.versions.insert(uri.clone(), 1);

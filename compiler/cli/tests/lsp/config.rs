@@ -107,3 +107,30 @@ fn programs_follow_their_tool_table() {
     assert!(c.hover(&uri, "T|7 M6").contains("new"));
     c.shut_down();
 }
+
+#[test]
+fn ini_and_parameter_files() {
+    let ini = "[RS274NGC]\nPARAMETER_FILE = mill.var\n[TRAJ]\nLINEAR_UNITS = mm\n[AXIS_X]\nMIN_LIMIT = -1\n";
+    let mut c = Client::new(&[("mill.ini", ini), ("mill.var", "5161\t0\n5221\t12.5\n"), ("other.ini", "[core]\nno value\n")], json!({}));
+    let uri = c.open("mill.ini", None);
+    assert_eq!(c.diagnostics(&uri), Vec::<serde_json::Value>::new());
+    assert!(c.hover(&uri, "LINEAR|_UNITS").contains("The machine's unit of length"));
+    assert!(c.hover(&uri, "MIN_|LIMIT").contains("Smallest position of the axis"));
+    let symbols = c.request("textDocument/documentSymbol", json!({ "textDocument": { "uri": uri } }));
+    assert_eq!(tree(&symbols, 0), "RS274NGC [3] 0-1\nTRAJ [3] 2-3\nAXIS_X [3] 4-5\n");
+    c.edit(&uri, "MIN_LIMIT = -1\n", "MIN_LIMIT = -1\nMAX_\nwhat is this\n");
+    let found = c.diagnostics(&uri);
+    assert_eq!(found.iter().map(|d| c.place(&uri, &d["range"])).collect::<Vec<_>>(), ["mill.ini:7 MAX_", "mill.ini:8 what is this"]);
+    assert_eq!(c.labels(&uri, "MAX_|\n"), ["MAX_LIMIT", "MAX_VELOCITY", "MAX_ACCELERATION"]);
+    let vars = c.open("mill.var", None);
+    assert_eq!(c.diagnostics(&vars), Vec::<serde_json::Value>::new());
+    let told = c.hover(&vars, "52|21");
+    assert!(told.starts_with("**#5221**") && told.contains("`12.5`"), "{told}");
+    c.edit(&vars, "5161", "5500");
+    let found = c.diagnostics(&vars);
+    assert_eq!(c.place(&vars, &found[0]["range"]), "mill.var:2 5221\t12.5", "{found:?}");
+    // An INI file of another program is none of ours.
+    let other = c.open("other.ini", None);
+    assert_eq!(c.diagnostics(&other), Vec::<serde_json::Value>::new());
+    c.shut_down();
+}

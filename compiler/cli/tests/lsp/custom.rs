@@ -99,6 +99,16 @@ fn preview_shows_the_raw_part() {
     c.shut_down();
 }
 
+#[test]
+fn preview_shows_the_raw_part_that_the_project_states() {
+    let project = "schema = 1\n[project]\nstock = [[100, 0, -20], [0, 60, 0.5]]\n";
+    let mut c = Client::new(&[("gcc-robot.toml", project), ("a.ngc", "G21 G0 X5\nM2\n")], json!({}));
+    let uri = c.open("a.ngc", None);
+    let p = c.request("gccRobot/preview", json!({ "textDocument": { "uri": uri } }));
+    assert_eq!(p["stock"], json!([[0.0, 0.0, -20.0], [100.0, 60.0, 0.5]]));
+    c.shut_down();
+}
+
 /// A cell and a program that needs its arm to reach over.
 const CELL: &str = include_str!("../../../../docs/examples/irb2400-cell.toml");
 const CUTS: &str = "G21 G90 G17 F600\nT1 M6\nG0 X0 Y0 Z20\nG1 Z5\nX60\nG3 X60 Y40 J20\nG1 X0\nM2\n";

@@ -239,3 +239,39 @@ fn units_are_put_right() {
     insta::assert_snapshot!(fixed.join("\n"));
     c.shut_down();
 }
+
+#[test]
+fn names_of_entities_lead_to_their_pages() {
+    let (mut c, uri) = plan();
+    let at = c.at(&uri, "#46=TWIST|_DRILL");
+    let found = c.request("textDocument/definition", at);
+    assert_eq!(found[0]["uri"], "gcc-robot-explain:/TWIST_DRILL.md");
+    let page = c.request("gccRobot/explain", json!({ "code": "TWIST_DRILL" }));
+    let text = page["markdown"].as_str().expect("a page");
+    assert!(text.starts_with("# TWIST_DRILL") && text.contains("A kind of ") && text.contains("ISO 14649-111"), "{text}");
+    // A word in a string is none.
+    let at = c.at(&uri, "'WS DR|ILL'");
+    assert_eq!(c.request("textDocument/definition", at), json!([]));
+    c.shut_down();
+}
+
+#[test]
+fn units_that_nobody_states_are_told_in_both_readings() {
+    // 0.24 and -9000 can't be m/s and 1/s: no machine turns that fast.
+    let text = PLAN.replace(",-20.,$,.F.", ",-9000.,$,.F.");
+    assert!(text != PLAN);
+    let mut c = Client::new(&[("plate.p21", &text), ("said/plate.p21", &text), ("said/gcc-robot.toml", "schema = 1\n[project]\nstep-units = \"step-modeler\"\n")], json!({}));
+    let uri = c.open("plate.p21", None);
+    let told = c.hover(&uri, ",-9|000.,$,.F.");
+    assert!(told.contains("540000 rpm") && told.contains("9000 rpm, clockwise") && told.contains("step-units"), "{told}");
+    let line = c.at(&uri, ",-9|000.,$,.F.")["position"]["line"].as_u64().expect("a line");
+    let range = json!({ "start": { "line": line, "character": 0 }, "end": { "line": line + 1, "character": 0 } });
+    let hints = |c: &mut Client, uri: &str| c.request("textDocument/inlayHint", json!({ "textDocument": { "uri": uri }, "range": range })).to_string();
+    assert!(hints(&mut c, &uri).contains(" 1/s or rpm"));
+    let said = c.open("said/plate.p21", None);
+    let told = c.hover(&said, ",-9|000.,$,.F.");
+    assert!(told.contains("9000 rpm, clockwise") && !told.contains("1/s"), "{told}");
+    let shown = hints(&mut c, &said);
+    assert!(shown.contains("\" rpm\"") && !shown.contains("1/s"), "{shown}");
+    c.shut_down();
+}

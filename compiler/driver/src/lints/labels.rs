@@ -1,6 +1,7 @@
 //! Labels of the whole file: N numbers used twice where jumps look for them, subroutines that nobody calls.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
 
 use gr_spec::{Code, Family, code};
 
@@ -8,8 +9,25 @@ use super::{Found, Where};
 use crate::Options;
 use crate::db::{Label, LabelKind, Outline, Shape};
 
-/// Looks through the labels of all chunks.
-pub(crate) fn labels(shapes: &[&Shape], starts: &[u32], options: &Options, found: &mut Vec<Found>) {
+/// The name that other programs call a file by: that of its path, without folder and ending.
+pub(crate) fn called_as(path: &str) -> &str {
+    Path::new(path).file_stem().and_then(|s| s.to_str()).unwrap_or("")
+}
+
+/// Whether a file of this name is where other programs look for the subroutine.
+fn is_named_after(stem: &str, name: &str) -> bool {
+    // Fanuc programs are often kept as O1000.nc or O0010.nc.
+    let number = stem.strip_prefix(['o', 'O']).filter(|n| !n.is_empty()).and_then(|n| n.parse::<u32>().ok());
+    stem.eq_ignore_ascii_case(name) || number.is_some_and(|n| n.to_string() == name)
+}
+
+/// Whether other programs find a subroutine of this file by the file's name.
+pub(crate) fn holds_own_sub(shapes: &[&Shape], stem: &str) -> bool {
+    shapes.iter().flat_map(|s| s.labels.iter()).any(|l| l.kind == LabelKind::Sub && is_named_after(stem, &l.name))
+}
+
+/// Looks through the labels of all chunks; `stem` as [`called_as`] gives it.
+pub(crate) fn labels(shapes: &[&Shape], starts: &[u32], stem: &str, options: &Options, found: &mut Vec<Found>) {
     if shapes.iter().all(|s| s.labels.is_empty()) {
         return;
     }
@@ -28,12 +46,13 @@ pub(crate) fn labels(shapes: &[&Shape], starts: &[u32], options: &Options, found
             }
         }
     }
-    unused_subs(all(), shapes, &mut report);
+    unused_subs(all(), shapes, stem, &mut report);
 }
 
 fn unused_subs<'a>(
     all: impl Iterator<Item = (&'a Label, u32)>,
     shapes: &[&Shape],
+    stem: &str,
     report: &mut impl FnMut(Code, u32, u8, &str),
 ) {
     let mut subs = BTreeMap::new();
@@ -49,7 +68,7 @@ fn unused_subs<'a>(
     if shapes.iter().any(|s| s.computed) || !has_main(shapes) {
         return;
     }
-    let mut unused: Vec<_> = subs.into_iter().filter(|(name, _)| !calls.contains(name)).collect();
+    let mut unused: Vec<_> = subs.into_iter().filter(|(name, _)| !calls.contains(name) && !is_named_after(stem, name)).collect();
     unused.sort_by_key(|(_, line)| *line);
     for (name, line) in unused {
         report(code::SUB_UNUSED, line, b'o', &spelled(name));
@@ -63,7 +82,7 @@ fn spelled(name: &str) -> String {
 }
 
 /// Whether there are blocks outside of subroutine definitions.
-fn has_main(shapes: &[&Shape]) -> bool {
+pub(crate) fn has_main(shapes: &[&Shape]) -> bool {
     let mut depth = 0;
     shapes.iter().flat_map(|s| s.outline.iter()).any(|kind| {
         match kind {

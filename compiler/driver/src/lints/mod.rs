@@ -24,7 +24,7 @@ use gr_interp::Modal;
 use gr_spec::{Code, Severity};
 
 pub(crate) use end::left_on;
-pub(crate) use labels::labels;
+pub(crate) use labels::{called_as, has_main, holds_own_sub, labels};
 pub use rules::{Level, Rules};
 pub(crate) use stock::{Cuts, Dive};
 pub(crate) use travel::Limits;

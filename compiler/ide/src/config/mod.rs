@@ -1,5 +1,7 @@
-//! Files that programs are run with: machine files and `gcc-robot.toml` (by their JSON Schema), tool tables.
+//! Files that programs are run with: machine files and `gcc-robot.toml` (by their JSON Schema), tool tables, INI and
+//! parameter files.
 
+pub mod linuxcnc;
 pub mod tools;
 
 use gr_text::Span;

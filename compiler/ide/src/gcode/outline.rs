@@ -50,39 +50,66 @@ pub fn outline(doc: Doc<'_>) -> Vec<Item> {
             }
         }
     }
-    items.extend(nested(main, doc.len()));
+    for sub in items.iter_mut() {
+        let end = sub.range.end + 1;
+        stretch(&mut sub.children, end);
+    }
+    items.extend(nested(doc, main));
     items.sort_by_key(|i| (i.range.start, std::cmp::Reverse(i.range.end)));
     items
 }
 
-/// Operations go below the tool change before them; a tool lasts until the next.
-fn nested(flat: Vec<Item>, end: u32) -> Vec<Item> {
+/// Operations go below the tool change before them, those right before a change below that one; a tool lasts until the
+/// next, an operation too.
+fn nested(doc: Doc<'_>, flat: Vec<Item>) -> Vec<Item> {
     let mut out: Vec<Item> = Vec::new();
-    for item in flat {
-        let start = item.range.start;
-        let tool = out.last().is_some_and(|t| t.kind == ItemKind::Tool);
-        if item.kind == ItemKind::Tool {
-            if let Some(last) = out.last_mut().filter(|_| tool) {
-                close(last, start);
-            }
-            out.push(item);
-        } else if tool {
-            out.last_mut().expect("just looked at").children.push(item);
-        } else {
-            out.push(item);
+    for mut item in flat {
+        let before = match out.last_mut() {
+            Some(last) if last.kind == ItemKind::Tool => &mut last.children,
+            _ => &mut out,
+        };
+        if item.kind != ItemKind::Tool {
+            before.push(item);
+            continue;
         }
+        let heads = announcing(doc, before, &item);
+        let heads = before.split_off(before.len() - heads);
+        if let Some(first) = heads.first() {
+            item.range.start = first.range.start;
+        }
+        item.children = heads;
+        out.push(item);
     }
-    if let Some(last) = out.last_mut().filter(|t| t.kind == ItemKind::Tool) {
-        close(last, end);
+    stretch(&mut out, doc.len());
+    for tool in &mut out {
+        let end = tool.range.end + 1;
+        stretch(&mut tool.children, end);
     }
     out
 }
 
-fn close(tool: &mut Item, end: u32) {
-    tool.range.end = end.max(tool.range.end).max(tool.children.last().map_or(0, |c| c.range.end));
-    // Up to the end of the line before the next change.
-    tool.range.end = tool.range.end.saturating_sub(u32::from(end > tool.range.start));
-    tool.range.end = tool.range.end.max(tool.span.end);
+/// How many of the last operations speak of the tool change that follows: comments on lines right below each other, with
+/// nothing between them and the change but spindle and coolant.
+fn announcing(doc: Doc<'_>, before: &[Item], change: &Item) -> usize {
+    const MOST_LINES: u32 = 20;
+    let line = |item: &Item| doc.line_at(item.span.start).map_or(0, |l| l.line);
+    let own = |i: &&Item| i.kind == ItemKind::Operation;
+    let Some(last) = before.last().filter(own).map(line) else { return 0 };
+    let other = |l: LineOf<'_>| l.words().iter().any(|w| w.form != Form::Comment && !matches!(w.letter, b'm' | b't' | b's' | b'n'));
+    let to = line(change);
+    if to.saturating_sub(last) > MOST_LINES || doc.lines(last..to).any(other) {
+        return 0;
+    }
+    before.iter().rev().zip(0u32..).take_while(|(i, n)| own(i) && line(i) + n == last).count()
+}
+
+/// Each lasts to the end of the line before the next; `end` is where what follows the last one begins.
+fn stretch(items: &mut [Item], end: u32) {
+    let mut next = end;
+    for item in items.iter_mut().rev() {
+        item.range.end = item.range.end.max(next.saturating_sub(1));
+        next = item.range.start;
+    }
 }
 
 fn entry(line: &LineOf<'_>) -> Option<Item> {
@@ -98,7 +125,7 @@ fn entry(line: &LineOf<'_>) -> Option<Item> {
     let span = line.tight(word);
     let name = comment(line.slice(span));
     let active = name.split_once(',').is_some_and(|(head, _)| gr_spec::comments().iter().any(|c| c.name.eq_ignore_ascii_case(head.trim())));
-    if name.is_empty() || active {
+    if name.is_empty() || active || name.starts_with('%') {
         return None;
     }
     Some(Item { kind: ItemKind::Operation, name, detail: String::new(), range: line.span(), span, children: Vec::new() })

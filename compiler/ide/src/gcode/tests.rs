@@ -238,3 +238,19 @@ fn completions_replace_the_whole_name() {
         assert_eq!(accepted(marked, label), becomes, "{marked}");
     }
 }
+
+#[test]
+fn comments_above_a_tool_change_belong_to_it() {
+    let text = "%\n(PART 7)\nG21 G90\n\n(Face1)\nT1 M6\nG0 X0\n(Finish)\nG1 X5 F100\n(Drill1)\n(6 mm)\nM5\nT2 M6\nG0 X9\nM2\n%\n";
+    let f = file(text);
+    let items = outline::outline(doc(&f));
+    let mut shown = String::new();
+    for item in &items {
+        shown += &format!("{} {:?}\n", item.name, &text[item.range.range()]);
+        for child in &item.children {
+            assert!(item.range.start <= child.range.start && child.range.end <= item.range.end, "{item:?}");
+            shown += &format!("  {} {:?}\n", child.name, &text[child.range.range()]);
+        }
+    }
+    insta::assert_snapshot!(shown);
+}

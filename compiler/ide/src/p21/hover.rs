@@ -4,7 +4,7 @@ use gr_p21::Kind;
 use gr_step::{Node, Type};
 use gr_text::Span;
 
-use super::{Doc, attribute, meaning, short, unit, words};
+use super::{Doc, Units, attribute, meaning, short, unit, words};
 use crate::Hover;
 use crate::gcode::doc::number;
 
@@ -56,10 +56,21 @@ fn about(doc: Doc<'_>, node: Node<'_>, a: &'static gr_step::Attribute, value: Op
     text
 }
 
-/// A value with its unit, and in the one that machinists use.
+/// A value with its unit, and in the one that machinists use; in every reading of it.
 fn in_units(doc: Doc<'_>, node: Node<'_>, a: &gr_step::Attribute, value: f64) -> String {
+    let read: Vec<String> = doc.units.readings().iter().map(|u| in_unit(*u, node, a, value)).collect();
+    match read.as_slice() {
+        [iso, modeler] if iso != modeler => format!(
+            "- {iso}, as the standard says\n- {modeler}, as STEP Modeler writes\n\nNothing in the file says which: `step-units` in gcc-robot.toml does."
+        ),
+        [one, ..] => one.clone(),
+        [] => String::new(),
+    }
+}
+
+fn in_unit(units: Units, node: Node<'_>, a: &gr_step::Attribute, value: f64) -> String {
     let turn = if value < 0.0 && node.is_a("milling_technology") { ", clockwise as M3: negative is the usual direction of cutting" } else { "" };
-    match unit(a, doc.units) {
+    match unit(a, units) {
         "1/s" => format!("{} 1/s = {} rpm{turn}", number(value, 6), number(value.abs() * 60.0, 2)),
         "rpm" => format!("{} rpm{turn}", number(value.abs(), 2)),
         "m/s" => format!("{} m/s = {} mm/min = {} m/min", number(value, 6), number(value * 60_000.0, 2), number(value * 60.0, 3)),

@@ -7,6 +7,7 @@ pub mod hover;
 pub mod lenses;
 pub mod names;
 pub mod outline;
+pub mod page;
 #[cfg(test)]
 mod tests;
 
@@ -33,15 +34,18 @@ pub enum Units {
     Iso,
     /// m/min, rpm, mm per revolution, radians: as STEP Modeler writes them.
     StepModeler,
+    /// The numbers fit to neither, and nobody says which is meant: both are told.
+    Open,
 }
 
 impl Units {
-    /// As the file is read when nobody says how: by the program that wrote it.
-    pub fn of(text: &[u8], file: &Exchange) -> Units {
-        let model = Model::new(text, file);
-        let name = model.header("FILE_NAME");
-        let by = name.is_some_and(|n| n.parameters().any(|v| v.string().is_some_and(|s| s.contains("ST-GENERATOR"))));
-        if by { Units::StepModeler } else { Units::Iso }
+    /// The readings to be told.
+    fn readings(self) -> &'static [Units] {
+        match self {
+            Units::Iso => &[Units::Iso],
+            Units::StepModeler => &[Units::StepModeler],
+            Units::Open => &[Units::Iso, Units::StepModeler],
+        }
     }
 }
 
@@ -111,17 +115,19 @@ pub fn commas(text: &[u8]) -> Option<usize> {
 pub fn unit(attribute: &Attribute, units: Units) -> &'static str {
     let ty = attribute.written;
     let has = |part: &str| ty.contains(part);
-    let iso = units == Units::Iso;
+    let of = |iso, modeler, open| match units {
+        Units::Iso => iso,
+        Units::StepModeler => modeler,
+        Units::Open => open,
+    };
     if has("rot_speed_measure") {
-        if iso { "1/s" } else { "rpm" }
+        of("1/s", "rpm", "1/s or rpm")
+    } else if has("speed_measure") && attribute.name == "feedrate" {
+        of("m/s", "mm per revolution", "m/s or mm per revolution")
     } else if has("speed_measure") {
-        match (iso, attribute.name) {
-            (true, _) => "m/s",
-            (_, "feedrate") => "mm per revolution",
-            _ => "m/min",
-        }
+        of("m/s", "m/min", "m/s or m/min")
     } else if has("plane_angle_measure") {
-        if iso { "degrees" } else { "radians" }
+        of("degrees", "radians", "degrees or radians")
     } else if has("length_measure") {
         "mm"
     } else if has("time_measure") {

@@ -39,7 +39,8 @@ fn units_are_those_of_the_file() {
     assert!(told(super::Units::StepModeler, "-9000").contains("9000 rpm, clockwise"));
     let hints = super::hints::hints(Doc { text: text.as_bytes(), file: &file, units: super::Units::StepModeler }, gr_text::Span::new(0, text.len() as u32));
     assert!(hints.iter().any(|h| h.text == " rpm") && hints.iter().all(|h| h.text != " 1/s"));
-    let guessed = |by: &str| super::Units::of(by.as_bytes(), &gr_p21::parse(by.as_bytes()));
-    assert_eq!(guessed(text), super::Units::Iso);
-    assert_eq!(guessed("ISO-10303-21;\nHEADER;\nFILE_NAME('a','',(''),(''),'ST-GENERATOR','','');\nENDSEC;\nDATA;\nENDSEC;"), super::Units::StepModeler);
+    let both = told(super::Units::Open, "-9000");
+    assert!(both.contains("-9000 1/s = 540000 rpm") && both.contains("9000 rpm, clockwise") && both.contains("step-units"), "{both}");
+    let hints = super::hints::hints(Doc { text: text.as_bytes(), file: &file, units: super::Units::Open }, gr_text::Span::new(0, text.len() as u32));
+    assert!(hints.iter().any(|h| h.text == " 1/s or rpm"));
 }

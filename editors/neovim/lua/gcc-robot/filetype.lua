@@ -1,9 +1,12 @@
--- Which files are G-code and which are STEP-NC.
+-- Which files are G-code, which are STEP-NC, and which are what programs are run with.
 local M = {}
 
 M.gcode = { "ngc", "nc", "cnc", "tap", "eia", "gc", "g", "gcode" }
 M.p21 = { "p21", "stpnc" }
 local maybe_p21 = { "stp", "step" }
+-- Files that programs are run with. Machine files are TOML, INI files are "dosini": Neovim knows these.
+M.tools = { "tbl" }
+M.parameters = { "var" }
 
 -- How the names of the schemas of ISO 14649 and AP238 begin.
 local schemas = {
@@ -31,6 +34,29 @@ function M.is_stepnc(lines)
   return false
 end
 
+local function has(text, starts)
+  for _, start in ipairs(starts) do
+    if text:find("\n%s*" .. start) then
+      return true
+    end
+  end
+  return false
+end
+
+--- Whether a file that programs are run with is one of ours: project file, machine file, tool table, INI and parameter
+--- file of LinuxCNC.
+function M.is_beside(name, lines)
+  local file = vim.fn.fnamemodify(name, ":t"):lower()
+  if file == "gcc-robot.toml" or file:match("%.tbl$") or file:match("%.var$") then
+    return true
+  end
+  local text = "\n" .. table.concat(lines, "\n")
+  if file:match("%.toml$") then
+    return has(text, { "format" }) and has(text, { "%[kinematics%]", "extends", "%[%[joint%]%]" })
+  end
+  return file:match("%.ini$") ~= nil and has(text, { "%[RS274NGC%]", "%[EMC%]", "%[EMCIO%]", "%[TRAJ%]", "%[KINS%]" })
+end
+
 local function head(buffer)
   return vim.api.nvim_buf_get_lines(buffer, 0, 200, false)
 end
@@ -50,6 +76,8 @@ local function add_by_pattern()
   end
   add(M.gcode, "gcode")
   add(M.p21, "p21")
+  add(M.tools, "tooltable")
+  add(M.parameters, "cncparameters")
   add(maybe_p21, function(_, buffer)
     return M.is_stepnc(head(buffer)) and "p21" or nil
   end)
@@ -80,12 +108,18 @@ local function add_by_event()
   add(M.p21, function()
     return "p21"
   end)
+  add(M.tools, function()
+    return "tooltable"
+  end)
+  add(M.parameters, function()
+    return "cncparameters"
+  end)
   add(maybe_p21, function(buffer)
     return M.is_stepnc(head(buffer)) and "p21" or nil
   end)
 end
 
---- Makes Neovim know the two kinds. Before 0.8 names are looked at by autocommands.
+--- Makes Neovim know them. Before 0.8 names are looked at by autocommands.
 function M.register()
   if vim.fn.has("nvim-0.8") == 1 then
     add_by_pattern()

@@ -3,7 +3,11 @@ local M = {}
 
 local program = require("gcc-robot.program")
 
+local kinds = require("gcc-robot.filetype")
+
 M.filetypes = { "gcode", "p21" }
+-- Of these only the files that `kinds.is_beside` knows.
+M.beside = { "toml", "dosini", "tooltable", "cncparameters" }
 M.root_markers = { "gcc-robot.toml", ".git" }
 
 M.options = {
@@ -46,9 +50,29 @@ function M.root(path)
   return folder
 end
 
+--- Every file type that may be one of the server's.
+function M.all_filetypes()
+  return vim.list_extend(vim.list_extend({}, M.filetypes), M.beside)
+end
+
+--- Whether the server is for this buffer.
+function M.is_ours(buffer)
+  if vim.tbl_contains(M.filetypes, vim.bo[buffer].filetype) then
+    return true
+  end
+  return kinds.is_beside(vim.api.nvim_buf_get_name(buffer), vim.api.nvim_buf_get_lines(buffer, 0, 2000, false))
+end
+
+--- For Neovim 0.11: calls back with the root when the server is for this buffer.
+function M.root_dir(buffer, on_root)
+  if M.is_ours(buffer) then
+    on_root(M.root(vim.api.nvim_buf_get_name(buffer)))
+  end
+end
+
 -- Neovim 0.10 and later asks for diagnostics itself; sent ones too would be shown twice.
 local function init_options()
-  return { gccRobot = M.options.settings, pullDiagnostics = vim.fn.has("nvim-0.10") == 1 }
+  return { gccRobot = M.options.settings, pullDiagnostics = vim.fn.has("nvim-0.10") == 1, explainPages = true }
 end
 
 --- What Neovim is told of the server, in the form of `vim.lsp.start_client`.
@@ -85,7 +109,7 @@ end
 
 local function attach(buffer)
   local name = vim.api.nvim_buf_get_name(buffer)
-  if name == "" or vim.bo[buffer].buftype ~= "" then
+  if name == "" or vim.bo[buffer].buftype ~= "" or not M.is_ours(buffer) then
     return
   end
   local root = M.root(name)
@@ -118,21 +142,43 @@ local function enable_by_event()
   local group = vim.api.nvim_create_augroup("GccRobot", { clear = true })
   vim.api.nvim_create_autocmd("FileType", {
     group = group,
-    pattern = M.filetypes,
+    pattern = M.all_filetypes(),
     callback = function(event)
       attach(event.buf)
     end,
   })
   for _, buffer in ipairs(vim.api.nvim_list_bufs()) do
-    if vim.tbl_contains(M.filetypes, vim.bo[buffer].filetype) then
+    if vim.tbl_contains(M.all_filetypes(), vim.bo[buffer].filetype) then
       attach(buffer)
     end
   end
 end
 
---- Starts the server for every G-code and STEP-NC buffer. Options: see M.options.
+-- Names of STEP-NC entities lead to pages of this address, which `gcc-robot explain` writes.
+local function show_pages()
+  local group = vim.api.nvim_create_augroup("GccRobotPages", { clear = true })
+  vim.api.nvim_create_autocmd("BufReadCmd", {
+    group = group,
+    pattern = "gcc-robot-explain:/*",
+    callback = function(event)
+      local found = M.program()
+      local name = event.match:match("([^/]+)%.md$")
+      if not (found and name) then
+        return
+      end
+      local lines = program.run(found, { "explain", name })
+      vim.api.nvim_buf_set_lines(event.buf, 0, -1, false, lines)
+      vim.bo[event.buf].buftype = "nofile"
+      vim.bo[event.buf].modifiable = false
+      vim.bo[event.buf].filetype = "markdown"
+    end,
+  })
+end
+
+--- Starts the server for every G-code and STEP-NC buffer, and for the files that programs are run with. Options: see M.options.
 function M.setup(options)
   M.options = vim.tbl_extend("force", M.options, options or {})
+  show_pages()
   if vim.lsp.config and vim.lsp.enable then
     enable_by_name()
   else
