@@ -25,6 +25,7 @@
 // `!(x <= limit)` is meant: a value that is not a number must fail the test. Matrices are walked by index.
 #![allow(clippy::neg_cmp_op_on_partial_ord, clippy::needless_range_loop)]
 
+mod angle;
 mod cartesian;
 mod cell;
 pub mod differential;

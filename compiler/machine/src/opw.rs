@@ -125,12 +125,13 @@ impl Opw {
             };
             let (k1, s1) = unit(k1, s1);
             let meets = free || (b != 0.0 && out <= 1e-9 * far);
-            self.elbows(&mut all, flange, side, (s1, k1), (x - a1, wrist[2] - c1), (a2, meets));
+            let first = (crate::angle::atan2(s1, k1), s1, k1);
+            self.elbows(&mut all, flange, side, first, (x - a1, wrist[2] - c1), (a2, meets));
         }
         all
     }
 
-    fn elbows(&self, all: &mut Eight, flange: &Frame, side: u8, (s1, k1): (f64, f64), (x, z): (f64, f64), (a2, meets): (f64, bool)) {
+    fn elbows(&self, all: &mut Eight, flange: &Frame, side: u8, (q1, s1, k1): (f64, f64, f64), (x, z): (f64, f64), (a2, meets): (f64, bool)) {
         let (c2, c3) = (self.lengths[4], self.lengths[5]);
         let fore = a2 * a2 + c3 * c3;
         let k = libm::sqrt(fore);
@@ -150,7 +151,7 @@ impl Opw {
             let folded = vx * vx + vz * vz <= 1e-18;
             let (k2, s2) = if folded { (1.0, 0.0) } else { unit(vx * x + vz * z, vz * x - vx * z) };
             let (s23, k23) = (s2 * k3 + k2 * s3, k2 * k3 - s2 * s3);
-            let arm = [libm::atan2(s1, k1), libm::atan2(s2, k2), libm::atan2(s3, k3)];
+            let arm = [q1, crate::angle::atan2(s2, k2), crate::angle::atan2(s3, k3)];
             let mark = meets || stretched || folded;
             self.wrists(all, flange, side * 4 + bend * 2, arm, [s1, k1, s23, k23], mark);
         }
@@ -168,10 +169,10 @@ impl Opw {
         let pole = lean <= POLE;
         // With the fourth and the sixth axis in one line only their sum counts: the fourth stays at model angle 0.
         let (k4, s4) = if pole { (1.0, 0.0) } else { (z[0] / lean, z[1] / lean) };
-        let q4 = libm::atan2(s4, k4);
-        let q5 = libm::atan2(lean, z[2]);
+        let q4 = crate::angle::atan2(s4, k4);
+        let q5 = crate::angle::atan2(lean, z[2]);
         // The sixth joint from what the fourth leaves over: exact however small the lean is.
-        let q6 = libm::atan2(k4 * x[1] - s4 * x[0], k4 * y[1] - s4 * y[0]);
+        let q6 = crate::angle::atan2(k4 * x[1] - s4 * x[0], k4 * y[1] - s4 * y[0]);
         for (flip, wrist) in [[q4, q5, q6], [q4 + std::f64::consts::PI, -q5, q6 + std::f64::consts::PI]].into_iter().enumerate() {
             let model = [arm[0], arm[1], arm[2], wrist[0], wrist[1], wrist[2]];
             let slot = usize::from(branch) + flip;
@@ -211,7 +212,13 @@ fn unit(x: f64, y: f64) -> (f64, f64) {
 /// An angle brought into −π … π.
 pub(crate) fn turn(angle: f64) -> f64 {
     const TURN: f64 = 2.0 * std::f64::consts::PI;
-    if angle.abs() <= std::f64::consts::PI { angle } else { angle - TURN * libm::round(angle / TURN) }
+    const HALF: f64 = std::f64::consts::PI;
+    if angle.abs() > 3.0 * HALF {
+        return angle - TURN * libm::round(angle / TURN);
+    }
+    // Which of the three it is can't be foreseen: no branch.
+    let too_far = f64::from_bits(TURN.to_bits() & u64::from(angle.abs() > HALF).wrapping_neg());
+    angle - too_far.copysign(angle)
 }
 
 impl Kinematics for Opw {
