@@ -190,9 +190,9 @@ fn joints_of_usp2009() {
     insta::assert_snapshot!("usp2009_cone", text(&refused.stderr).replace(&format!("{}/", folder.path().display()), ""));
 }
 
-/// Two million moves for an arm, in files of the controller's size: `cargo test --release -p gcc-robot --test robot -- --ignored`.
+/// Two million moves for an arm, in files of the controller's size.
 #[test]
-#[ignore = "a minute, and a gigabyte"]
+#[cfg_attr(debug_assertions, ignore = "a minute without optimisation")]
 fn two_million_moves() {
     moves(2_000_000);
 }
