@@ -65,17 +65,17 @@ impl Default for Options {
     }
 }
 
-/// A PNG picture.
-pub fn png(program: &Program, options: &Options) -> Result<Vec<u8>, String> {
-    let path = path::Path::new(program, options.rapids, &options.rates);
+/// A PNG picture. `bent`: the path as a machine with joint rapids goes it.
+pub fn png(program: &Program, bent: Option<&Trace>, options: &Options) -> Result<Vec<u8>, String> {
+    let path = path::Path::new(program, options.rapids, &options.rates).bent(bent, options.rapids);
     let mut canvas = raster::Raster::new(limit(options.width), limit(options.height));
     chart::draw(&path, options, &mut canvas);
     canvas.encode()
 }
 
-/// An SVG picture.
-pub fn svg(program: &Program, options: &Options) -> String {
-    let path = path::Path::new(program, options.rapids, &options.rates);
+/// An SVG picture; `bent` as for [`png`].
+pub fn svg(program: &Program, bent: Option<&Trace>, options: &Options) -> String {
+    let path = path::Path::new(program, options.rapids, &options.rates).bent(bent, options.rapids);
     let mut canvas = svg::Svg::new(limit(options.width), limit(options.height), &options.title);
     chart::draw(&path, options, &mut canvas);
     canvas.finish()

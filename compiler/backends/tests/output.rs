@@ -133,7 +133,7 @@ fn feed_is_blue_and_rapid_orange() {
         out.call(&At { file: FileId(0), line, frame: FrameId::MAIN, now: b"" }, call);
     }
     let options = plot::Options { show: plot::Show::Top, width: 600, height: 600, ..Default::default() };
-    let bytes = plot::png(&out.finish(), &options).expect("png");
+    let bytes = plot::png(&out.finish(), None, &options).expect("png");
     let map = tiny_skia::Pixmap::decode_png(&bytes).expect("valid png");
     let (mut blue, mut orange) = (Vec::new(), Vec::new());
     for y in 80..550 {
@@ -160,7 +160,7 @@ fn feed_is_blue_and_rapid_orange() {
 #[test]
 fn svg_and_html_are_whole() {
     let options = plot::Options { title: "a<b>.ngc".into(), ..Default::default() };
-    let svg = plot::svg(&part(), &options);
+    let svg = plot::svg(&part(), None, &options);
     assert!(svg.starts_with("<svg") && svg.ends_with("</svg>\n"));
     assert!(svg.contains("<title>a&lt;b&gt;.ngc</title>"));
     assert!(svg.contains("100 mm") || svg.contains("20 mm"), "a scale");
@@ -175,8 +175,8 @@ fn svg_and_html_are_whole() {
 fn an_empty_program_gives_an_empty_picture() {
     let options = plot::Options::default();
     let empty = Program::default();
-    assert!(plot::png(&empty, &options).is_ok());
-    assert!(plot::svg(&empty, &options).contains("no motion"));
+    assert!(plot::png(&empty, None, &options).is_ok());
+    assert!(plot::svg(&empty, None, &options).contains("no motion"));
     assert!(plot::html(&plot::Trace::new(&empty, &Default::default()), &options).contains("\"count\":0"));
     assert!(sheet::sheet(&empty, &sheet::Options::default()).text().contains("Time     0:00:00"));
 }

@@ -436,8 +436,8 @@ fn one_picture(program: &Program, trace: Option<&Trace>, unit: &Unit, kind: &str
 /// A picture of this kind: svg, png, or html, which shows a trace.
 pub fn picture(program: &Program, trace: Option<&Trace>, kind: &str, options: &gr_backends::plot::Options) -> Result<Vec<u8>, String> {
     Ok(match (kind, trace) {
-        ("png", _) => gr_backends::plot::png(program, options)?,
-        ("svg", _) => gr_backends::plot::svg(program, options).into_bytes(),
+        ("png", bent) => gr_backends::plot::png(program, bent, options)?,
+        ("svg", bent) => gr_backends::plot::svg(program, bent, options).into_bytes(),
         ("html", Some(trace)) => gr_backends::plot::html(trace, options).into_bytes(),
         (other, _) => return Err(format!("pictures are .svg, .png or .html, not .{other}")),
     })
@@ -448,11 +448,11 @@ pub fn traced(motion: &Motion, unit: &Unit, machine: Option<&Machine>) -> Trace 
     let options = TraceOptions { tools: tool_rows(motion, unit), rates: gr_driver::rates(&unit.setup), ..TraceOptions::default() };
     let mut trace = Trace::new(&motion.program, &options);
     trace.stock = motion.plan.as_ref().and_then(|p| p.stock).or(unit.stock);
-    trace.machine = machine.map(|m| {
+    if let Some(m) = machine {
         let planned = is_planned(m).then(|| gr_robot::plan(&motion.program, m, &texts(motion), &gr_robot::Options::default()));
         let planned = planned.as_ref().map(|p| p.as_ref().map_err(|found| gr_lsp::machine::reason(found)));
-        gr_lsp::machine::along(m, planned, &trace)
-    });
+        gr_lsp::machine::along(m, planned, &mut trace);
+    }
     trace
 }
 

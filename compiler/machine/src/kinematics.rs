@@ -92,6 +92,10 @@ pub enum KinematicsError {
 impl std::fmt::Display for KinematicsError {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
+            KinematicsError::OutOfReach { distance, reach: (least, f64::INFINITY) } => {
+                let (far, least) = (crate::short(*distance), crate::short(*least));
+                write!(f, "the wrist would be {far} mm from the base, the arm can't come nearer than {least} mm")
+            }
             KinematicsError::OutOfReach { distance, reach: (least, most) } => write!(
                 f,
                 "the wrist would be {} mm from the base, the arm can do {} to {} mm",

@@ -4,10 +4,11 @@
 use std::collections::HashMap;
 
 use gr_ir::{FileId, Source};
-use gr_machine::math::{Frame, norm, sub};
-use gr_machine::{Chain, Kind, Machine, Pose};
+use gr_machine::math::{Frame, cross, norm, sub};
+use gr_machine::{Chain, Kind, Machine, Pose, Rapid};
 
-use crate::joints::{JointOptions, JointPoint, TooMany, joint_path};
+use crate::joints::{JointOptions, JointPath, JointPoint, TooMany, joint_path};
+use crate::solver::{Joints, Solver};
 use crate::{Action, MAX_JOINTS, Planned, RobotProgram};
 
 /// A point of a path.
@@ -19,6 +20,17 @@ pub struct PathPoint {
     pub source: Source,
     /// The path leads here from the point before.
     pub joined: bool,
+    /// It does so by a rapid.
+    pub rapid: bool,
+}
+
+/// How the tool point goes to a point of the path in a joint rapid: not in a line.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Sweep {
+    /// The point it leads to.
+    pub point: usize,
+    /// Tool points between the point before and it, in the base, mm.
+    pub places: Vec<[f64; 3]>,
 }
 
 /// How a machine stands at a point.
@@ -76,28 +88,105 @@ fn stand(p: &JointPoint) -> Stand {
     Stand { joints: p.joints, tip: p.tool.position }
 }
 
-/// How the machine stands at points of the program's path; the points of a block follow each other. None for points of blocks that the plan has nothing of.
-pub fn along(planned: &Planned, points: &[PathPoint]) -> Result<Vec<Option<Stand>>, TooMany> {
-    let path = joint_path(&planned.program, &JointOptions { tolerance: TOLERANCE, most: MOST, ..JointOptions::default() })?;
-    let (stretches, mut waiting) = stretches(path.points());
-    let mut out: Vec<Option<Stand>> = Vec::with_capacity(points.len());
-    let mut start = 0;
-    for block in points.chunk_by(|a, b| a.source == b.source) {
-        // A block that is run several times in the same frame comes back in the same order.
-        let stretch = block.first().and_then(|p| waiting.get_mut(&p.source)?.next()).and_then(|n| stretches.get(n));
-        let ways = ways(points, start, block.len());
-        let whole = ways.last().copied().unwrap_or(0.0);
-        match stretch {
-            Some(s) => out.extend(ways.iter().map(|w| s.at(if whole > 0.0 { w / whole } else { 1.0 }))),
-            // While it waits the machine stays where it is.
-            None => {
-                let last = out.last().copied().flatten();
-                out.extend(ways.iter().map(|w| last.filter(|_| *w == 0.0)));
-            }
-        }
-        start += block.len();
+/// A plan as joint positions, to be read off.
+pub struct Walk<'p> {
+    planned: &'p Planned,
+    path: JointPath,
+}
+
+impl<'p> Walk<'p> {
+    /// Cuts the plan into joint positions.
+    pub fn new(planned: &'p Planned) -> Result<Walk<'p>, TooMany> {
+        let path = joint_path(&planned.program, &JointOptions { tolerance: TOLERANCE, most: MOST, ..JointOptions::default() })?;
+        Ok(Walk { planned, path })
     }
-    Ok(out)
+
+    /// How the machine stands at points of the program's path; the points of a block follow each other. None for points
+    /// of blocks that the plan has nothing of.
+    pub fn stands(&self, points: &[PathPoint]) -> Vec<Option<Stand>> {
+        let mut out: Vec<Option<Stand>> = Vec::with_capacity(points.len());
+        self.blocks(points, |start, block, stretch| {
+            let ways = ways(points, start, block.len());
+            let whole = ways.last().copied().unwrap_or(0.0);
+            match stretch {
+                Some(s) => out.extend(ways.iter().map(|w| s.at(if whole > 0.0 { w / whole } else { 1.0 }))),
+                // While it waits the machine stays where it is.
+                None => {
+                    let last = out.last().copied().flatten();
+                    out.extend(ways.iter().map(|w| last.filter(|_| *w == 0.0)));
+                }
+            }
+        });
+        out
+    }
+
+    /// The ways of the tool point in the plan's joint rapids.
+    pub fn sweeps(&self, points: &[PathPoint]) -> Vec<Sweep> {
+        let mut out = Vec::new();
+        let machine = &self.planned.program.machine;
+        if !sweeps(machine) {
+            return out;
+        }
+        let solver = Solver::new(machine);
+        let forward = |q: &Joints| solver.forward(q);
+        self.blocks(points, |start, block, stretch| {
+            let mut ends = block.iter().enumerate().filter(|(_, p)| p.joined);
+            let (Some((n, end)), None) = (ends.next(), ends.next()) else { return };
+            let Some(s) = stretch.filter(|s| end.rapid && s.points.iter().skip(1).all(|p| p.rapid)) else { return };
+            let mut places = Vec::new();
+            for pair in s.points.windows(2) {
+                if pair[0].joints == pair[1].joints {
+                    continue;
+                }
+                places.extend(between(&forward, &pair[0].joints, &pair[1].joints, pair[1].tool.position, solver.count));
+                places.push(pair[1].tool.position);
+            }
+            places.pop();
+            let ends = s.points.first().zip(s.points.last());
+            if ends.is_some_and(|(a, b)| places.iter().any(|p| beside(*p, a.tool.position, b.tool.position) > TOLERANCE)) {
+                out.push(Sweep { point: start + n, places });
+            }
+        });
+        out
+    }
+
+    /// Each block of the path with its stretch of the plan. A block that is run several times in the same frame comes
+    /// back in the same order.
+    fn blocks(&self, points: &[PathPoint], mut each: impl FnMut(usize, &[PathPoint], Option<&Stretch<'_>>)) {
+        let (stretches, mut waiting) = stretches(self.path.points());
+        let mut start = 0;
+        for block in points.chunk_by(|a, b| a.source == b.source) {
+            let stretch = block.first().and_then(|p| waiting.get_mut(&p.source)?.next()).and_then(|n| stretches.get(n));
+            each(start, block, stretch);
+            start += block.len();
+        }
+    }
+}
+
+/// Whether the rapids of a machine are joint rapids.
+fn sweeps(machine: &Machine) -> bool {
+    machine.kind == Kind::Robot && machine.cell.rapid != Some(Rapid::Linear)
+}
+
+/// Pieces of one joint rapid at most.
+const MOST_PIECES: usize = 32;
+
+/// Tool points on the way between two joint positions, near enough to be joined by lines; `tip`: the tool point at the
+/// second.
+fn between(forward: &dyn Fn(&Joints) -> Option<Frame>, a: &Joints, b: &Joints, tip: [f64; 3], count: usize) -> Vec<[f64; 3]> {
+    let Some(held) = forward(b).map(|f| f.inverse().apply(tip)) else { return Vec::new() };
+    let at = |share: f64| {
+        let mut q = *a;
+        (0..count).for_each(|i| q[i] += (b[i] - a[i]) * share);
+        forward(&q).map(|f| f.apply(held))
+    };
+    let Some(all) = (0..=MOST_PIECES).map(|k| at(k as f64 / MOST_PIECES as f64)).collect::<Option<Vec<_>>>() else { return Vec::new() };
+    let mut step = MOST_PIECES;
+    let off = |from: usize, to: usize| (from + 1..to).map(|k| beside(all[k], all[from], all[to])).fold(0.0, f64::max);
+    while step > 1 && (0..MOST_PIECES).step_by(step).any(|k| off(k, k + step) > TOLERANCE) {
+        step /= 2;
+    }
+    (step..MOST_PIECES).step_by(step).map(|k| all[k]).collect()
 }
 
 /// Way from the point before the block to each of its points.
@@ -174,6 +263,28 @@ pub fn nearest(machine: &Machine, points: &[PathPoint]) -> Vec<Option<Stand>> {
         Some(Stand { joints: padded, tip })
     };
     points.iter().map(one).collect()
+}
+
+/// Distance of a place from the line between two others.
+fn beside(p: [f64; 3], a: [f64; 3], b: [f64; 3]) -> f64 {
+    let (line, to) = (sub(b, a), sub(p, a));
+    let way = norm(line);
+    if way > 1e-9 { norm(cross(line, to)) / way } else { norm(to) }
+}
+
+/// As [`Walk::sweeps`], for machines whose joint values follow from each place alone: how they `stand` at the points.
+pub fn swept(machine: &Machine, points: &[PathPoint], stands: &[Option<Stand>]) -> Vec<Sweep> {
+    if !sweeps(machine) {
+        return Vec::new();
+    }
+    let (kinematics, count) = (machine.kinematics(), machine.joints.len().min(MAX_JOINTS));
+    let forward = |q: &Joints| kinematics.forward(&q[..count]).ok().map(|p| Frame::shift(p.position));
+    let one = |i: usize| {
+        let (a, b) = (stands[i - 1]?, stands[i]?);
+        let places = between(&forward, &a.joints, &b.joints, b.tip, count);
+        (!places.is_empty()).then_some(Sweep { point: i, places })
+    };
+    (1..points.len().min(stands.len())).filter(|i| points[*i].joined && points[*i].rapid).filter_map(one).collect()
 }
 
 #[cfg(test)]

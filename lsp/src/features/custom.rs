@@ -29,7 +29,7 @@ pub fn preview(mut view: View, p: &PreviewParams) -> Answer<Value> {
         let options = TraceOptions { tolerance: p.tolerance, most_points, document: motion.main, tools: tools(&view, motion), rates: motion.rates };
         trace = Trace::new(&motion.program, &options);
         trace.stock = motion.stock;
-        trace.machine = machine(&view, motion, &trace);
+        machine(&view, motion, &mut trace);
     }
     let key = trace.key();
     let mut out = trace.json(view.uri.as_str(), &key, p.have.as_deref() == Some(key.as_str()));
@@ -49,15 +49,16 @@ fn tools(view: &View, motion: &Motion) -> Vec<ToolRow> {
     setup.tools.rows.iter().skip(1).filter(|t| &*t.comment != gr_interp::ASSUMED).map(row).collect()
 }
 
-/// The chosen machine along the path.
-fn machine(view: &View, motion: &Motion, trace: &Trace) -> Option<TraceMachine> {
-    let machine = view.station.machine.as_ref()?;
+/// Adds the chosen machine along the path.
+fn machine(view: &View, motion: &Motion, trace: &mut Trace) {
+    let Some(machine) = view.station.machine.as_ref() else { return };
     if view.text.len() > super::MOST_FOR_A_ROBOT {
-        return Some(TraceMachine::new(machine, super::TOO_LARGE.into()));
+        trace.machine = Some(TraceMachine::new(machine, super::TOO_LARGE.into()));
+        return;
     }
     let planning = view.planning(motion);
     let planned = planning.as_ref().map(|p| p.as_ref().as_ref().map_err(|found| crate::machine::reason(found)));
-    Some(crate::machine::along(machine, planned, trace))
+    crate::machine::along(machine, planned, trace);
 }
 
 /// What a target makes of the document.

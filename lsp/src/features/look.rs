@@ -87,7 +87,7 @@ fn joints(view: &View, t: &Traced, motion: &Motion) -> Option<String> {
     let shown = |q: &[f64]| crate::machine::show(machine, q).join(", ");
     if !gr_robot::along::is_planned(machine) {
         let place = t.program.steps().filter(|s| s.op.moves()).last()?.end.xyz();
-        let point = PathPoint { place: place.map(|v| v as f32), source: Source::default(), joined: false };
+        let point = PathPoint { place: place.map(|v| v as f32), source: Source::default(), joined: false, rapid: false };
         let found = gr_robot::along::nearest(machine, &[point]).into_iter().next().flatten()?;
         return Some(format!("joints at the end (of several solutions the nearest): {}", shown(&found.joints)));
     }

@@ -5,6 +5,8 @@ use gr_ir::measure::{Known, Rates, Totals};
 use gr_ir::timing::Clock;
 use gr_ir::{Op, Pose, Program, State, View};
 
+use super::trace::Trace;
+
 /// What a stretch of path is drawn as.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, PartialOrd, Ord)]
 #[repr(u8)]
@@ -142,6 +144,27 @@ impl Path {
             self.extent.add(p);
             self.points.push(single(p));
         });
+    }
+
+    /// The same with rapids as a machine makes them, where it makes them differently.
+    pub(super) fn bent(mut self, trace: Option<&Trace>, rapids: bool) -> Path {
+        let Some(trace) = trace.filter(|t| t.bent && !t.truncated) else { return self };
+        self.runs.clear();
+        self.points.clear();
+        for (i, p) in trace.positions.iter().enumerate() {
+            let Some(class) = Class::ALL.into_iter().find(|c| *c as u8 == trace.kinds[i]) else { continue };
+            if i == 0 || class == Class::Rapid && !rapids {
+                continue;
+            }
+            let from = trace.positions[i - 1];
+            if self.runs.last().is_none_or(|r| r.0 != class) || self.points.last() != Some(&from) {
+                self.runs.push((class, u32::try_from(self.points.len()).unwrap_or(u32::MAX)));
+                self.points.push(from);
+            }
+            self.points.push(*p);
+            self.extent.add(p.map(f64::from));
+        }
+        self
     }
 
     /// Runs with their points.

@@ -10,7 +10,8 @@ use gr_machine::math::Frame;
 use gr_machine::{JointKind, Machine};
 use serde_json::{Value, json};
 
-use super::path::{Class, Common, moves_frame, rough_size, single};
+pub use super::path::Class;
+use super::path::{Common, moves_frame, rough_size, single};
 use crate::sheet::ToolRow;
 
 /// A kind: the point begins a new line.
@@ -81,6 +82,8 @@ pub struct Trace {
     pub stock: Option<[[f64; 3]; 2]>,
     /// The machine along the path.
     pub machine: Option<TraceMachine>,
+    /// Rapids go as this machine makes them, not in lines.
+    pub bent: bool,
 }
 
 /// The machine that was chosen, and how it stands along the path.
@@ -234,6 +237,45 @@ impl Trace {
             }
         }
         run.trace
+    }
+
+    /// Puts places between points and those before them, in ascending order of the points: the way there isn't straight.
+    pub fn bend(&mut self, ways: &[(usize, Vec<[f64; 3]>)]) {
+        let old = std::mem::take(self);
+        let room = old.positions.len() + ways.iter().map(|w| w.1.len()).sum::<usize>();
+        let mut out = Trace { positions: Vec::with_capacity(room), bent: old.bent || !ways.is_empty(), ..Trace::default() };
+        let mut tools = old.tools.iter().cloned().peekable();
+        let mut waiting = ways.iter().peekable();
+        for i in 0..old.positions.len() {
+            while let Some(tool) = tools.next_if(|t| t.point as usize <= i) {
+                out.tools.push(TraceTool { point: out.positions.len() as u32, ..tool });
+            }
+            if let Some((_, places)) = waiting.next_if(|w| w.0 == i && i > 0) {
+                let (from, to) = (old.times[i - 1], old.times[i]);
+                for (k, p) in places.iter().enumerate() {
+                    out.bounds.add(*p);
+                    let share = (k + 1) as f32 / (places.len() + 1) as f32;
+                    out.put(&old, i, single(*p), from + (to - from) * share);
+                }
+            }
+            out.put(&old, i, old.positions[i], old.times[i]);
+        }
+        let count = out.positions.len() as u32;
+        out.tools.extend(tools.map(|t| TraceTool { point: count, ..t }));
+        let bounds = [old.bounds.min, old.bounds.max];
+        if !old.bounds.is_empty() {
+            bounds.into_iter().for_each(|p| out.bounds.add(p));
+        }
+        *self = Trace { cut: old.cut, totals: old.totals, truncated: old.truncated, stock: old.stock, machine: old.machine, ..out };
+    }
+
+    fn put(&mut self, like: &Trace, i: usize, place: [f32; 3], time: f32) {
+        self.positions.push(place);
+        self.times.push(time);
+        self.kinds.push(like.kinds[i]);
+        self.lines.push(like.lines[i]);
+        self.feeds.push(like.feeds[i]);
+        self.sources.push(like.sources[i]);
     }
 
     /// A name for this path: the same path has the same one, on every machine.

@@ -38,7 +38,7 @@ pub fn run(global: &Global, args: &PreviewArgs) -> Exit {
     let bad = motion.found.iter().any(|d| d.severity == Severity::Error);
     let kind = goal.extension().map_or(String::new(), |e| e.to_string_lossy().to_ascii_lowercase());
     let plot = Options { text: unit.text.to_string(), rates: gr_driver::rates(&unit.setup), ..options(args) };
-    let trace = (kind == "html").then(|| traced(&motion, &unit, station.machine.as_ref()));
+    let trace = (kind == "html" || station.machine.is_some()).then(|| traced(&motion, &unit, station.machine.as_ref()));
     let made = picture(&motion.program, trace.as_ref(), &kind, &plot);
     drop(progress);
     show(&mut renderer, &Checked { sources: motion.sources, found: motion.found, ..Checked::nothing() });

@@ -84,6 +84,30 @@ fn preview_knows_tools_subs_and_machine() {
     c.shut_down();
 }
 
+/// A rapid of a robot turns all joints evenly: the tool point goes in a bow, and that is what is drawn.
+#[test]
+fn preview_bends_joint_rapids() {
+    let flat = "G21 G90 F600\nG1 X-80 Y20\nG0 X80 Y20\nG1 X80 Y10\nM2\n";
+    let arm = "G21 G90 F600\nG0 X450 Y-200 Z300\nG0 X450 Y200\nG1 X450 Y190\nM2\n";
+    for (machine, text, bent) in [("ufmg/plano-3r", flat, true), ("kuka/kr6-r900", arm, true), ("generic/mill3", flat, false)] {
+        let mut c = Client::new(&[("a.ngc", text)], json!({ "machine": machine }));
+        let uri = c.open("a.ngc", None);
+        let p = c.request("gccRobot/preview", json!({ "textDocument": { "uri": uri } }));
+        assert_eq!(p["machine"]["id"], machine);
+        let (path, kinds, times) = (floats(&p["positions"]), bytes(&p["kinds"]), floats(&p["times"]));
+        let rapid: Vec<&[f32]> = path.chunks(3).zip(&kinds).filter(|(_, k)| **k == 0).map(|(q, _)| q).collect();
+        assert_eq!(rapid.len() > 4, bent, "{machine}: {rapid:?}");
+        let off = |q: &&[f32]| if text == arm { q[0] - 450.0 } else { q[1] - 20.0 };
+        assert_eq!(rapid.iter().any(|q| off(q).abs() > 1.0), bent, "{machine}: {rapid:?}");
+        let end = rapid.last().map(|q| [q[0], q[1]]);
+        assert_eq!(end, Some(if text == arm { [450.0, 200.0] } else { [80.0, 20.0] }), "{machine}");
+        assert!(times.is_sorted() && kinds.len() == times.len(), "{machine}");
+        let joints = floats(&p["machine"]["values"]);
+        assert!(machine == "generic/mill3" || joints.len() % kinds.len() == 0 && joints.iter().any(|v| v.is_finite()), "{machine}");
+        c.shut_down();
+    }
+}
+
 #[test]
 fn preview_shows_the_raw_part() {
     let mut c = Client::new(&[], json!({}));
