@@ -19,7 +19,7 @@ fn pictures(folder: &Path) -> Result<(), Box<dyn std::error::Error>> {
         let Some(planned) = plan(make(strategy, "$").part.text().as_bytes(), FileId(0), &Options::default()).0 else { continue };
         let file: String = name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).collect();
         let options = plot::Options { width: 700, height: 450, title: name.into(), ..plot::Options::default() };
-        std::fs::write(folder.join(file + ".png"), plot::png(&planned.program, &options)?)?;
+        std::fs::write(folder.join(file + ".png"), plot::png(&planned.program, None, &options)?)?;
     }
     Ok(())
 }
