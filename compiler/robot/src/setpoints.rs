@@ -626,7 +626,9 @@ impl Setpoints {
             let _ = write!(out, "{:.6}", k as f64 * self.interval);
             for i in 0..self.joints {
                 for v in [row.position[i], row.velocity[i], row.acceleration[i]] {
-                    let _ = write!(out, ",{:.6}", self.shown(i, v) + 0.0);
+                    let shown = self.shown(i, v);
+                    // No minus before nothing.
+                    let _ = write!(out, ",{:.6}", if shown.abs() < 5e-7 { 0.0 } else { shown });
                 }
             }
             out.push('\n');
