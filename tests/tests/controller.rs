@@ -11,9 +11,10 @@ use gr_tests::oracle::{Job, Verdict, differ, gcc_robot, kept, reference, root, s
 use gr_tests::process::{end, run};
 
 /// Files that become programs for a mill with three axes, and how they mean their numbers.
-const PARTS: [(&str, &[&str]); 5] = [
+const PARTS: [(&str, &[&str]); 6] = [
     ("docs/examples/stepnc/case-study.p21", &[]),
     ("tests/linuxcnc/quick.p21", &[]),
+    ("tests/linuxcnc/walls.p21", &[]),
     ("tests/golden/unb2013/fig4-45_slot-square-u.p21", &["--step-units", "step-modeler"]),
     ("tests/golden/unb2013/example-a_conical-hole.p21", &["--step-units", "step-modeler"]),
     ("tests/golden/ufsc2016/example1.p21", &["--step-overlap", "percent"]),
@@ -47,7 +48,7 @@ fn written_programs_pass_the_interpreter() {
     for (part, meant) in PARTS {
         let folder = tempfile::tempdir().expect("a folder");
         let source = root().join(part);
-        for options in [&[][..], &["--cycles"], &["--tool-change-at", "g53"], &["--tool-change-at", "g55"], &["--tool-change-at", "g30"], &["--units", "inch"]] {
+        for options in [&[][..], &["--cycles"], &["--cutter-compensation", "control"], &["--tool-change-at", "g53"], &["--tool-change-at", "g55"], &["--tool-change-at", "g30"], &["--units", "inch"]] {
             let mut args = vec!["build", "-q", source.to_str().expect("UTF-8"), "-o", "part.ngc"];
             args.extend(meant);
             args.extend(options);
@@ -61,6 +62,47 @@ fn written_programs_pass_the_interpreter() {
         }
         in_full_precision(part, meant, folder.path(), &source);
     }
+}
+
+/// Feeds of a run of `rs274`: the call and its numbers.
+fn feeds(canon: &str) -> Vec<(String, Vec<f64>)> {
+    let call = |l: &str| {
+        let (head, rest) = l.split_once('(')?;
+        let name = head.split_whitespace().last()?;
+        let numbers = rest.trim_end().trim_end_matches(')').split(',').filter_map(|v| v.trim().parse().ok()).collect();
+        name.ends_with("_FEED").then(|| (name.to_string(), numbers))
+    };
+    canon.lines().filter_map(call).collect()
+}
+
+/// With the tool's diameter in the table LinuxCNC makes of contours (G41, G42) the path of the tool's center; with another
+/// diameter it comes nearer to the wall.
+#[test]
+fn the_control_keeps_the_tool_beside_walls() {
+    let Some(rs274) = reference() else { return };
+    let folder = tempfile::tempdir().expect("a folder");
+    let source = root().join("tests/linuxcnc/walls.p21");
+    let source = source.to_str().expect("UTF-8");
+    let run = |options: &[&str], worn: f64| {
+        ours(folder.path(), &[&["build", "-q", source, "-o", "part.ngc"], options].concat());
+        let program = std::fs::read(folder.path().join("part.ngc")).expect("written");
+        let table = std::fs::read_to_string(folder.path().join("part.tbl")).expect("written").replace(" D6 ", &format!(" D{worn} "));
+        let job = Job { tools: Some(in_inches(&table)), ..Job::new(program.clone()) };
+        assert_eq!(differ(&job, &rs274), Verdict::Same, "{options:?}");
+        let ended = job.reference(&rs274);
+        assert!(ended.ok(), "{options:?}: {}", ended.ended.errors());
+        (String::from_utf8(program).expect("UTF-8"), feeds(&ended.ended.output()))
+    };
+    let (path, plain) = run(&[], 6.0);
+    let (contours, compensated) = run(&["--cutter-compensation", "control"], 6.0);
+    assert!(!path.contains("G41") && contours.matches("G41 D1\n").count() >= 4, "{contours}");
+    assert!(plain.len() > 50, "{plain:?}");
+    assert_eq!(plain.len(), compensated.len());
+    for (a, b) in plain.iter().zip(&compensated) {
+        assert!(a.0 == b.0 && a.1.iter().zip(&b.1).all(|(a, b)| (a - b).abs() < 2e-4), "{a:?} {b:?}");
+    }
+    let (_, worn) = run(&["--cutter-compensation", "control"], 5.8);
+    assert!(plain.iter().zip(&worn).any(|(a, b)| a.1.iter().zip(&b.1).any(|(a, b)| (a - b).abs() > 0.05)));
 }
 
 /// As a machine in millimeters with the table as it was written: every move ends where ours ends.

@@ -614,6 +614,40 @@ mod property {
     }
 }
 
+/// Canned cycles that are folded again make the same motion; one that would not stays spelled out.
+#[test]
+fn holes_as_cycles() {
+    let cycles = Options { cycles: true, ..options(Language::Linuxcnc) };
+    let inch = Options { units: Units::Inch, decimals: Some(6), ..cycles.clone() };
+    let head = "G21 G90 G17 G94 F100 S800 M3\nG0 X0 Y0 Z20\n";
+    for level in ["G98", "G99"] {
+        for (cycle, kept) in [
+            ("G81 Z-5 R2", "G81 Z-5 R2"),
+            ("G82 Z-5 R2 P0.5", "G82 Z-5 R2 P0.5"),
+            ("G83 Z-7.3 R2 Q2.5", "G83 Z-7.3 R2 Q2.5"),
+            ("G83 Z-8 R2 Q2.5", "G83 Z-8 R2 Q2.5"),
+            ("G73 Z-7.3 R2 Q2.5", "G73 Z-7.3 R2 Q2.5"),
+            ("G84 Z-5 R2 P0.25", "G84 Z-5 R2 P0.25"),
+            ("G85 Z-5 R2", "G85 Z-5 R2"),
+            ("G86 Z-5 R2 P0.5", "G86 Z-5 R2 P0.5"),
+            ("G89 Z-5 R2 P0.5", "G89 Z-5 R2 P0.5"),
+        ] {
+            let text = format!("{head}{level} {cycle} X10 Y5\nX20\nG80\nG0 Z20\nM5\nM2\n");
+            same(&text, &cycles, 1e-6);
+            same(&text, &inch, 1e-4);
+            let written = write(&text, &cycles);
+            // With G98 LinuxCNC taps up to the height it came from: no plan does that.
+            let folds = !(level == "G98" && cycle.starts_with("G84"));
+            assert_eq!(written.contains(&format!("{level} {kept}")), folds, "{level} {cycle}\n{written}");
+        }
+    }
+    // A control that takes 0.1 off again and again makes one peck more, of nothing: whatever is written does that too.
+    same(&format!("{head}G99 G83 X1 Z-8 R2.3 Q0.1\nG80\nM2\n"), &cycles, 1e-6);
+    let other = Options { pecks: false, ..cycles };
+    let written = write(&format!("{head}G99 G83 X1 Z-7.3 R2 Q2.5\nG80\nM2\n"), &other);
+    assert!(!written.contains("G83"), "{written}");
+}
+
 /// Lengths of a machine without a tool table are not known: what the program asks for stays.
 #[test]
 fn tool_lengths_without_a_table() {

@@ -50,9 +50,13 @@ pub struct TargetOptions {
     /// rs274ngc: leave out comments
     #[arg(long)]
     pub no_comments: bool,
-    /// rs274ngc: write drilling as canned cycles (G81, G82, G85, G89) where they do exactly the same
+    /// rs274ngc: write holes as canned cycles (G73, G81 to G86, G89) where they do exactly the same
     #[arg(long)]
     pub cycles: bool,
+    /// rs274ngc: who keeps the tool beside a wall that a plan finishes: the path, or the control (G41, G42 with D)
+    /// [default: path]
+    #[arg(long, value_enum, value_name = "BY")]
+    pub cutter_compensation: Option<CompensationArg>,
     /// rs274ngc: where tools are changed [default: above the part, where the program has the tool]
     #[arg(long, value_enum, value_name = "PLACE")]
     pub tool_change_at: Option<ChangeAt>,
@@ -79,6 +83,15 @@ pub struct TargetOptions {
     pub reference_config: Option<PathBuf>,
     #[command(flatten)]
     pub robot: crate::robot::RobotOptions,
+}
+
+/// Who keeps the tool beside a wall.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
+pub enum CompensationArg {
+    /// The path is that of the tool's center
+    Path,
+    /// The control, from the diameter in its tool table
+    Control,
 }
 
 /// Where tools are changed.
@@ -227,6 +240,7 @@ pub fn given(o: &TargetOptions) -> Vec<&'static str> {
         ("--repeat-words", o.repeat_words),
         ("--no-comments", o.no_comments),
         ("--cycles", o.cycles),
+        ("--cutter-compensation", o.cutter_compensation.is_some()),
         ("--tool-change-at", o.tool_change_at.is_some()),
         ("--lossy", o.lossy),
         ("--interval", o.interval.is_some()),
@@ -573,6 +587,8 @@ fn normalised(motion: &Motion, unit: &Unit, options: &TargetOptions, name: &str)
     o.repeat_words = options.repeat_words;
     o.comments = !options.no_comments;
     o.cycles = options.cycles;
+    o.pecks = gr_spec::Dialect::find(to).is_none_or(|d| d.id != "linuxcnc-2.10");
+    o.control_compensates = options.cutter_compensation == Some(CompensationArg::Control);
     o.change_at = options.tool_change_at.map(|p| match p {
         ChangeAt::G53 => rs274ngc::ChangeAt::G53,
         ChangeAt::G30 => rs274ngc::ChangeAt::G30,

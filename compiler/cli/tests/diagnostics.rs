@@ -160,6 +160,7 @@ fn what_a_written_program_cannot_carry() {
     told("E0603", std::slice::from_ref(&arc), "build a.ngc --target rs274ngc --decimals 1 -o a.nc");
     told("E0604", &[arc], "build a.ngc --target rs274ngc --to grbl --arcs ijk-absolute -o a.nc");
     told("E0605", &[file("a.ngc", "G21 G90\nG10 L2 P2 X10\nG55 G0 X1\nM2\n")], "build a.ngc --target rs274ngc -o a.nc");
+    told("E0606", &[file("a.p21", &plan(&[]))], "build a.p21 --cutter-compensation control -o a.nc");
     told("E0614", &[file("a.ngc", PART)], "build a.ngc --target rs274ngc --from-line 4 -o a.nc");
 }
 

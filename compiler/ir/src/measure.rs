@@ -339,6 +339,9 @@ impl Run {
     }
 
     fn begin(&mut self, marker: Marker, code: i32, text: &str, source: Source) {
+        if marker == Marker::Contour {
+            return;
+        }
         if marker != Marker::Cycle {
             self.open.push(self.out.stretches.len());
             let totals = Totals::default();

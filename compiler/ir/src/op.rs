@@ -149,6 +149,9 @@ pub enum Marker {
     Feature,
     /// A tolerance that holds for the stretch.
     Tolerance,
+    /// Passes beside a wall; its number is 41 with the wall on the right of the way, 42 on the left, its text the
+    /// radius of the tool, mm.
+    Contour,
 }
 
 /// One operation. For motion the end pose stands beside it (see [`crate::View`]).

@@ -24,7 +24,7 @@ fn plane() -> impl Strategy<Value = Plane> {
 }
 
 fn marker() -> impl Strategy<Value = Marker> {
-    prop::sample::select(vec![Marker::Tool, Marker::Cycle, Marker::Workingstep, Marker::Feature, Marker::Tolerance])
+    prop::sample::select(vec![Marker::Tool, Marker::Cycle, Marker::Workingstep, Marker::Feature, Marker::Tolerance, Marker::Contour])
 }
 
 fn three() -> impl Strategy<Value = [f64; 3]> {

@@ -8,8 +8,8 @@ use crate::emit::Emit;
 use crate::frame::Frame;
 use crate::process::*;
 
-/// Above the bottom of the last peck, rapids end here, mm.
-const ABOVE_LAST_PECK: f64 = 1.0;
+/// Above the bottom of the last peck, rapids end here, mm: as far as in LinuxCNC's own cycles (0.01 inch).
+const ABOVE_LAST_PECK: f64 = 0.254;
 /// Drills break through by this much, mm.
 const BREAK_THROUGH: f64 = 1.0;
 /// Room between a stepped-aside back-boring edge and its hole, mm.
@@ -272,6 +272,9 @@ fn once(e: &mut Emit<'_>, job: &Job<'_>) {
     } else {
         e.rapid(job.at(job.retract));
     }
+    if d.stop_at_bottom {
+        e.turn(if o.technology.clockwise { Turn::Cw } else { Turn::Ccw });
+    }
     if let Some(s) = o.technology.speed {
         e.speed(s);
     }
@@ -350,13 +353,19 @@ fn tap(e: &mut Emit<'_>, job: &Job<'_>) {
     if job.d.floating_chuck {
         let way = if t.clockwise { (Turn::Cw, Turn::Ccw) } else { (Turn::Ccw, Turn::Cw) };
         e.feed(pitch * speed / 60.0);
+        // Feed and speed belong together here: nobody may change one of them.
+        let locks = (t.lock_feed, t.lock_spindle);
+        e.locks(true, true);
         e.line(job.at(-job.depth));
+        e.turn(Turn::Stop);
+        e.turn(way.1);
         if job.d.dwell > 0.0 {
             e.push(Op::Dwell(job.d.dwell));
         }
-        e.turn(way.1);
         e.line(job.at(job.retract));
+        e.turn(Turn::Stop);
         e.turn(way.0);
+        e.locks(locks.0, locks.1);
         return;
     }
     e.push(Op::SyncStart(Sync { spindle: 0, per_rev: pitch, velocity: false }));

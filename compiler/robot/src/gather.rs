@@ -277,6 +277,7 @@ impl<'a> Gather<'a> {
             Op::Note(Note::Message, text) => self.act(Action::Message(text.to_string())),
             Op::Note(_, text) if text.starts_with("interpreter:") => {}
             Op::Note(_, text) => self.act(Action::Comment(text.to_string())),
+            Op::Begin { marker: gr_ir::Marker::Contour, .. } => {}
             Op::Begin { marker, text, .. } if !text.is_empty() => {
                 if marker == gr_ir::Marker::Workingstep {
                     self.workingstep = Some(text.to_string());

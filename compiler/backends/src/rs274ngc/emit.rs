@@ -4,9 +4,11 @@ use super::write::Writer;
 use super::{Emitted, Language, Options};
 use crate::sources::Words;
 use gr_ir::Sources;
-use gr_ir::{Axes, FeedMode, Note, Op, Plane, Program, Source, State, Stop, Turn, Units, View};
+use gr_ir::{Axes, FeedMode, Marker, Note, Op, Override, Plane, Program, Source, State, Stop, Turn, Units, View};
 use gr_text::{Code, Diagnostic, FileId, Findings, code};
 
+/// Decimals of compensated contours at least.
+const CONTOUR_PLACES: usize = 7;
 /// Findings reported at most.
 const MOST_FAULTS: usize = 100;
 
@@ -16,7 +18,12 @@ pub fn emit(program: &Program, options: &Options, sources: &dyn Sources) -> Resu
         let (file, span) = sources.place(Source::default());
         return Err(vec![Diagnostic::new(code::EMIT_BAD_OPTION, file, span, &[mistake])]);
     }
+    let contours = options.control_compensates.then(|| super::beside::contours(program));
+    let program = contours.as_ref().map_or(program, |c| &c.program);
     let mut emitter = Emitter::new(program, options, sources);
+    for (source, why) in contours.iter().flat_map(|c| &c.left) {
+        emitter.say(code::EMIT_NOT_COMPENSATED, *source, std::slice::from_ref(why));
+    }
     emitter.run(program);
     if emitter.found.failed() {
         Err(emitter.found.into_list())
@@ -256,11 +263,26 @@ impl<'a> Emitter<'a> {
             Op::Dwell(seconds) => self.dwell(seconds),
             Op::RunTime(what) => self.say(code::EMIT_RUNTIME_VALUE, view.source, &[what.into()]),
             Op::Note(note, text) => self.note(note, text, view.source),
+            Op::Override(Override::Feed, false) if self.tap_here(view) => {}
+            Op::Begin { marker: Marker::Contour, code, .. } if self.options.control_compensates => self.compensation(code, view.state.tool),
+            Op::Close(Marker::Contour) if self.options.control_compensates => self.compensation(40, 0),
             Op::LogClose if self.linuxcnc() => self.w.bare("(LOGCLOSE)"),
             Op::LogClose => {}
             Op::Stop(stop) => self.stop(stop, view),
             _ => self.setting(view),
         }
+    }
+
+    /// Contours have finer numbers: the control makes tangents of them.
+    fn compensation(&mut self, code: i32, tool: i32) {
+        let places = self.options.places();
+        self.w.places = if code == 40 { places } else { places.max(CONTOUR_PLACES) };
+        match code {
+            super::beside::WAY_IN => return,
+            40 => self.w.block("G40"),
+            _ => self.w.block(&format!("G{code} D{tool}")),
+        }
+        self.motion = None;
     }
 
     fn dwell(&mut self, seconds: f64) {

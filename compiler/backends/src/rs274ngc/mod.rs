@@ -13,9 +13,11 @@
 //! | `moves` | moves: which words, which numbers |
 //! | `arcs` | arcs whose rounded numbers still make a circle |
 //! | `cycles` | drilling as canned cycles |
+//! | `beside` | contours for the radius compensation of the control |
 //! | `settings` | everything that does not move |
 
 mod arcs;
+mod beside;
 mod cycles;
 mod emit;
 mod moves;
@@ -107,6 +109,10 @@ pub struct Options {
     pub comments: bool,
     /// Write drilling as canned cycles where the control does exactly the same.
     pub cycles: bool,
+    /// Pecks as canned cycles too: the control is LinuxCNC 2.9, whose distance from the last peck is known.
+    pub pecks: bool,
+    /// Passes beside a wall as contours that the control compensates (G41, G42) where that is the same motion.
+    pub control_compensates: bool,
     /// Where tools are changed; none = where the program has the tool.
     pub change_at: Option<ChangeAt>,
     /// Remarks at the top of the program.
@@ -134,6 +140,8 @@ impl Default for Options {
             repeat_words: false,
             comments: true,
             cycles: false,
+            pecks: true,
+            control_compensates: false,
             change_at: None,
             remarks: Vec::new(),
             name: String::new(),
@@ -158,6 +166,12 @@ impl Options {
         }
         if self.change_at.is_some() && self.language != Language::Linuxcnc {
             return Some("a place for tool changes can be chosen for LinuxCNC only".into());
+        }
+        if self.control_compensates && self.language != Language::Linuxcnc {
+            return Some("how a control enters a compensated contour is known of LinuxCNC only".into());
+        }
+        if self.control_compensates && self.arcs == Arcs::Lines {
+            return Some("an arc in straight pieces is no contour to compensate".into());
         }
         if !(self.arc_tolerance > 0.0) {
             return Some("the arc tolerance must be above zero".into());

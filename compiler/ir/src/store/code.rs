@@ -91,7 +91,8 @@ fn marker(n: i32) -> Marker {
         1 => Marker::Cycle,
         2 => Marker::Workingstep,
         3 => Marker::Feature,
-        _ => Marker::Tolerance,
+        4 => Marker::Tolerance,
+        _ => Marker::Contour,
     }
 }
 

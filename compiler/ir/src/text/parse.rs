@@ -247,7 +247,7 @@ fn plane(name: &str) -> Res<Plane> {
 }
 
 fn marker(name: &str) -> Res<Marker> {
-    [Marker::Tool, Marker::Cycle, Marker::Workingstep, Marker::Feature, Marker::Tolerance]
+    [Marker::Tool, Marker::Cycle, Marker::Workingstep, Marker::Feature, Marker::Tolerance, Marker::Contour]
         .into_iter()
         .find(|m| print::marker_name(*m) == name)
         .ok_or_else(|| format!("unknown marker `{name}`"))

@@ -336,5 +336,6 @@ pub(super) fn marker_name(marker: Marker) -> &'static str {
         Marker::Workingstep => "workingstep",
         Marker::Feature => "feature",
         Marker::Tolerance => "tolerance",
+        Marker::Contour => "contour",
     }
 }

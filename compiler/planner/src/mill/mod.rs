@@ -8,6 +8,7 @@ mod section;
 mod slot;
 pub(crate) mod thread;
 
+use gr_ir::{Marker, Op};
 use gr_text::code;
 use gr_toolpath as tp;
 use gr_toolpath::{P2, Path2, Vertex};
@@ -100,8 +101,15 @@ pub(crate) fn mill(e: &mut Emit<'_>, step: &Workingstep, m: &Milling, feature: &
     };
     job.check_approach(e, &moves);
     job.unused(e, &moves);
+    let beside = job.beside_a_wall();
     for frame in &feature.copies {
+        if let Some(code) = beside {
+            e.mark(Marker::Contour, code, &format!("{:?}", step.operation.tool.diameter / 2.0));
+        }
         write(e, step, frame, &moves, given.security);
+        if beside.is_some() {
+            e.push(Op::Close(Marker::Contour));
+        }
     }
 }
 
@@ -266,6 +274,15 @@ impl Job<'_> {
         // A spindle that turns the other way changes the sides.
         let climb = climb == self.step.operation.technology.clockwise;
         Some(if climb { tp::CutMode::Climb } else { tp::CutMode::Conventional })
+    }
+    /// Only walls are followed: 41 where they are on the right of the way, 42 on the left.
+    fn beside_a_wall(&self) -> Option<u64> {
+        let walls = matches!(
+            self.feature.shape,
+            Shape::Pocket { .. } | Shape::OpenPocket { .. } | Shape::Hole { .. } | Shape::Step { .. } | Shape::Outside { .. } | Shape::Boss(_)
+        );
+        let climb = self.cut_mode().unwrap_or(tp::CutMode::Climb) == tp::CutMode::Climb;
+        (walls && !self.m.bottom).then_some(if climb { 41 } else { 42 })
     }
     fn start(&self) -> Option<P2> {
         // A start point at the origin is what programs write that have none.
