@@ -192,7 +192,7 @@ fn plan(unit: &Unit) -> (Option<gr_planner::Planned>, Vec<Diagnostic>) {
     let text = unit.text.as_bytes();
     let (_, tools, _) = gr_planner::process(text, FILE, unit.step_units);
     let (loaded, missing) = loaded(unit, &tools);
-    let options = gr_planner::Options { units: unit.step_units, overlap: unit.step_overlap, name: unit.name(), tools: loaded, ..Default::default() };
+    let options = gr_planner::Options { units: unit.step_units, overlap: unit.step_overlap, name: unit.name(), tools: loaded, axial_depth: unit.axial_depth, ..Default::default() };
     let (planned, more) = gr_planner::plan(text, FILE, &options);
     add(&mut found, more, &unit.lints);
     add(&mut found, missing, &unit.lints);

@@ -36,6 +36,8 @@ pub struct Unit {
     pub stock: Option<[[f64; 3]; 2]>,
     /// Name of the machine's tool table; none: every tool exists.
     pub tools: Option<String>,
+    /// Greatest axial depth of cut that the machine stands, mm.
+    pub axial_depth: Option<f64>,
 }
 
 impl Unit {
@@ -52,6 +54,7 @@ impl Unit {
             step_overlap: station.step_overlap,
             stock: station.stock,
             tools: station.tools.as_ref().map(|p| p.display().to_string()),
+            axial_depth: station.machine.as_ref().and_then(|m| m.cell.axial_depth),
         }
     }
     /// Millimetres per unit of the machine's tool table.

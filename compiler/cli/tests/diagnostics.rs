@@ -91,6 +91,8 @@ fn names_that_nothing_has() {
 #[test]
 fn tables_and_settings() {
     let part = file("a.ngc", PART);
+    let machine = file("m.toml", &shipped("spec/machines/generic/mill3.toml").replace("[start]", "[cutting]\naxial_depth = 1.5\n\n[start]"));
+    told("E0448", &[machine, file("a.p21", &plan(&[]))], "check --machine m.toml a.p21");
     told("E0829", &[part.clone(), file("a.ini", "[TRAJ]\nwhat is this\n")], "check -i a.ini a.ngc");
     let many: String = (1..=1100).map(|n| format!("T{n} P{n} Z1\n")).collect();
     told("E0837", &[part, file("a.tbl", &many)], "check --tools a.tbl a.ngc");
@@ -132,6 +134,15 @@ fn exchange_files_and_plans() {
                 "#90=WORKPLAN('one',(#10,#11),$,#3,$);",
                 "#91=WORKPLAN('two',(#12),$,#92,$);",
                 "#92=SETUP('turned',$,#9,(#5));",
+            ],
+        ),
+        ("E0449", vec!["#2=WORKPLAN('main workplan',(#10,#11,#12,#12),$,#3,$);"]),
+        (
+            "E0450",
+            vec![
+                "#3=SETUP('vise',#90,#9,(#5));",
+                "#90=AXIS2_PLACEMENT_3D('origin',#7,#91,#61);",
+                "#91=DIRECTION('',(0.,1.,0.));",
             ],
         ),
         (

@@ -204,7 +204,8 @@ enum Event {
 impl Event {
     fn of(view: &View<'_, '_>) -> Option<Event> {
         Some(match view.op {
-            Op::Dwell(s) => Event::Dwell(s),
+            // No time is no wait: cycles say it where plans do not.
+            Op::Dwell(s) if s != 0.0 => Event::Dwell(s),
             Op::ToolChange(_) | Op::ToolNumber(_) => Event::ToolChange(view.state.tool),
             Op::Stop(stop) => Event::Stop(stop),
             Op::DigitalOut { index, on, synced } => Event::Digital(index, on, synced),

@@ -19,6 +19,8 @@ pub struct Cell {
     pub tools: BTreeMap<u32, ToolData>,
     /// Spindle on the flange.
     pub spindle: Option<Spindle>,
+    /// Greatest axial depth of a milling cut, mm.
+    pub axial_depth: Option<f64>,
     /// Rails and positioners.
     pub external: Vec<External>,
     /// Joint values of the home position, mm or rad.

@@ -68,6 +68,7 @@ pub(crate) static ROOT: &[Key] = &[
     key("frames", Table(FRAMES), "Base, table and part."),
     key("frame", Tables(FRAME), "More frames in the base, by name: `G54`, `fixture` …"),
     key("spindle", Table(SPINDLE), "Spindle on the flange."),
+    key("cutting", Table(CUTTING), "What the machine stands."),
     key("tool", Tables(TOOL), "Tools and their points."),
     key("speed", Table(SPEED), "Speeds where the program says nothing."),
     key("zone", Table(ZONE), "Corner zones, mm."),
@@ -180,6 +181,8 @@ static SPINDLE: &[Key] = &[
     key("max_speed", Number, "Turns per minute."),
     key("controlled", Flag, "Whether the program can switch it; else true."),
 ];
+
+static CUTTING: &[Key] = &[key("axial_depth", Number, "Greatest axial depth of a milling cut, mm.")];
 
 static TOOL: &[Key] = &[
     must("number", Whole, "T number."),

@@ -538,6 +538,7 @@ impl Check {
             frames: list("frame").iter().map(|f| (f.string("name").unwrap_or_default(), place(f))).collect(),
             tools: self.tools(list("tool")),
             spindle: raw.get("spindle").and_then(|s| self.spindle(s)),
+            axial_depth: self.axial_depth(raw),
             external: list("external").iter().filter_map(|e| self.external(e)).collect(),
             home,
             coupling: raw.get("coupling").and_then(|c| self.coupling(c, joints)),
@@ -566,6 +567,15 @@ impl Check {
             }
         }
         out
+    }
+
+    fn axial_depth(&mut self, raw: &Node) -> Option<f64> {
+        let node = raw.get("cutting")?.get("axial_depth")?;
+        let depth = node.number()?;
+        if !(depth > 0.0) {
+            self.value(&node.span, format!("axial_depth {depth} must be above zero"));
+        }
+        Some(depth)
     }
 
     fn spindle(&mut self, s: &Node) -> Option<Spindle> {

@@ -369,7 +369,8 @@ fn tap(e: &mut Emit<'_>, job: &Job<'_>) {
         return;
     }
     e.push(Op::SyncStart(Sync { spindle: 0, per_rev: pitch, velocity: false }));
-    e.push(Op::RigidTap { bottom: job.at(-job.depth), scale: 1.0 });
+    let bottom = e.placed(job.at(-job.depth));
+    e.push(Op::RigidTap { bottom, scale: 1.0 });
     e.drilled(job.at(-job.depth));
     e.push(Op::SyncStop);
 }

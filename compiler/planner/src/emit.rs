@@ -1,6 +1,6 @@
 //! Writes motion: keeps tool, spindle, feed and coolant, and goes from place to place by the security plane.
 
-use gr_ir::{Arc, ArcPlane, Builder, Marker, Note, Op, Plane, Pose, Source, Turn, Units};
+use gr_ir::{Arc, ArcPlane, Builder, FeedMode, Marker, Note, Op, Plane, Pose, Source, Turn, Units};
 use gr_text::{Code, Diagnostic, FileId, LineIndex, Severity, Span, code};
 
 use crate::frame::{Frame, norm, sub};
@@ -39,6 +39,12 @@ pub(crate) struct Emit<'a> {
     /// What is left of the raw part, where it is known.
     pub stock: Option<Stock>,
     cutter: Option<Cutter>,
+    /// How far feeds of this workingstep reached: lowest and highest coordinates of their ends.
+    pub fed: Option<[[f64; 3]; 2]>,
+    /// Cosine and sine of the turn of the setup about Z against the machine.
+    turned: [f64; 2],
+    per_rev: bool,
+    surface: Option<[f64; 2]>,
     /// Features that some workingstep has cut.
     pub cut: std::collections::BTreeSet<u64>,
 }
@@ -66,6 +72,10 @@ impl<'a> Emit<'a> {
             cut: std::collections::BTreeSet::new(),
             stock: None,
             cutter: None,
+            fed: None,
+            turned: [1.0, 0.0],
+            per_rev: false,
+            surface: None,
         }
     }
     pub fn begin(&mut self) {
@@ -103,11 +113,30 @@ impl<'a> Emit<'a> {
         self.push(Op::Begin { marker, code, text });
     }
 
-    fn pose(&self, to: [f64; 3]) -> Pose {
+    /// Coordinates from here on are written turned by this about Z, as the setup is on the machine.
+    pub fn turn_setup(&mut self, x: [f64; 3]) {
+        self.turned = [x[0], x[1]];
+    }
+    /// A point or a vector of the setup along the axes of the machine.
+    pub fn placed(&self, p: [f64; 3]) -> [f64; 3] {
+        let [c, s] = self.turned;
+        [c * p[0] - s * p[1] + 0.0, s * p[0] + c * p[1] + 0.0, p[2] + 0.0]
+    }
+    /// Where the tool stands as far as it is known, in the setup.
+    pub fn standing(&self) -> [f64; 3] {
+        let ([c, s], p) = (self.turned, self.b.pose().xyz());
+        self.at.unwrap_or([c * p[0] + s * p[1], c * p[1] - s * p[0], p[2]])
+    }
+    /// The pose at a point of the setup.
+    pub fn pose(&self, to: [f64; 3]) -> Pose {
         let mut pose = *self.b.pose();
-        pose.axes[..3].copy_from_slice(&to.map(|c| c + 0.0));
-        pose.tool_axis = self.axes.then_some(self.axis);
+        pose.axes[..3].copy_from_slice(&self.placed(to));
+        pose.tool_axis = self.axes.then_some(self.placed(self.axis));
         pose
+    }
+    fn reached(&mut self, to: [f64; 3]) {
+        let [low, high] = self.fed.unwrap_or([to, to]);
+        self.fed = Some([std::array::from_fn(|i| low[i].min(to[i])), std::array::from_fn(|i| high[i].max(to[i]))]);
     }
     fn same(&self, to: [f64; 3]) -> bool {
         self.at.is_some_and(|at| norm(sub(at, to)) < TINY)
@@ -166,12 +195,16 @@ impl<'a> Emit<'a> {
             let pose = self.pose(to);
             self.b.push_to(Op::Linear, &pose, self.source);
             self.take_off(self.at.unwrap_or(to), to);
+            self.at.into_iter().chain([to]).for_each(|p| self.reached(p));
             self.at = Some(to);
         }
     }
     /// An arc, counter-clockwise seen against the normal, of `sweep` (may exceed a turn; < 0 the other way).
     pub fn arc(&mut self, center: [f64; 3], normal: [f64; 3], to: [f64; 3], sweep: f64) {
         let pose = self.pose(to);
+        self.reached(to);
+        let (level, middle) = (normal[2], center);
+        let (center, normal) = (self.placed(center), self.placed(normal));
         let begun = (sweep.abs() / (2.0 * std::f64::consts::PI) - 1e-9).floor().max(0.0) as i32 + 1;
         let turns = if sweep < 0.0 { -begun } else { begun };
         // Normals of the planes as controls have them: Z, Y, X.
@@ -184,8 +217,8 @@ impl<'a> Emit<'a> {
             None => Arc { plane: ArcPlane::Free(normal), center, turns },
         };
         self.b.push_to(Op::Arc(arc), &pose, self.source);
-        if let Some(from) = self.at.filter(|_| self.upright().is_some() && normal[2].abs() > 1.0 - 1e-12) {
-            self.take_off_arc(from, center, to, if normal[2] > 0.0 { sweep } else { -sweep });
+        if let Some(from) = self.at.filter(|_| self.upright().is_some() && level.abs() > 1.0 - 1e-12) {
+            self.take_off_arc(from, middle, to, if level > 0.0 { sweep } else { -sweep });
         }
         self.at = Some(to);
     }
@@ -231,12 +264,12 @@ impl<'a> Emit<'a> {
         match self.at {
             Some(at) => self.rapid_as_written([at[0], at[1], up.max(at[2])]),
             None => {
-                let pose = *self.b.pose();
+                let here = self.standing();
                 self.axis = axis;
-                let mut start = self.pose([pose.axes[0], pose.axes[1], up]);
-                start.tool_axis = self.axes.then_some(axis);
-                self.b.push_to(Op::Rapid, &start, self.source);
-                self.at = Some([pose.axes[0], pose.axes[1], up]);
+                let start = [here[0], here[1], up];
+                let pose = self.pose(start);
+                self.b.push_to(Op::Rapid, &pose, self.source);
+                self.at = Some(start);
             }
         }
         let high = self.at.map_or(up, |a| a[2]);
@@ -303,7 +336,32 @@ impl<'a> Emit<'a> {
         }
         self.locks = (feed, spindle);
     }
+    /// Feeds from here on are per revolution or per time.
+    fn feeds_per_rev(&mut self, per_rev: bool) {
+        if self.per_rev != per_rev {
+            let mode = if per_rev { FeedMode::PerRev } else { FeedMode::PerTime };
+            self.push(Op::FeedMode { spindle: 0, mode });
+            (self.per_rev, self.feed) = (per_rev, None);
+        }
+    }
+    /// Constant cutting speed, or an end of it.
+    fn cutting_speed(&mut self, t: &Technology) {
+        if t.surface == self.surface {
+            return;
+        }
+        self.push(Op::SpindleMode { spindle: 0, surface: t.surface.map(|s| s[1]) });
+        (self.surface, self.speed) = (t.surface, None);
+        if let Some([speed, _]) = t.surface {
+            self.push(Op::SpindleSpeed { spindle: 0, speed });
+        }
+    }
     pub fn technology(&mut self, t: &Technology, functions: Functions) {
+        self.cutting_speed(t);
+        self.feeds_per_rev(t.per_rev);
+        if t.surface.is_some() {
+            let way = if t.clockwise { Turn::Cw } else { Turn::Ccw };
+            self.turn(way);
+        }
         if let Some(speed) = t.speed {
             if speed > 0.0 {
                 self.speed(speed);
@@ -365,6 +423,8 @@ impl<'a> Emit<'a> {
     pub fn end(&mut self, security: f64) {
         self.lift(security);
         self.stop_spindle();
+        self.cutting_speed(&Technology::default());
+        self.feeds_per_rev(false);
         self.locks(false, false);
         self.plane(Plane::Xy);
         if self.tool.take().is_some() {

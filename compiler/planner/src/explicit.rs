@@ -39,7 +39,7 @@ pub(crate) fn follow(e: &mut Emit<'_>, paths: &[Toolpath], frame: &Frame, techno
                     None => vec![frame.z; curve.pieces.len() + 1],
                 };
                 let start = frame.point(curve.start);
-                let here = e.at.unwrap_or_else(|| e.b.pose().xyz());
+                let here = e.standing();
                 let gap = e.at.is_none() || norm(sub(here, start)) > TINY;
                 if gap && (!joined || by_plane) {
                     // What says it approaches begins above the material; anything else is reached at feed.
@@ -100,7 +100,7 @@ fn by_axes(e: &mut Emit<'_>, p: &Toolpath, rows: &[[Option<f64>; 3]], technology
     }
     conditions(e, p, technology);
     for row in rows {
-        let here = e.at.unwrap_or_else(|| e.b.pose().xyz());
+        let here = e.standing();
         e.at = Some(here);
         let to = std::array::from_fn(|i| row[i].unwrap_or(here[i]));
         if p.rapid || technology.is_none() { as_written(e, p, to) } else { e.line(to) }

@@ -29,6 +29,8 @@ pub struct Options {
     pub tolerance: Option<f64>,
     /// Tools of the control that take the place of the file's own numbers; none: numbers from 1.
     pub tools: Vec<Loaded>,
+    /// Greatest axial depth of cut that the machine stands, mm.
+    pub axial_depth: Option<f64>,
 }
 
 /// The tool of the control that a tool of the file is.
@@ -96,6 +98,8 @@ pub fn plan(text: &[u8], file: FileId, options: &Options) -> (Option<Planned>, V
         }),
         smallest: tools.iter().map(|t| t.diameter / 2.0).filter(|r| *r > 0.0).fold(f64::INFINITY, f64::min),
         block: None,
+        axial_depth: options.axial_depth,
+        made: BTreeSet::new(),
     };
     p.e.b.file(file, &options.name);
     p.e.begin();
@@ -169,6 +173,10 @@ struct Planner<'a> {
     smallest: f64,
     /// Raw part of the step before.
     block: Option<[[f64; 3]; 2]>,
+    /// Greatest axial depth of the machine.
+    axial_depth: Option<f64>,
+    /// Operations that were made on their features.
+    made: BTreeSet<(u64, u64)>,
 }
 
 impl Planner<'_> {
@@ -216,11 +224,17 @@ impl Planner<'_> {
             self.e.at = None;
             self.block = None;
         }
-        if let Some(f) = setup.frame.filter(|f| new && (f.origin != [0.0; 3] || f.x[0] < 1.0 - 1e-9 || f.z[2] < 1.0 - 1e-9)) {
-            let [x, z] = [f.x, f.z].map(|a| a.map(|c| format!("{:.4}", c + 0.0)).join(","));
-            let turned = f.x[0] < 1.0 - 1e-9 || f.z[2] < 1.0 - 1e-9;
-            let turned = if turned { format!(", turned: its X along {x} and its Z along {z}") } else { String::new() };
-            let at = format!("X{} Y{} Z{}{turned}", f.origin[0], f.origin[1], f.origin[2]);
+        let frame = setup.frame.unwrap_or_default();
+        if frame.z[2] < 1.0 - 1e-9 {
+            let z = frame.z.map(|c| format!("{:.4}", c + 0.0)).join(",");
+            self.e.say(code::PLAN_SETUP_TILTED, setup.origin, &[&format!("'{}'", setup.name), &z]);
+        } else {
+            self.e.turn_setup(frame.x);
+        }
+        if new && (frame.origin != [0.0; 3] || frame.x[0] < 1.0 - 1e-9) {
+            let turn = libm::atan2(frame.x[1], frame.x[0]).to_degrees();
+            let turned = if frame.x[0] < 1.0 - 1e-9 { format!(", turned by {turn:.4} degrees about Z, as its coordinates are written") } else { String::new() };
+            let at = format!("X{} Y{} Z{}{turned}", frame.origin[0], frame.origin[1], frame.origin[2]);
             self.e.say(code::PLAN_SETUP_ORIGIN, setup.origin, &[&format!("'{}'", setup.name), &at]);
         }
         self.setup = Some(setup.clone());
@@ -247,13 +261,31 @@ impl Planner<'_> {
                 self.axes.push(axis);
             }
         }
+        self.e.fed = None;
         self.cut(s);
+        self.air(s);
         // An explicit path ends where it says; whatever comes next goes by the security plane from there.
         if s.operation.toolpaths.is_empty() {
             self.e.lift(security);
         }
         self.e.push(Op::Close(Marker::Feature));
         self.e.push(Op::Close(Marker::Workingstep));
+    }
+
+    /// Steps that meet no material: made before, or beside the raw part.
+    fn air(&mut self, s: &Workingstep) {
+        let what = format!("#{} {}", s.operation.origin.id, s.operation.keyword);
+        if !self.made.insert((s.feature.origin.id, s.operation.origin.id)) {
+            let why = format!("the same operation has been made on #{} {} before", s.feature.origin.id, s.feature.keyword);
+            self.e.say(code::PLAN_AIR, s.origin, &[&what, &why]);
+        }
+        let (Some([low, high]), Some([least, most])) = (s.stock, self.e.fed) else { return };
+        let r = s.operation.tool.diameter / 2.0;
+        let beside = (0..2).any(|i| most[i] + r <= low[i] || least[i] - r >= high[i]);
+        if beside || least[2] >= high[2] {
+            let why = if beside { "all of its way lies beside the raw part" } else { "all of its way lies above the raw part" };
+            self.e.say(code::PLAN_AIR, s.origin, &[&what, why]);
+        }
     }
 
     /// The height for rapids: the security plane, unless the part reaches above it.
@@ -276,14 +308,16 @@ impl Planner<'_> {
     fn cut(&mut self, s: &Workingstep) {
         let o = &s.operation;
         let security = self.security;
+        let lathe = o.tool.diameter == 0.0;
+        let technology = if lathe { "TURNING_TECHNOLOGY" } else { "MILLING_TECHNOLOGY" };
         let moving = |t: &Toolpath| !t.rapid && matches!(t.path, PathKind::Location { .. } | PathKind::Axes(_));
         let fed = |t: &Toolpath| t.technology.unwrap_or(o.technology).feed.is_some();
         if o.technology.feed.is_none() && (o.toolpaths.is_empty() || o.toolpaths.iter().any(|t| moving(t) && !fed(t))) {
             let why = "the feed follows from a feed, or from a feed per tooth with a spindle speed";
-            self.e.say(code::PLAN_MISSING_VALUE, o.technology.origin, &["MILLING_TECHNOLOGY", "feedrate", why]);
+            self.e.say(code::PLAN_MISSING_VALUE, o.technology.origin, &[technology, "feedrate", why]);
         }
-        if o.technology.speed.is_none_or(|s| s == 0.0 && o.toolpaths.is_empty()) {
-            self.e.say(code::PLAN_MISSING_VALUE, o.technology.origin, &["MILLING_TECHNOLOGY", "spindle", "nothing is cut with a spindle that stands"]);
+        if o.technology.surface.is_none() && o.technology.speed.is_none_or(|s| s == 0.0 && o.toolpaths.is_empty()) {
+            self.e.say(code::PLAN_MISSING_VALUE, o.technology.origin, &[technology, if lathe { "spindle_speed" } else { "spindle" }, "nothing is cut with a spindle that stands"]);
         }
         if o.technology.contact_feed && o.toolpaths.is_empty() {
             self.e.say(code::PLAN_NO_EFFECT, o.technology.origin, &["feedrate_reference .CCP.", "the operation", "the feed is that of the tool center"]);
@@ -304,7 +338,7 @@ impl Planner<'_> {
                 }
             }
             OperationKind::Mill(m) => {
-                let given = mill::Given { security, tolerance: self.tolerance, tells: self.tells.contains(&s.origin.id), overlap: self.overlap };
+                let given = mill::Given { security, tolerance: self.tolerance, tells: self.tells.contains(&s.origin.id), overlap: self.overlap, axial_depth: self.axial_depth };
                 for f in targets(s) {
                     mill::mill(&mut self.e, s, m, f, &given);
                     self.e.cut.insert(f.origin.id);
@@ -360,8 +394,7 @@ impl Planner<'_> {
         self.e.travel(p.start, axis, security);
         let far = p.distance.abs() * 2.0;
         let to = std::array::from_fn(|i| p.start[i] + p.direction[i] * far);
-        let mut pose = *self.e.b.pose();
-        pose.axes[..3].copy_from_slice(&to);
+        let pose = self.e.pose(to);
         self.e.feed(1.0);
         let source = self.e.source;
         self.e.b.push_to(Op::Probe(0), &pose, source);

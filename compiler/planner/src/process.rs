@@ -709,8 +709,12 @@ pub enum Approach {
 pub struct Technology {
     /// Instance.
     pub origin: Origin,
-    /// mm/s.
+    /// mm/s, or mm per revolution.
     pub feed: Option<f64>,
+    /// The feed is per revolution.
+    pub per_rev: bool,
+    /// Constant cutting speed in the place of a spindle speed: mm/s, and the fastest the spindle may turn, rpm.
+    pub surface: Option<[f64; 2]>,
     /// The feed is that of the contact point.
     pub contact_feed: bool,
     /// rpm, always positive.

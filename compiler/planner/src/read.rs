@@ -240,7 +240,7 @@ impl<'m> Reader<'m> {
     fn dispatch(&mut self, node: Node<'m>, setup: Option<&Setup>, out: &mut Vec<Element>) {
         match node.keyword() {
             "WORKPLAN" => self.workplan(node, setup, out),
-            "MACHINING_WORKINGSTEP" => {
+            "MACHINING_WORKINGSTEP" | "TURNING_WORKINGSTEP" => {
                 if let Some(step) = self.workingstep(node, setup) {
                     out.push(Element::Step(Box::new(step)));
                 }
@@ -335,11 +335,11 @@ impl<'m> Reader<'m> {
     }
 
     fn workingstep(&mut self, node: Node<'m>, setup: Option<&Setup>) -> Option<Workingstep> {
-        let feature = node.node("its_feature");
+        let feature = node.node("its_feature").or_else(|| node.nodes("its_features").first().copied());
         let operation = node.node("its_operation");
         let security = node.node("its_secplane").and_then(|p| self.plane(p));
         let (Some(feature), Some(operation)) = (feature, operation) else {
-            let which = if feature.is_none() { "its_feature" } else { "its_operation" };
+            let which = if feature.is_none() && node.keyword() == "TURNING_WORKINGSTEP" { "its_features" } else if feature.is_none() { "its_feature" } else { "its_operation" };
             self.missing(node, which, "nothing can be machined without it");
             return None;
         };

@@ -112,7 +112,7 @@ const ENTITIES: &[(&str, &str, &str)] = &[
     ("executables", "lowered, with a warning: branches one after another, the first of several alternatives", "PARALLEL SELECTIVE"),
     ("executables", "lowered", "DISPLAY_MESSAGE OPTIONAL_STOP PROGRAM_STOP EXCHANGE_PALLET LOAD_TOOL UNLOAD_TOOL"),
     ("executables", "read; one channel: no effect, said so", "SET_MARK WAIT_FOR_MARK"),
-    ("executables", "refused by name", "INDEX_PALLET INDEX_TABLE WORKPIECE_COMPLETE_PROBING TOOL_LENGTH_PROBING TOOL_RADIUS_PROBING TURNING_WORKINGSTEP"),
+    ("executables", "refused by name", "INDEX_PALLET INDEX_TABLE WORKPIECE_COMPLETE_PROBING TOOL_LENGTH_PROBING TOOL_RADIUS_PROBING"),
     ("features", "lowered", "PLANAR_FACE CLOSED_POCKET OPEN_POCKET SLOT STEP ROUND_HOLE GENERAL_OUTSIDE_PROFILE GENERAL_SHAPE_PROFILE PARTIAL_CIRCULAR_SHAPE_PROFILE CIRCULAR_CLOSED_SHAPE_PROFILE RECTANGULAR_CLOSED_SHAPE_PROFILE BOSS TOOLPATH_FEATURE COMPOUND_FEATURE COUNTERBORE_HOLE COUNTERSUNK_HOLE CIRCULAR_PATTERN RECTANGULAR_PATTERN GENERAL_PATTERN CATALOGUE_THREAD DEFINED_THREAD"),
     ("features", "refused by name", "RECTANGULAR_OPEN_SHAPE_PROFILE ROUNDED_END SPHERICAL_CAP CHAMFER EDGE_ROUND"),
     ("features", "lowered with explicit tool paths, otherwise refused by name", "REGION_PROJECTION REGION_SURFACE_LIST TOPOLOGICAL_REGION"),
@@ -177,7 +177,7 @@ fn every_entity() {
         let names: Vec<String> = names.split(' ').map(|n| format!("`{n}`")).collect();
         let _ = writeln!(table, "| {kind} | {} | {what} |", names.join(" "));
     }
-    table.push_str("\nTurning (part 12): read and checked; lowered where tool paths are explicit, otherwise refused by name.\n");
+    table.push_str("\nTurning (part 12), in `MACHINING_WORKINGSTEP` and `TURNING_WORKINGSTEP`: read and checked; lowered where tool paths are explicit, otherwise refused by name.\n");
     in_docs("entities", &table);
 }
 

@@ -413,6 +413,14 @@ impl Job<'_> {
         if !self.m.bottom && matches!(self.feature.shape, Shape::Pocket { .. } | Shape::OpenPocket { .. }) && !self.before_cut(e) {
             self.leaves(e, "its middle, which no workingstep before has cleared: it only goes round the wall");
         }
+        if let (Shape::Pocket { .. }, Ok((low, high))) = (&self.feature.shape, self.stock()) {
+            let f = area.outline.bounds();
+            let beyond = [low.x - f.min.x, low.y - f.min.y, f.max.x - high.x, f.max.y - high.y].into_iter().fold(0.0, f64::max);
+            if beyond > self.tolerance.max(1e-3) {
+                let why = format!("it reaches {beyond:.4} mm beyond the raw part");
+                e.say(gr_text::code::PLAN_AIR, self.step.origin, &[&self.name(), &why]);
+            }
+        }
         let moves = self.emptied(e, &area)?;
         if let Shape::Pocket { .. } | Shape::Hole { .. } = self.feature.shape {
             // A floor that is not flat leaves a disk further down: corners are those of the walls.

@@ -40,6 +40,8 @@ pub(crate) struct Given {
     pub tells: bool,
     /// How overlaps are written.
     pub overlap: Overlap,
+    /// Greatest axial depth of the machine.
+    pub axial_depth: Option<f64>,
 }
 
 #[derive(Clone, Copy)]
@@ -157,6 +159,10 @@ fn job<'a>(e: &mut Emit<'_>, step: &'a Workingstep, m: &'a Milling, feature: &'a
             return None;
         }
     };
+    if let Some(most) = given.axial_depth.filter(|most| axial.min(bottom) > *most + 1e-9) {
+        let (what, cut) = (format!("#{} {}", o.origin.id, o.keyword), axial.min(bottom));
+        e.say(code::PLAN_OVER_MACHINE_LIMIT, step.origin, &[&what, &gr_step::short(cut), &gr_step::short(most)]);
+    }
     if bottom / axial > MOST_LEVELS {
         e.say(code::PLAN_TOO_MUCH, o.origin, &[&o.keyword, &MOST_LEVELS.to_string(), "levels"]);
         return None;

@@ -71,7 +71,7 @@ impl<'m> Reader<'m> {
             None => Frame::default(),
         };
         let copies: Vec<Frame> = if replaced { copies } else { copies.iter().map(|c| c.place(&placement)).collect() };
-        let depth = self.depth(node)?;
+        let depth = self.depth(node, operation)?;
         let frame = copies.first().copied().unwrap_or(placement);
         if let ([first, second, ..], Some(circle)) = (&copies[..], patterns.iter().find(|p| p.keyword() == "CIRCULAR_PATTERN").copied())
             && first.origin.iter().zip(second.origin).all(|(a, b)| (a - b).abs() < 1e-9)
@@ -196,7 +196,7 @@ impl<'m> Reader<'m> {
         None
     }
 
-    fn depth(&mut self, node: Node<'m>) -> Option<f64> {
+    fn depth(&mut self, node: Node<'m>, operation: u64) -> Option<f64> {
         if !node.is_a("machining_feature") {
             return Some(0.0);
         }
@@ -205,6 +205,12 @@ impl<'m> Reader<'m> {
             return None;
         };
         if plane.normal[2].abs() < 1.0 - 1e-9 {
+            let explicit = |o: &Node<'m>| o.id() == operation && o.node("its_toolpath").is_some();
+            // A plane along the axis is no floor at all: files write its direction in the axes of the part.
+            if plane.normal[2].abs() > 1e-9 && !node.nodes("its_operations").iter().any(explicit) {
+                self.not_lowered(node, ": the plane of its depth is not square to its axis, a floor that leans needs explicit tool paths");
+                return None;
+            }
             self.no_effect(node, "depth", "its plane is not square to the feature's axis; only how far below its point lies counts");
         }
         let depth = -plane.point[2] + 0.0;
@@ -262,7 +268,7 @@ impl<'m> Reader<'m> {
                 let bosses = self.bosses(node, placement)?;
                 Shape::Step { start, length, direction, wall: if wall.abs() < 1e-9 { 0.0 } else { wall }, radius, bosses }
             }
-            "ROUND_HOLE" => self.hole(node)?,
+            "ROUND_HOLE" => self.hole(node, operation)?,
             "GENERAL_OUTSIDE_PROFILE" => {
                 let boundary = self.need(node, "feature_boundary")?;
                 let boundary = if boundary.is_a("closed_profile") {
@@ -276,6 +282,7 @@ impl<'m> Reader<'m> {
             | "RECTANGULAR_OPEN_SHAPE_PROFILE" | "RECTANGULAR_CLOSED_SHAPE_PROFILE" => self.shape_profile(node, placement)?,
             "BOSS" => Shape::Boss(self.boss(node, placement, placement)?),
             "TOOLPATH_FEATURE" => Shape::Toolpath,
+            _ if node.is_a("turning_feature") => Shape::Toolpath,
             "CATALOGUE_THREAD" | "DEFINED_THREAD" => {
                 let major = self.positive(node, "major_diameter", "the size of the thread")?;
                 let hand = node.node("thread_hand").map_or(String::new(), |h| h.string("descriptive_string").to_lowercase());
@@ -285,6 +292,7 @@ impl<'m> Reader<'m> {
                     None => None,
                 };
                 let inner = node.attr("inner_or_outer_thread").and_then(|v| v.boolean()).unwrap_or(true);
+                self.thread_fits(node, major, inner);
                 Shape::Thread { major, pitch, right: !hand.contains("left"), inner, length }
             }
             _ if node.is_a("compound_feature") => {
@@ -303,6 +311,30 @@ impl<'m> Reader<'m> {
             }
             _ => Shape::Other,
         })
+    }
+
+    /// A thread that what it is cut on contradicts: an inner one in a hole as wide as it, a longer one than it is deep.
+    fn thread_fits(&mut self, node: Node<'m>, major: f64, inner: bool) {
+        let of = title(node);
+        for on in node.nodes("applied_shape") {
+            let wide = on.length("diameter").filter(|d| inner && *d >= major - 1e-9);
+            if let Some(d) = wide {
+                let why = format!("#{} {} is {d} mm wide, the thread {major} mm", on.id(), on.keyword());
+                self.say_at(code::PLAN_AIR, node, "applied_shape", &[&of, &why]);
+            }
+            let deep = on.node("depth").and_then(|d| self.plane(d)).map(|p| -p.point[2]);
+            let own = node.node("depth").and_then(|d| self.plane(d)).map_or(0.0, |p| -p.point[2]);
+            if let Some(d) = deep.filter(|d| own > *d + 1e-9) {
+                let why = format!("it is {own} mm deep, what it is cut on {d} mm");
+                self.say_at(code::PLAN_BEYOND_FEATURE, node, "depth", &[&of, &format!("#{} {}", on.id(), on.keyword()), &why]);
+            }
+        }
+        let area = node.node("partial_profile");
+        let own = node.node("depth").and_then(|d| self.plane(d)).map_or(0.0, |p| -p.point[2]);
+        if let Some((a, l)) = area.and_then(|a| Some((a, a.real("effective_length")?))).filter(|(_, l)| own > 0.0 && *l > own + 1e-9) {
+            let why = format!("it is {l} mm, the thread only {own} mm deep: that counts");
+            self.no_effect(a, "effective_length", &why);
+        }
     }
 
     fn need(&mut self, node: Node<'m>, attribute: &str) -> Option<Node<'m>> {
@@ -439,10 +471,10 @@ impl<'m> Reader<'m> {
         }))
     }
 
-    fn hole(&mut self, node: Node<'m>) -> Option<Shape> {
+    fn hole(&mut self, node: Node<'m>, operation: u64) -> Option<Shape> {
         let diameter = self.positive(node, "diameter", "a hole has one")?;
         let taper = node.node("change_in_diameter");
-        let depth = self.depth(node)?;
+        let depth = self.depth(node, operation)?;
         let final_diameter = match taper.map(|t| (t, t.keyword())) {
             Some((t, "DIAMETER_TAPER")) => t.length("final_diameter"),
             Some((t, "ANGLE_TAPER")) => {

@@ -12,6 +12,9 @@ const MOST_FEED_ON_RETRACT: f64 = 10.0;
 /// Largest cutting speed, m/s, and spindle speed, 1/s, that a mill may mean.
 const FASTEST: [f64; 2] = [50.0, 1000.0];
 
+/// Fastest turn of a lathe, 1/s.
+const FASTEST_LATHE: f64 = 200.0;
+
 /// Largest feed, m/s.
 const FASTEST_FEED: f64 = 1.0;
 
@@ -20,6 +23,10 @@ const FASTEST_FEED: f64 = 1.0;
 fn agree(spindle: f64, cut: f64, round: f64) -> bool {
     let turns = spindle.abs();
     round <= 0.0 || turns == 0.0 || ((turns * round - cut * 1000.0).abs() <= 0.02 * cut.abs() * 1000.0 && cut.abs() <= FASTEST[0] && turns <= FASTEST[1])
+}
+
+fn feed_words(mm_per_min: f64) -> Option<String> {
+    (mm_per_min > 0.0).then(|| format!("feed {mm_per_min:.1} mm/min"))
 }
 
 impl<'m> Reader<'m> {
@@ -31,6 +38,13 @@ impl<'m> Reader<'m> {
         };
         let tool = self.tool(tool)?;
         let technology = match node.node("its_technology") {
+            Some(t) if t.keyword() == "TURNING_TECHNOLOGY" => {
+                if node.node("its_toolpath").is_none() {
+                    self.not_lowered(node, " without an explicit tool path");
+                    return None;
+                }
+                self.turning(t)
+            }
             Some(t) => self.technology(t, &tool),
             None => {
                 self.missing(node, "its_technology", "feed and speed are not known");
@@ -46,7 +60,8 @@ impl<'m> Reader<'m> {
         }
         let direction = direction.map(|d| d.keyword().to_string());
         if !toolpaths.is_empty() {
-            for a in ["retract_plane", "start_point", "overcut_length"] {
+            let turning: &[&str] = if node.is_a("turning_machining_operation") { &["approach", "retract", "its_machining_strategy", "allowance"] } else { &[] };
+            for a in ["retract_plane", "start_point", "overcut_length"].iter().chain(turning) {
                 self.unused(node, a, "the tool path is followed as it is written");
             }
         }
@@ -214,9 +229,79 @@ impl<'m> Reader<'m> {
         }
     }
 
+    /// Feed and speed of a lathe. Feeds per revolution are in mm (ISO 14649-12 gives no unit, its example means that).
+    fn turning(&mut self, node: Node<'m>) -> Technology {
+        let iso = self.units == Units::Iso;
+        let [feed, fixed] = ["feedrate", "feed_per_revolution"].map(|a| node.real(a).filter(|v| v.is_finite()));
+        let rev = fixed.or_else(|| node.real("feedrate_per_revolution").filter(|v| v.is_finite()));
+        for (a, v) in [("feedrate", feed), ("feed_per_revolution", rev)] {
+            if let Some(v) = v {
+                self.in_range(node, a, v, f64::MIN_POSITIVE, "above zero");
+            }
+        }
+        let speed = node.node("spindle_speed");
+        let turns = speed.and_then(|s| s.real("rot_speed"));
+        let surface = speed.and_then(|s| s.real("speed"));
+        let most = speed.and_then(|s| s.real("max_speed"));
+        let fast = |v: Option<f64>, most: f64| v.is_some_and(|v| v.abs() > most);
+        if fast(turns.or(most), FASTEST_LATHE) || fast(surface, FASTEST[0]) || fast(feed, FASTEST_FEED) {
+            let show = |turn: f64, cut: f64, feed: f64| {
+                let rpm = turns.map(|v| format!("{:.1} rpm", v.abs() * turn));
+                let cut = surface.map(|v| format!("{:.1} m/min", v * cut));
+                let feed = feed_words(feed);
+                [rpm, cut, feed].into_iter().flatten().collect::<Vec<_>>().join(", ")
+            };
+            let (a, b) = (show(60.0, 60.0, feed.unwrap_or(0.0) * 60_000.0), show(1.0, 1.0, feed.unwrap_or(0.0) * 1000.0));
+            self.units_are_open(node, &a, &b);
+        }
+        let per_minute = if iso { 60.0 } else { 1.0 };
+        let flag = |a: &str| node.attr(a).and_then(|v| v.boolean()).unwrap_or(false);
+        if node.attr("its_adaptive_control").is_some() {
+            self.no_effect(node, "its_adaptive_control", "the control does it");
+        }
+        let reference = node.attr("feedrate_reference").and_then(|v| v.choice());
+        Technology {
+            origin: origin(node),
+            feed: rev.or(feed.map(|f| if iso { f * 1000.0 } else { f * 1000.0 / 60.0 })).filter(|f| *f > 0.0),
+            per_rev: rev.is_some(),
+            surface: surface.filter(|v| *v > 0.0).map(|v| [v * 1000.0 * per_minute / 60.0, most.map_or(f64::MAX, |m| m.abs() * per_minute)]),
+            contact_feed: reference.as_deref() == Some("CCP"),
+            speed: turns.map(|s| s.abs() * per_minute),
+            clockwise: turns.is_none_or(|s| s <= 0.0),
+            synchronised: flag("sync_spindle_and_z_feed"),
+            lock_feed: flag("inhibit_feedrate_override"),
+            lock_spindle: flag("inhibit_spindle_override"),
+            written: [feed, surface, turns, rev],
+        }
+    }
+
+    /// The tool of a lathe: a point, as long as it says.
+    fn lathe_tool(&mut self, node: Node<'m>) -> Tool {
+        let hand = node.attr("hand_of_tool").and_then(|v| v.choice());
+        for a in ["f_dimension", "a_dimension_on_f", "a_dimension_on_lf", "minimum_cutting_diameter"] {
+            self.unused(node, a, "the control has the offsets of its tools");
+        }
+        let tool = Tool {
+            origin: origin(node),
+            name: node.string("its_id").into_owned(),
+            kind: node.keyword().to_string(),
+            length: node.real("functional_length").filter(|l| l.is_finite()),
+            right_handed: hand.as_deref().and_then(|h| match h {
+                "RIGHT" => Some(true),
+                "LEFT" => Some(false),
+                _ => None,
+            }),
+            ..Tool::default()
+        };
+        self.numbered(tool)
+    }
+
     /// A tool; the same tool gets the same number wherever it is described.
     pub fn tool(&mut self, node: Node<'m>) -> Option<Tool> {
         let body = node.node("its_tool_body");
+        if node.is_a("turning_machine_cutting_tool") || node.is_a("turning_machine_tool") {
+            return Some(self.lathe_tool(node));
+        }
         let dimension = body.and_then(|b| b.node("dimension"));
         let (of, attribute) = match dimension {
             Some(d) => (d, "diameter"),
@@ -355,6 +440,8 @@ impl<'m> Reader<'m> {
         let reference = node.attr("feedrate_reference").and_then(|v| v.choice());
         Technology {
             origin: origin(node),
+            per_rev: false,
+            surface: None,
             feed: feed_mm.filter(|f| *f > 0.0),
             contact_feed: reference.as_deref() == Some("CCP"),
             speed: speed.filter(|s| *s > 0.0 || spindle == Some(0.0)),
@@ -381,6 +468,11 @@ impl<'m> Reader<'m> {
         }
         for a in ["axis_clamping", "other_functions"] {
             if node.attr(a).is_some_and(|v| v.items().next().is_some()) {
+                self.no_effect(node, a, why);
+            }
+        }
+        for a in ["tail_stock", "steady_rest", "follow_rest"] {
+            if flag(a) {
                 self.no_effect(node, a, why);
             }
         }
