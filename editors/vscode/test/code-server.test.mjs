@@ -262,6 +262,19 @@ test("a fix is offered and applied", async () => {
   await command("View: Close All Editors");
 });
 
+test("names of STEP-NC lead to their pages", async () => {
+  await open("workplan.stp");
+  const source = readFileSync(join(workspace, "workplan.stp"), "utf8").split(/\r?\n/);
+  const line = source.findIndex((l) => l.includes("CENTERDRILL("));
+  await place(line + 1, source[line].indexOf("CENTERDRILL") + 3);
+  await command("Go to Definition");
+  await page.waitForSelector('.tab.active[data-resource-name="CENTERDRILL.md"]', { timeout: 30000 });
+  await retry("the page", async () =>
+    (await lines(".editor-group-container.active")).some((l) => l.includes("CENTERDRILL")),
+  );
+  await command("View: Close All Editors");
+});
+
 test("the preview draws; cursor and picture go together", async () => {
   await open("flange.ngc");
   await command("gcc-robot: Preview Tool Path");

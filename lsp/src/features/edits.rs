@@ -150,7 +150,7 @@ fn fixes(view: &View, at: Span) -> Answer<(Vec<lsp::CodeAction>, Vec<lsp::Diagno
     };
     let (mut out, mut endings) = (Vec::new(), Vec::new());
     for d in found.iter().filter(touches).take(50) {
-        if [code::PROGRAM_ENDS_EARLY, code::PROGRAM_END_MISSING, code::END_SPINDLE_ON].contains(&d.code) {
+        if [code::PROGRAM_ENDS_EARLY, code::PROGRAM_END_MISSING, code::END_SPINDLE_ON, code::END_COMPENSATION_ON].contains(&d.code) {
             endings.push(protocol::diagnostic(d, &view.text, view.columns, &|_| None));
         }
         for (n, fix) in d.fixes.iter().enumerate() {

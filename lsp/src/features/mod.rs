@@ -198,5 +198,9 @@ fn exchange_in_units<'a>(view: &View, exchange: &'a crate::documents::Exchange) 
 
 /// Edits of one file as the protocol has them.
 fn text_edits(view: &View, edits: Vec<gr_ide::Edit>) -> Vec<lsp::TextEdit> {
-    edits.into_iter().map(|e| lsp::TextEdit { range: view.range(e.span), new_text: e.text }).collect()
+    let ends = edits.iter().any(|e| e.text.contains('\n'));
+    let returns = ends && view.text.slice(Span::new(0, crate::analysis::HEAD)).split_once('\n').is_some_and(|(first, _)| first.ends_with('\r'));
+    // Lines end as those of the document do.
+    let text = |t: String| if returns && t.contains('\n') { t.replace("\r\n", "\n").replace('\n', "\r\n") } else { t };
+    edits.into_iter().map(|e| lsp::TextEdit { range: view.range(e.span), new_text: text(e.text) }).collect()
 }

@@ -111,7 +111,8 @@ fn preview_bends_joint_rapids() {
 #[test]
 fn preview_shows_the_raw_part() {
     let mut c = Client::new(&[], json!({}));
-    let uri = c.open("plate.p21", Some(include_str!("../../../../docs/examples/stepnc/case-study.p21")));
+    let text = include_str!("../../../../docs/examples/stepnc/case-study.p21");
+    let uri = c.open("plate.p21", Some(text));
     let p = c.request("gccRobot/preview", json!({ "textDocument": { "uri": uri } }));
     let stock = p["stock"].as_array().unwrap_or_else(|| panic!("no raw part: {}", p["stock"]));
     let corner = |i: usize| stock[i].as_array().expect("a corner").iter().map(|v| v.as_f64().expect("a number")).collect::<Vec<_>>();
@@ -120,6 +121,14 @@ fn preview_shows_the_raw_part() {
     // The part is cut out of it: in depth the tool does not come below it by more than a drill's point.
     assert!(cut[0][2].as_f64() < Some(high[2]) && cut[0][2].as_f64() > Some(low[2] - 10.0), "{cut} {stock:?}");
     assert_eq!(p["tools"][0]["diameter"].is_number(), true);
+    // Every point leads to its workingstep, and every tool to the step that mounts it.
+    let source: Vec<&str> = text.lines().collect();
+    let lines = integers(&p["lines"]);
+    assert!(!lines.is_empty() && lines.iter().all(|l| source[*l as usize].contains("=MACHINING_WORKINGSTEP(")), "{lines:?}");
+    for tool in p["tools"].as_array().expect("tools") {
+        let line = source[tool["line"].as_u64().expect("a line") as usize];
+        assert!(line.contains("=MACHINING_WORKINGSTEP("), "{line}");
+    }
     c.shut_down();
 }
 

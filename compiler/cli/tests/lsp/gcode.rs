@@ -795,7 +795,7 @@ fn rewritings_do_the_same() {
 
 #[test]
 fn what_a_program_leaves_out_is_a_fix() {
-    for (text, wanted) in [("G21\nS100 M3\nG1 X1 F100\n", "M5\nM2\n"), ("%\nG21\nS100 M3\nG1 X1 F100\n%\n", "M5\nM2\n%\n"), ("G21\nG1 X1 F100", "\nM2\n")] {
+    for (text, wanted) in [("G21\nS100 M3\nG1 X1 F100\n", "M5\nM2\n"), ("%\nG21\nS100 M3\nG1 X1 F100\n%\n", "M5\nM2\n%\n"), ("G21\nG1 X1 F100", "\nM2\n"), ("G21\r\nS100 M3\r\nG1 X1 F100\r\n", "F100\r\nM5\r\nM2\r\n")] {
         let mut c = Client::new(&[("a.ngc", text)], json!({}));
         let uri = c.open("a.ngc", None);
         let found = c.diagnostics(&uri);

@@ -13,6 +13,7 @@ pub const MOST_ITEMS: usize = 2_000;
 /// Subroutines, tools and operations of a program: tools hold their operations.
 pub fn outline(doc: Doc<'_>) -> Vec<Item> {
     let subs = names::subs(doc);
+    let turret = doc.dialect.id == "fanuc-turn";
     let end_of = |line: u32| doc.line(line).map_or(doc.len(), |l| l.span().end);
     let mut items: Vec<Item> = subs
         .iter()
@@ -33,12 +34,13 @@ pub fn outline(doc: Doc<'_>) -> Vec<Item> {
         }
         let bytes = chunk.text.as_bytes();
         let telling = memchr::memchr2(b'(', b';', bytes).is_some() || memchr::memchr2(b'M', b'm', bytes).is_some();
+        let telling = telling || turret && memchr::memchr2(b'T', b't', bytes).is_some();
         if !telling {
             continue;
         }
         let first = doc.file.first_lines[c];
         for line in doc.lines(first..first + chunk.scan.lines.len() as u32) {
-            let Some(item) = entry(&line) else { continue };
+            let Some(item) = entry(&line, turret) else { continue };
             let inside = subs.iter().position(|s| (s.first..=s.last).contains(&line.line) && s.last > s.first);
             match inside {
                 Some(s) if item.kind == ItemKind::Operation => items[s].children.push(item),
@@ -112,11 +114,17 @@ fn stretch(items: &mut [Item], end: u32) {
     }
 }
 
-fn entry(line: &LineOf<'_>) -> Option<Item> {
+/// `turret`: T alone changes the tool, and has its offset in its last two digits; 00 there switches the offset off.
+fn entry(line: &LineOf<'_>, turret: bool) -> Option<Item> {
     let words = line.words();
-    if line.has_code(b'm', 60) {
-        let change = words.iter().find(|w| w.letter == b'm' && w.value == 6.0)?;
-        let name = line.literal(b't').map_or_else(|| "tool change".to_string(), |t| format!("T{}", t.value));
+    let tool = line.literal(b't').filter(|t| turret && t.value >= 100.0 && t.value % 100.0 != 0.0);
+    if line.has_code(b'm', 60) || tool.is_some() {
+        let change = tool.or_else(|| words.iter().find(|w| w.letter == b'm' && w.value == 6.0))?;
+        let name = match (tool, line.literal(b't')) {
+            (Some(t), _) => format!("T{:04}", t.value),
+            (None, Some(t)) => format!("T{}", t.value),
+            (None, None) => "tool change".to_string(),
+        };
         let detail = words.iter().find(|w| w.form == Form::Comment).map_or(String::new(), |w| comment(line.slice(line.tight(w))));
         let span = line.tight(change);
         return Some(Item { kind: ItemKind::Tool, name, detail, range: line.span(), span, children: Vec::new() });

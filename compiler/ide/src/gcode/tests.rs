@@ -254,3 +254,13 @@ fn comments_above_a_tool_change_belong_to_it() {
     }
     insta::assert_snapshot!(shown);
 }
+
+#[test]
+fn a_turret_changes_tools_by_t_alone() {
+    let text = "O0001\nT0101\nG0 X5\nT0100\n(finish)\nT0303\nG0 X9\nM30\n";
+    let turn = Dialect::find("fanuc-turn").expect("a dialect");
+    let f = File::new("a", vec![Chunk { text: text.into(), scan: Arc::new(gr_gcode::scan(text, turn)) }]);
+    let items = outline::outline(Doc { file: &f, dialect: turn });
+    let names: Vec<&str> = items.iter().map(|i| i.name.as_str()).filter(|n| n.starts_with('T')).collect();
+    assert_eq!(names, ["T0101", "T0303"]);
+}
