@@ -78,7 +78,16 @@ pub fn end(child: &mut Child, limit: Duration) -> (Option<i32>, bool) {
 
 /// Runs `command` without input and gathers what it writes.
 pub fn run(command: &mut Command, limit: Duration) -> std::io::Result<Ended> {
-    let mut child = start(command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()))?;
+    gather(command.stdin(Stdio::null()), limit)
+}
+
+/// The same with a file as its input.
+pub fn run_fed(command: &mut Command, input: std::fs::File, limit: Duration) -> std::io::Result<Ended> {
+    gather(command.stdin(input), limit)
+}
+
+fn gather(command: &mut Command, limit: Duration) -> std::io::Result<Ended> {
+    let mut child = start(command.stdout(Stdio::piped()).stderr(Stdio::piped()))?;
     let stdout = reader(child.stdout.take());
     let stderr = reader(child.stderr.take());
     let (status, timed_out) = end(&mut child, limit);

@@ -140,8 +140,10 @@ fn one_line_of_10_mb() {
 #[test]
 fn deep_nesting() {
     gives(format!("#1={}1{}\nM2\n", "[".repeat(100_000), "]".repeat(100_000)).as_bytes(), &["E0102"]);
-    gives(format!("#1={}1{}\nM2\n", "[".repeat(120), "]".repeat(120)).as_bytes(), &["E0227"]);
-    gives(format!("G0 X{}1\nM2\n", "-".repeat(200)).as_bytes(), &["E0227"]);
+    // What fits into a line is no deeper than the controller goes.
+    gives(format!("#1={}1{}\nM2\n", "[".repeat(120), "]".repeat(120)).as_bytes(), &[]);
+    gives(format!("G21 G0 X{}1\nM2\n", "-".repeat(200)).as_bytes(), &[]);
+    gives(format!("#1={}1\nM2\n", "#".repeat(246)).as_bytes(), &["E0237"]);
     gives(format!("#1={}1{}\nM2\n", "SIN[".repeat(60), "]".repeat(60)).as_bytes(), &["E0102"]);
     gives(format!("#1={}1{}\nM2\n", "SIN[".repeat(20), "]".repeat(20)).as_bytes(), &[]);
     let mut loops = String::new();
@@ -268,6 +270,9 @@ fn runaway_programs_end() {
     gives(b"o1 while [1]\nG0 X1\nG0 X0\no1 endwhile\nM2\n", &["E0254", "E0288"]);
     gives(b"o1 repeat [1000000000]\nG4 P0\no1 endrepeat\nM2\n", &["E0254"]);
     gives(b"o1 do\no1 while [1]\nM2\n", &["E0254"]);
+    // The loop ends twice: the second end begins it anew for ever.
+    gives(b"o1 repeat [800]\nG4 P0\no1 endrepeat\no1 endrepeat\nM2\n", &["E0254"]);
+    gives(b"o1 while [0]\no1 endwhile\no1 endwhile\nM2\n", &["E0254"]);
     gives(b"G21 F100\nG81 X1 Y1 Z-1 R1 L2000000000\nM2\n", &["E0254", "E0275"]);
 }
 

@@ -5,7 +5,11 @@
 
 use std::path::{Path, PathBuf};
 
-use gr_tests::oracle::{Job, must_agree, root};
+use std::process::Command;
+use std::time::Duration;
+
+use gr_tests::oracle::{Job, gcc_robot, must_agree, reference, root};
+use gr_tests::process::{Ended, run_fed};
 
 fn files(dir: &Path) -> Vec<PathBuf> {
     let mut files: Vec<PathBuf> = std::fs::read_dir(dir)
@@ -106,4 +110,61 @@ fn parameter_files_agree() {
         }
     }
     assert!(wrong.is_empty(), "{} differ\n{}", wrong.len(), wrong.join("\n"));
+}
+
+/// Lines from standard input, and what both say of each: standard output, standard error and exit status.
+#[test]
+fn lines_by_hand() {
+    const SUB: &str = "o<b> sub\ng0 x1\no<b> endsub\nm2\n";
+    const INPUTS: [&str; 16] = [
+        "g0 x1\n/ g0 x2\ng0 x3\n",
+        "f100\ny2 g5\ng5 x1\ng89 z-1 r2\ng82 z-1 r2\ng1 x5\n",
+        // A call is begun, and the lines after it are the subroutine's.
+        "o<b> call\ng0 x9\ng77\n",
+        "o<b> call\no<b> sub\ng0 x3\no<b> endsub\ng0 x4\n",
+        "o<nowhere> call\ng0 x9\n",
+        "o1 sub\ng0 x1\no1 endsub\no1 call\ng0 x2\no1 endsub\ng0 x3\n",
+        "m98 p1\ng0 x9\no1\ng0 x2\nm99\ng0 x3\n",
+        "m98 p1 l3\ng77\n",
+        "#1=3\no<b> call [5]\n(print,#1)\n",
+        "o1 if [0]\ng0 x1\no1 endif\ng0 x2\n",
+        "o1 repeat [2]\ng0 x1\no1 endrepeat\ng0 x2\n",
+        "o1 return\no1 break\nm99\no1\ng0 x2\n",
+        "s100u\nu\nu[1\nx1 y u\nx1x1 u\nm98 u\nw-\n",
+        "g0 x[1\ng0 x1\nn#1 m98\ng0 x2\n",
+        "g1 x1\nf10\ng1 x1\nm2\ng0 x2\n",
+        "quit\ng0 x1\n",
+    ];
+    let Some(rs274) = reference() else { return };
+    for input in INPUTS {
+        for options in [&["-g"][..], &["-g", "-b"]] {
+            let by_hand = |command: &mut Command| -> Ended {
+                let dir = tempfile::tempdir().expect("a temporary folder");
+                std::fs::write(dir.path().join("b.ngc"), SUB).expect("writable");
+                std::fs::write(dir.path().join("input"), input).expect("writable");
+                let fed = std::fs::File::open(dir.path().join("input")).expect("readable");
+                command.current_dir(dir.path()).env("HOME", dir.path()).env("LC_ALL", "C").args(options);
+                run_fed(command, fed, Duration::from_secs(20)).expect("the program starts")
+            };
+            let (theirs, ours) = (by_hand(&mut Command::new(&rs274)), by_hand(Command::new(gcc_robot()).arg("rs274")));
+            assert_eq!((ours.output(), ours.errors(), ours.status), (theirs.output(), theirs.errors(), theirs.status), "{input}");
+        }
+    }
+}
+
+/// What `-n` says for other numbers, and remarks on the INI file.
+#[test]
+fn options_and_remarks() {
+    let Some(rs274) = reference() else { return };
+    for n in ["0", "2", "3", "-1", "02", "x"] {
+        let mut job = Job::new("g0 x1\ng1 x2\ng0 x3\ng77\ng0 x4\nm2\n");
+        job.options = vec!["-n".into(), n.into()];
+        must_agree("options", &[(n.to_string(), job)]);
+    }
+    for value in ["0.5", "0.02", "0.0001", "abc", "", "0.01 # mm", "-1"] {
+        let mut job = Job::new("g21 g2 x10 i5.0201 f100\nm2\n");
+        job.ini = Some(format!("[RS274NGC]\nCENTER_ARC_RADIUS_TOLERANCE_MM = {value}\nCENTER_ARC_RADIUS_TOLERANCE_INCH = {value}\n"));
+        let (theirs, ours) = (job.reference(&rs274), job.ours());
+        assert_eq!((ours.canon, ours.ended.errors(), ours.ended.status), (theirs.canon, theirs.ended.errors(), theirs.ended.status), "{value}");
+    }
 }

@@ -9,7 +9,7 @@ use gr_ir::Program;
 use gr_spec::Family;
 use gr_text::{Diagnostic, Encoding, FileId, Severity, Text, code};
 
-use crate::commands::check::{Checked, byte_order_mark, is_marked, unreadable};
+use crate::commands::check::{Checked, byte_order_mark, unreadable};
 use crate::exchange::Plan;
 use crate::setup::{Levels, Station, is_for_a_printer};
 use crate::sources::{Sources, read_program};
@@ -22,6 +22,8 @@ pub struct Unit {
     pub text: Text,
     /// How it was spelled.
     pub encoding: Encoding,
+    /// A finding about its byte order mark.
+    pub mark: Option<Diagnostic>,
     /// What it is run with.
     pub setup: Setup,
     /// How severe lints are.
@@ -45,6 +47,7 @@ impl Unit {
     pub fn new(path: &Path, text: Text, encoding: Encoding, station: &Station) -> Unit {
         Unit {
             setup: station.setup_for(path, &text),
+            mark: byte_order_mark(encoding, path, &text, station),
             exchange: crate::exchange::is_exchange(path, &text),
             path: path.to_path_buf(),
             text,
@@ -73,9 +76,16 @@ impl Unit {
     fn rules(&self) -> Rules {
         self.options().rules
     }
+    /// With what is to be said of the bytes that the text was read from.
+    fn told(&self, checked: Checked) -> Checked {
+        match self.mark.clone() {
+            Some(mark) => checked.headed_by(mark, &self.name(), &self.text),
+            None => checked,
+        }
+    }
     /// Everything that is to be said about it. `Err` when there are errors.
     fn check(&self) -> Result<Checked, Checked> {
-        let checked = Checked::of(&self.name(), &self.text, self.options(), &self.lints);
+        let checked = self.told(Checked::of(&self.name(), &self.text, self.options(), &self.lints));
         let bad = checked.more.errors > 0 || checked.found.iter().any(|d| d.severity == Severity::Error);
         if bad { Err(checked) } else { Ok(checked) }
     }
@@ -92,13 +102,8 @@ pub fn load(path: &Path, station: &Station) -> Result<Unit, Checked> {
         checked.unreadable = false;
         return Err(checked);
     }
-    if is_marked(unit.encoding) && !unit.exchange {
-        // As `check` has it.
-        let mut checked = Checked::nothing();
-        byte_order_mark(&mut checked, (&name, path), &unit.text, station);
-        if checked.found.iter().any(|d| d.severity == Severity::Error) {
-            return Err(checked);
-        }
+    if unit.mark.as_ref().is_some_and(|d| d.severity == Severity::Error) {
+        return Err(unit.told(Checked::nothing()));
     }
     Ok(unit)
 }
@@ -107,7 +112,7 @@ pub fn load(path: &Path, station: &Station) -> Result<Unit, Checked> {
 /// warnings.
 pub fn run<S: Sink>(unit: &Unit, sink: S) -> Result<(S, Loaded, Checked), Checked> {
     let streamed = gr_driver::stream(&unit.name(), unit.text.clone(), &unit.setup, Some(&unit.rules()), sink);
-    let checked = if streamed.clean { Checked::nothing() } else { unit.check()? };
+    let checked = if streamed.clean { unit.told(Checked::nothing()) } else { unit.check()? };
     Ok((streamed.sink, streamed.files, checked))
 }
 
@@ -135,7 +140,7 @@ pub fn motion(unit: &Unit, machine: Option<&gr_machine::Machine>) -> Result<(Mot
         return Ok((ufmg(unit, machine), checked));
     }
     let motion = gr_driver::lower(&unit.name(), unit.text.clone(), &unit.setup, Some(&unit.rules()));
-    let checked = if motion.clean { Checked::nothing() } else { unit.check()? };
+    let checked = if motion.clean { unit.told(Checked::nothing()) } else { unit.check()? };
     Ok((plain(motion), checked))
 }
 

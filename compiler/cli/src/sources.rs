@@ -167,7 +167,8 @@ fn binary(bytes: &[u8]) -> Option<&'static str> {
     (controls >= 16 && controls * 20 > body.len()).then_some("binary data")
 }
 
-fn read_bytes(path: &Path) -> Result<Vec<u8>, (gr_text::Code, Vec<String>)> {
+/// The bytes of a file, or why there are none.
+pub fn read_bytes(path: &Path) -> Result<Vec<u8>, (gr_text::Code, Vec<String>)> {
     let unreadable = |e: std::io::Error| match e.kind() {
         std::io::ErrorKind::NotFound => (code::FILE_MISSING, vec![]),
         std::io::ErrorKind::IsADirectory => (code::FILE_DIRECTORY, vec![]),

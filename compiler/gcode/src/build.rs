@@ -11,8 +11,9 @@ use crate::grammar::{self, Block, Expr, Flaw, Item, Kind, Name, Problem};
 use crate::lex::{self, CommentFault, Token};
 use crate::model::*;
 
-/// Deepest nesting of brackets, signs and `#`; the grammar recurses that far.
-pub(crate) const MAX_DEPTH: usize = 64;
+/// Deepest nesting of brackets, signs and `#`, operators in a row counted too: the grammar and whatever walks over an
+/// expression recurse that far. No line that LinuxCNC reads is long enough for more.
+pub(crate) const MAX_DEPTH: usize = 256;
 
 /// [`Scan`] under construction.
 #[derive(Default)]
@@ -391,22 +392,59 @@ fn kind_of(words: &[Word]) -> LineKind {
     kind
 }
 
-/// How far the grammar would recurse.
-fn depth(tokens: &[Token]) -> usize {
-    let (mut deepest, mut prefixes) = (0, 0);
-    let mut open: Vec<usize> = Vec::new();
-    for token in tokens {
-        match token {
-            Token::Mark(b'[') => {
-                open.push(prefixes);
-                prefixes += 1;
-            }
-            Token::Mark(b']') => prefixes = open.pop().unwrap_or(0),
-            Token::Mark(b'#' | b'-' | b'+') => prefixes += 1,
-            Token::Letter(_) => {}
-            _ => prefixes = open.last().map_or(0, |p| p + 1),
-        }
-        deepest = deepest.max(prefixes);
+/// One bracket level, or what stands outside of brackets.
+#[derive(Clone, Copy, Default)]
+struct Nest {
+    /// Signs and `#` in front of the next value.
+    prefixes: usize,
+    /// Values so far: one operator less stands between them.
+    values: usize,
+    deepest: usize,
+}
+
+impl Nest {
+    fn value(&mut self, depth: usize) {
+        self.deepest = self.deepest.max(self.prefixes + depth);
+        self.values += 1;
+        self.prefixes = 0;
     }
-    deepest
+    fn depth(&self) -> usize {
+        self.deepest.max(self.prefixes) + self.values.saturating_sub(1)
+    }
+}
+
+/// An upper bound for how deep the tree of a line's expressions is.
+fn depth(tokens: &[Token]) -> usize {
+    let mut deepest = 0;
+    let mut open: Vec<Nest> = Vec::new();
+    let mut here = Nest::default();
+    let is_letter = |i: usize| matches!(tokens.get(i), Some(Token::Letter(_)));
+    for (i, token) in tokens.iter().enumerate() {
+        match token {
+            Token::Mark(b'[') => open.push(std::mem::take(&mut here)),
+            Token::Mark(b']') => {
+                let inner = here.depth() + 1;
+                here = open.pop().unwrap_or_default();
+                here.value(inner);
+            }
+            Token::Mark(b'#' | b'-' | b'+') => here.prefixes += 1,
+            // A word begins, or the right side of an assignment. Operators with names have more letters than one.
+            Token::Letter(_) if open.is_empty() && !is_letter(i + 1) && (i == 0 || !is_letter(i - 1)) => {
+                deepest = deepest.max(here.depth());
+                here = Nest::default();
+            }
+            Token::Mark(b'=') if open.is_empty() => {
+                deepest = deepest.max(here.depth());
+                here = Nest::default();
+            }
+            Token::Letter(_) | Token::Mark(_) => {}
+            _ => here.value(0),
+        }
+    }
+    while let Some(outer) = open.pop() {
+        let inner = here.depth() + 1;
+        here = outer;
+        here.value(inner);
+    }
+    deepest.max(here.depth())
 }

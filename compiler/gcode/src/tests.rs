@@ -151,13 +151,40 @@ fn text_faults() {
 #[test]
 fn deep_nesting_is_a_fault_and_no_crash() {
     for unit in ["[", "-[", "#[", "#", "-", "sin[", "-#[", "[1+", "exists[#["] {
-        for count in [10, 20, 40, 60, 63, 64, 65, 100, 200] {
+        for count in [10, 20, 40, 60, 63, 64, 65, 100, 200, 255, 256, 257, 5000] {
             let line = format!("X{}1\nX1\n", unit.repeat(count));
             for name in ["linuxcnc-2.9", "fanuc-mill"] {
                 assert_eq!(scan(&line, dialect(name)).lines.len(), 2);
             }
         }
     }
+}
+
+/// No line that LinuxCNC reads is too deep.
+#[test]
+fn a_line_of_linuxcnc_is_never_too_deep() {
+    let closing = |unit: &str, count: usize| if unit.contains('[') { "]".repeat(count * unit.matches('[').count()) } else { String::new() };
+    for unit in ["[", "-[", "#[", "#", "-", "sin[", "-#[", "[1+", "1+", "1**", "[[1]-", "exists[#["] {
+        let count = (1..253).rev().find(|n| 1 + unit.len() * n + 1 + closing(unit, *n).len() <= 252).expect("it fits");
+        for inner in [format!("X{}1{}", unit.repeat(count), closing(unit, count)), format!("X[{}1{}]", unit.repeat(count), closing(unit, count))] {
+            let scan = scan(&format!("{inner}\n"), dialect("linuxcnc-2.9"));
+            assert!(scan.faults.iter().all(|f| f.code != gr_spec::code::EXPRESSION_TOO_DEEP), "{inner}");
+        }
+    }
+}
+
+/// Lines without a limit: a row of operators makes a tree as deep as brackets do.
+#[test]
+fn long_rows_of_operators() {
+    let too_deep = |text: &str| scan(text, dialect("fanuc-mill")).faults.iter().any(|f| f.code == gr_spec::code::EXPRESSION_TOO_DEEP);
+    for operator in ["+1", "-#2", "*-1", " MOD 3", "AND1", "+[1]"] {
+        assert!(!too_deep(&format!("#1=1{}\n", operator.repeat(100))), "{operator}");
+        assert!(too_deep(&format!("#1=1{}\n", operator.repeat(9000))), "{operator}");
+        assert!(too_deep(&format!("X[1{}]\n", operator.repeat(9000))), "{operator}");
+    }
+    // Many short ones are none.
+    assert!(!too_deep(&"#1=1+2".repeat(5000)));
+    assert!(!too_deep(&"X[1+#2]".repeat(5000)));
 }
 
 /// Words that touch each other, comments, blanks, damage: all a line may hold.

@@ -45,22 +45,33 @@ pub(crate) struct Centre {
 /// Relative part of the allowed difference of start and end radius.
 const SPIRAL_RELATIVE: f64 = 0.001;
 
+/// Least and most that the INI file may say for the difference of start and end radius, and the key that says it.
+fn spiral_limits(units: Units) -> (f64, f64, &'static str) {
+    match units {
+        Units::Inch => (0.00004, 2.0 * 0.001 * std::f64::consts::SQRT_2, "CENTER_ARC_RADIUS_TOLERANCE_INCH"),
+        Units::Mm => (0.001, 2.0 * 0.01 * std::f64::consts::SQRT_2, "CENTER_ARC_RADIUS_TOLERANCE_MM"),
+    }
+}
+
+/// What the INI file says for it; `Err`: nothing that the controller takes.
+fn told_spiral(units: Units, ini: &Ini) -> Result<Option<f64>, &'static str> {
+    let (least, most, key) = spiral_limits(units);
+    let Some(text) = ini.get("rs274ngc", key).filter(|t| !t.is_empty()) else { return Ok(None) };
+    let number = text.parse().ok().filter(|v| (least..=most).contains(v));
+    number.map(Some).ok_or(key)
+}
+
+/// Keys of the INI file about arcs whose value the controller does not take; it keeps its own.
+pub fn wrong_arc_tolerances(ini: &Ini) -> Vec<&'static str> {
+    [Units::Inch, Units::Mm].into_iter().filter_map(|units| told_spiral(units, ini).err()).collect()
+}
+
 impl Tolerance {
     /// Defaults by unit, or what the INI file says within the controller's limits.
     pub(crate) fn of(units: Units, ini: &Ini) -> Tolerance {
-        let (radius, least, most, key) = match units {
-            Units::Inch => {
-                (0.00005, 0.00004, 2.0 * 0.001 * std::f64::consts::SQRT_2, "center_arc_radius_tolerance_inch")
-            }
-            Units::Mm => (
-                0.00005 * 25.4,
-                0.001,
-                2.0 * 0.01 * std::f64::consts::SQRT_2,
-                "center_arc_radius_tolerance_mm",
-            ),
-        };
-        let told = if ini.values.is_empty() { None } else { ini.number("rs274ngc", key) };
-        Tolerance { radius, spiral: told.filter(|v| (least..=most).contains(v)).unwrap_or(most) }
+        let radius = if units == Units::Inch { 0.00005 } else { 0.00005 * 25.4 };
+        let told = if ini.values.is_empty() { None } else { told_spiral(units, ini).ok().flatten() };
+        Tolerance { radius, spiral: told.unwrap_or(spiral_limits(units).1) }
     }
 }
 

@@ -36,6 +36,9 @@ fn label_is_damaged(scan: &Scan, text: &str, line: u32, word: &Word) -> bool {
     !fault.code.def().slug.starts_with("oword/") && !before.contains(|c: char| c.is_ascii_alphabetic())
 }
 
+/// How often a loop that is over may be begun anew by a second end of it: the controller does so for ever.
+const RESTARTS: u32 = 1000;
+
 /// A loop that is going on.
 #[derive(Clone, Debug)]
 pub(crate) struct Loop {
@@ -302,6 +305,13 @@ impl<S: Sink> Interp<'_, S> {
                 return Ok(());
             }
             self.doing_continue = false;
+        }
+        let level = self.level();
+        if !self.loops.iter().any(|l| l.label == label && l.level == level) {
+            self.restarts += 1;
+            if self.restarts > RESTARTS {
+                return Err(self.endless("the loop is over here, and this line begins it anew every time"));
+            }
         }
         self.go_back_to(&at);
         Ok(())

@@ -64,6 +64,7 @@ mod control;
 mod check;
 mod wide;
 
+pub use arc::wrong_arc_tolerances;
 pub use block::{Block, Group};
 pub use carry::Carry;
 pub use chunk::{ChunkExit, run_chunk, run_lines};

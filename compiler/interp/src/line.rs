@@ -80,10 +80,15 @@ impl<S: Sink> Interp<'_, S> {
         Ok(())
     }
 
+    fn budgets_anew(&mut self) {
+        self.spent = (self.blocks, self.emitted);
+        self.restarts = 0;
+    }
+
     #[cold]
     fn over_budget(&mut self, blocks: u64) -> Res {
         if self.at_rest() && self.place.line >= self.frontier {
-            self.spent = (self.blocks, self.emitted);
+            self.budgets_anew();
             return Ok(());
         }
         let what = if blocks > self.setup.budgets.blocks { "blocks" } else { "motions" };
@@ -95,7 +100,7 @@ impl<S: Sink> Interp<'_, S> {
     pub(crate) fn count_control(&mut self) -> Res {
         if self.level() == 0 && self.place.line >= self.frontier {
             if self.at_rest() {
-                self.spent = (self.blocks, self.emitted);
+                self.budgets_anew();
             }
             self.frontier = self.place.line + 1;
         }

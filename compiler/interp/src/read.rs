@@ -99,6 +99,9 @@ impl<S: Sink> Interp<'_, S> {
                 self.say_cut(scan);
                 return Ok(());
             }
+            if w.form == Form::Bad && w.start <= bad && !self.is_letter(w.letter) {
+                return self.read_word(scan, text, w);
+            }
             if w.form == Form::Bad || beyond {
                 return Err(self.parse_fault(scan));
             }
@@ -129,7 +132,7 @@ impl<S: Sink> Interp<'_, S> {
                 }
                 return Ok(());
             }
-            Form::Expr if !self.is_letter(w.letter) => return self.take_word(w.letter, 0.0),
+            Form::Expr | Form::Bad if !self.is_letter(w.letter) => return self.take_word(w.letter, 0.0),
             _ => match self.read_structured(scan, w)? {
                 Some(value) => value,
                 None => return Ok(()),

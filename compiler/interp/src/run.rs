@@ -170,6 +170,8 @@ pub struct Interp<'a, S: Sink> {
     pub(crate) begun: u64,
     /// Totals when the main program last came on by itself: budgets count from there.
     pub(crate) spent: (u64, u64),
+    /// Loops that were over and begun anew by another end, since then.
+    pub(crate) restarts: u32,
     /// Control flow of the main program was met on lines before this one only.
     pub(crate) frontier: u32,
     pub(crate) findings: Vec<Finding>,
@@ -262,6 +264,7 @@ impl<'a, S: Sink> Interp<'a, S> {
             emitted: 0,
             begun: 0,
             spent: (0, 0),
+            restarts: 0,
             frontier: 0,
             findings: Vec::new(),
             log: None,
@@ -554,7 +557,8 @@ impl<'a, S: Sink> Interp<'a, S> {
         self.reading.text.get(self.reading.start as usize..self.reading.end as usize).unwrap_or("")
     }
 
-    /// Executes a line typed in by hand. Calls of subroutines run to their end.
+    /// Executes a line typed in by hand. Calls of subroutines run to their end; `rs274` only begins them, and takes the
+    /// next lines typed in for theirs.
     pub fn mdi(&mut self, chunk: &Chunk) -> Result<Option<End>, Finding> {
         self.reading.text = chunk.text.clone();
         self.reading.scan = chunk.scan.clone();
@@ -567,7 +571,7 @@ impl<'a, S: Sink> Interp<'a, S> {
             self.fails(fault);
             return Err(self.findings.remove(at));
         }
-        while self.level() > base && !matches!(self.flow, Flow::End(_)) {
+        while !self.is_rs274() && self.level() > base && !matches!(self.flow, Flow::End(_)) {
             if let Some(end) = self.run_piece(1) {
                 // Doubts are no reason to stop.
                 let wrong = self.findings[before..].iter().position(|f| f.fault.rs.is_some());

@@ -40,6 +40,14 @@ impl Checked {
         found.iter_mut().for_each(|d| lints.harden(d));
         Checked { sources: used(&once, &found), found, more: lints.tally(&once.check.unlisted), unreadable: false }
     }
+    /// The same behind a finding about the start of the file.
+    pub fn headed_by(mut self, first: Diagnostic, name: &str, text: &Text) -> Checked {
+        if self.sources.get(FileId(0)).is_none() {
+            self.sources.add(name, text);
+        }
+        self.found.insert(0, first);
+        self
+    }
 }
 
 pub fn run(global: &Global, args: &CheckArgs) -> Exit {
@@ -168,11 +176,11 @@ pub fn check(path: &Path, station: &Station) -> Checked {
     match read_program(path) {
         Ok(decoded) => {
             let text = decoded.text.into();
-            let mut checked = checked(&name, path, &text, station);
-            if is_marked(decoded.encoding) && !exchange::is_exchange(path, &text) {
-                byte_order_mark(&mut checked, (&name, path), &text, station);
+            let checked = checked(&name, path, &text, station);
+            match byte_order_mark(decoded.encoding, path, &text, station) {
+                Some(mark) => checked.headed_by(mark, &name, &text),
+                None => checked,
             }
-            checked
         }
         Err((code, args)) => unreadable(&name, code, &args),
     }
@@ -184,20 +192,17 @@ pub fn is_marked(decoded: gr_text::Encoding) -> bool {
 }
 
 /// The mark is not part of the text, but the control reads it.
-pub fn byte_order_mark(checked: &mut Checked, (name, path): (&str, &Path), text: &Text, station: &Station) {
-    if station.lints.allow.contains(&code::TEXT_BYTE_ORDER_MARK) {
-        return;
+pub fn byte_order_mark(encoding: gr_text::Encoding, path: &Path, text: &Text, station: &Station) -> Option<Diagnostic> {
+    if !is_marked(encoding) || station.lints.allow.contains(&code::TEXT_BYTE_ORDER_MARK) || exchange::is_exchange(path, text) {
+        return None;
     }
     let refused = !station.undeclared(path, text) && station.setup_for(path, text).dialect.family == gr_spec::Family::Linuxcnc;
-    if checked.sources.get(FileId(0)).is_none() {
-        checked.sources.add(name, text);
-    }
     let mut d = Diagnostic::new(code::TEXT_BYTE_ORDER_MARK, FileId(0), Span::default(), &[]);
     if refused {
         d.severity = Severity::Error;
     }
     station.lints.harden(&mut d);
-    checked.found.insert(0, d);
+    Some(d)
 }
 
 /// What can be said of a program for an unknown control: nothing is an error there.

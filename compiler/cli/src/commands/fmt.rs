@@ -5,8 +5,9 @@ use std::path::{Path, PathBuf};
 
 use gr_gcode::{Case, Form, FormatOptions, Keyword, LeadingZeros, LineKind, Node, Renumber, Scan, Word};
 use gr_spec::{Dialect, Family};
-use gr_text::{Decoded, Encoding, Span, code};
+use gr_text::{Decoded, Encoding, Severity, Span, code};
 
+use crate::commands::check::{byte_order_mark, is_marked};
 use crate::exchange::{is_exchange, not_one};
 use crate::exit::Exit;
 use crate::options::{CaseArg, FmtArgs, Global, LintArgs, RenumberArgs, SetupArgs, StyleArgs, ZerosArg};
@@ -199,6 +200,7 @@ impl Work {
             self.renderer.show(&sources, &d);
             return Exit::Findings;
         }
+        self.doubt_mark(path, &decoded);
         let text = formatted(path, &decoded.text, &self.station, options);
         if check {
             if text == decoded.text {
@@ -211,6 +213,21 @@ impl Work {
             return Exit::Ok;
         }
         self.write(path, &text, decoded.encoding)
+    }
+
+    /// The byte order mark stays, as the spelling of the file does, but not in silence. No mark keeps a program from being
+    /// laid out.
+    fn doubt_mark(&mut self, path: &Path, decoded: &Decoded) {
+        if !is_marked(decoded.encoding) {
+            return;
+        }
+        let text = decoded.text.as_str().into();
+        let Some(mut mark) = byte_order_mark(decoded.encoding, path, &text, &self.station) else { return };
+        mark.severity = mark.severity.max(Severity::Warning);
+        let mut sources = Sources::default();
+        sources.add(path.display().to_string(), text);
+        self.renderer.forget();
+        self.renderer.show(&sources, &mark);
     }
 
     /// Instances of an exchange file in order; with faults in it no number is changed.

@@ -14,7 +14,7 @@ use gr_interp::{End, Finding, Interp, Setup, ToolTable};
 use gr_spec::{Dialect, Rs274, fill, rs274};
 use gr_text::{FileId, code, decode, decode_as_linuxcnc};
 
-use crate::sources::is_latin1;
+use crate::sources::{is_latin1, read_bytes};
 
 /// The tools that the real command reads when no table is named, from LinuxCNC's sample configuration.
 const DEFAULT_TOOLS: &str = "T1 P1 D0.125000 Z+0.511000\nT2 P2 D0.062500 Z+0.100000\nT3 P3 D0.201000 Z+1.273000\nT99999 P123 Z+0.100000\n";
@@ -150,9 +150,9 @@ fn with_value(name: &str, letter: char, value: OsString, choice: &mut Choice) ->
         'n' => {
             let number: String = value.to_string_lossy().trim().chars().take_while(char::is_ascii_digit).collect();
             choice.on_error = match number.trim_start_matches('0') {
-                "" => OnError::Continue,
                 "1" => OnError::Mdi,
-                _ => OnError::Stop,
+                "2" => OnError::Stop,
+                _ => OnError::Continue,
             };
         }
         _ => {} // -l: there is no log
@@ -319,7 +319,7 @@ fn execute(choice: &Choice) -> Result<u8, Quit> {
         }
         Some(Ok(())) => {
             if let Err(fault) = run.open(FileId(0)) {
-                let line: String = run.line_text().chars().take(254).collect();
+                let line: String = run.line_text().chars().take(254).take_while(|c| *c != '\0').collect();
                 report_fault(&fault.rs_text().unwrap_or_default(), &line, &[]);
                 return Err(Quit(1));
             }
@@ -357,11 +357,16 @@ fn program(choice: &Choice) -> Program {
     let Some(name) = choice.files.first() else { return none(None) };
     let path = Path::new(name);
     let name = path.display().to_string();
-    match std::fs::read(path) {
+    match read_bytes(path) {
         Ok(bytes) => {
             let decoded = decode_as_linuxcnc(bytes);
             let latin1 = is_latin1(&decoded);
             Program { name, text: without_lone_returns(decoded.text), latin1, open: Some(Ok(())) }
+        }
+        Err((code::FILE_TOO_BIG, args)) => {
+            // The real command has no such limit; nothing short of its words would tell so much.
+            let args: Vec<String> = std::iter::once(name).chain(args).collect();
+            none(Some(Err(fill(code::FILE_TOO_BIG.def().message, &args))))
         }
         Err(_) => {
             let text = if path.is_dir() { rs274::CLI_EMPTY_FILE } else { rs274::CLI_OPEN_FAILED };
@@ -421,6 +426,10 @@ fn setup(choice: &Choice, tools: ToolTable) -> (Setup, Vec<String>) {
         match std::fs::read(path) {
             Ok(bytes) => {
                 let (ini, found) = gr_interp::read_ini(&decode(bytes).text, FileId(0), path.parent(), None);
+                for key in gr_interp::wrong_arc_tolerances(&ini) {
+                    say(rs274::CLI_INI_TOLERANCE, &[key.to_string()]);
+                    eprintln!();
+                }
                 setup.ini = ini;
                 refused.extend(found.into_iter().filter(|d| d.code == code::INI_REMAP).map(|d| d.message));
                 let missing = gr_interp::remaps_without_file(&setup, &|p| p.is_file());
