@@ -348,7 +348,7 @@ pub(crate) fn shape_of(scan: &Scan, text: &str, setup: &gr_interp::Setup) -> Sha
                 b'q' if word.form == Form::Literal && words.iter().any(|w| w.letter == b'g' && (70.0..73.0).contains(&w.value)) => {
                     labels.push(Label { name: word.value.to_string().into(), line: n, kind: LabelKind::Call });
                 }
-                b'g' if macros && word.form == Form::Literal && word.value == 65.0 => {
+                b'g' if macros && word.form == Form::Literal && matches!(word.value, 65.0 | 66.0) => {
                     shape.control = true;
                     if let Some(p) = words.iter().find(|w| w.letter == b'p' && w.form == Form::Literal) {
                         labels.push(Label { name: (p.value as i64).to_string().into(), line: n, kind: LabelKind::Call });

@@ -47,6 +47,8 @@ pub struct Block {
     pub motion: i16,
     /// Fanuc: G68 or G69 (times ten), −1 = none.
     pub turning: i16,
+    /// Fanuc: G67.
+    pub ends_modal: bool,
     /// Steps of execution that are done already (a remapped block is executed in several goes).
     pub(crate) done: u32,
     /// Steps of execution that a remap takes over.
@@ -65,6 +67,7 @@ impl Default for Block {
             user_m: -1,
             motion: -1,
             turning: -1,
+            ends_modal: false,
             done: 0,
             remapped: 0,
         }
@@ -113,6 +116,7 @@ impl Block {
         }
         self.motion = -1;
         self.turning = -1;
+        self.ends_modal = false;
         self.done = 0;
         self.remapped = 0;
     }

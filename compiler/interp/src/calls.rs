@@ -50,6 +50,8 @@ pub(crate) struct Level {
     pub kept: Option<Box<[f64; ARGS]>>,
     /// Fanuc: the local variables while a macro that this level called has its own.
     pub locals: Option<Box<crate::macro_call::Locals>>,
+    /// Fanuc: this level is a macro that a movement called (G66).
+    pub modal: Option<crate::macro_call::ModalCall>,
     pub m98_left: i32,
     pub saved: Option<Box<SavedModes>>,
     pub saved_valid: bool,
@@ -58,7 +60,7 @@ pub(crate) struct Level {
 
 impl Level {
     pub fn new(sub: u32) -> Level {
-        Level { sub, kind: CallKind::None, ret: None, kept: None, locals: None, m98_left: -1, saved: None, saved_valid: false, restore: false }
+        Level { sub, kind: CallKind::None, ret: None, kept: None, locals: None, modal: None, m98_left: -1, saved: None, saved_valid: false, restore: false }
     }
 }
 
@@ -230,6 +232,9 @@ impl<S: Sink> Interp<'_, S> {
         if ret.params {
             self.take_back_params(level - 1);
         }
+        if let Some(call) = left.modal {
+            self.leave_modal(call);
+        }
         self.take_back_variables(level - 1);
         self.place = ret.place;
         self.next = ret.next;
@@ -246,7 +251,11 @@ impl<S: Sink> Interp<'_, S> {
                 self.restore_modes(saved).map(drop)?;
             }
         }
-        if left.kind == CallKind::Remap { self.remap_finished() } else { Ok(()) }
+        match left.modal {
+            Some(call) => self.repeat_modal(call),
+            None if left.kind == CallKind::Remap => self.remap_finished(),
+            None => Ok(()),
+        }
     }
 
     /// #1 … #30 as they were before the last call with arguments from this level, zeros if there was none.

@@ -64,6 +64,7 @@ impl<'a, S: Sink> Interp<'a, S> {
             && self.skip.is_none()
             && self.loops.is_empty()
             && self.remaps.is_empty()
+            && self.modal_macros.is_empty()
             && !self.defining_sub
             && self.sub_name.is_none()
             && self.place.frame == FrameId::MAIN

@@ -40,6 +40,10 @@ impl<S: Sink> Interp<'_, S> {
 
     /// Codes with no place among those of LinuxCNC: true when it is one.
     pub(crate) fn take_fanuc_g(&mut self, n: i32) -> bool {
+        if n == 670 && self.setup.dialect.code("G67").is_some() {
+            self.block.ends_modal = true;
+            return true;
+        }
         let turns = matches!(n, 680 | 690) && self.setup.dialect.code(if n == 680 { "G68" } else { "G69" }).is_some();
         let known = turns || n == 500 && is_lathe(self.setup.dialect);
         if known {
@@ -50,6 +54,9 @@ impl<S: Sink> Interp<'_, S> {
 
     /// Before the block is looked at as a whole: words that mean something else here become those that it knows.
     pub(crate) fn fanuc_words(&mut self) -> Res {
+        if self.block.ends_modal {
+            self.end_modal()?;
+        }
         match self.block.turning {
             -1 => {}
             500 => return self.clamp_spindle(),

@@ -64,7 +64,8 @@ impl<S: Sink> Interp<'_, S> {
         self.blocks += 1;
         self.check_budgets()?;
         self.begun = self.emitted;
-        self.execute_block()
+        self.execute_block()?;
+        if fanuc && !self.modal_macros.is_empty() { self.call_modal() } else { Ok(()) }
     }
 
     /// Budgets end what goes around and around. A program that comes on line by line may be as long as it likes.

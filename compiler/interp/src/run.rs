@@ -160,6 +160,8 @@ pub struct Interp<'a, S: Sink> {
     pub(crate) loops: Vec<Loop>,
     pub(crate) remaps: Vec<Remapped>,
     pub(crate) m98: bool,
+    /// Fanuc: macros that movements call (G66), the last one first in turn.
+    pub(crate) modal_macros: Vec<crate::macro_call::ModalMacro>,
     /// A contour is being read: U and W are words there on every machine.
     pub(crate) in_contour: bool,
     // Totals.
@@ -258,6 +260,7 @@ impl<'a, S: Sink> Interp<'a, S> {
             loops: Vec::new(),
             remaps: Vec::new(),
             m98: false,
+            modal_macros: Vec::new(),
             in_contour: false,
             frames: 0,
             blocks: 0,
@@ -516,6 +519,7 @@ impl<'a, S: Sink> Interp<'a, S> {
         }
         self.place.frame = FrameId::MAIN;
         self.remaps.clear();
+        self.modal_macros.clear();
         (self.sub_name, self.came_back) = (None, false);
         self.defining_sub = false;
         self.skip = None;

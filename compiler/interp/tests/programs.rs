@@ -273,7 +273,7 @@ fn every_code_of_the_fanuc_lists_is_known() {
                 }
             }
         }
-        for code in ["G27", "G66", "G51"] {
+        for code in ["G27", "G34", "G51"] {
             assert_eq!(refused.contains(&code), Dialect::find(id).unwrap().code(code).is_some(), "{id}: {code}");
         }
         for code in ["G0", "G1", "G2", "G4", "G28", "G54", "M3", "M30", "M98"] {
@@ -489,7 +489,86 @@ M99 P50
         ("G65 P1 L0\nM30\n", code::WORD_MISSING),
         ("G65 P8\nM30\n", code::SUB_NOT_FOUND),
         ("O1\nM98 P2\nM30\nO2\nG65 P2\nM99\n", code::SUB_LIMIT),
-        ("G66 P1\nM30\n", code::CODE_NOT_CARRIED_OUT),
+    ] {
+        let (_, outcome) = run_fanuc("fanuc-mill", text);
+        assert_eq!(outcome.findings[0].fault.code, wanted, "{text}: {:?}", outcome.findings);
+    }
+}
+
+/// The same manuals, modal call (G66): every movement calls, in a macro that is called the G66 before; the arguments are set
+/// once.
+#[test]
+fn fanuc_movements_call_macros() {
+    let text = "\
+O1
+G21 G90 G40 G67
+#1=5.
+G66 P9110 L1 Z-20. R5.
+G0 X20. Y20.
+G4 X1.
+F100.
+X50.
+M98 P7
+G67
+G0 X0 Y#1
+M30
+O7
+Y80.
+M99
+O9110
+G0 Z#18
+Z#26
+Z#18
+#18=[#18+1.]
+M99
+";
+    let (calls, outcome) = run_fanuc("fanuc-mill", text);
+    assert!(outcome.ok(), "{:?}", outcome.findings);
+    let expected = [
+        "rapid 20 20 0", "rapid 20 20 5", "rapid 20 20 -20", "rapid 20 20 5", //
+        "rapid 50 20 5", "rapid 50 20 6", "rapid 50 20 -20", "rapid 50 20 6", //
+        "rapid 50 80 6", "rapid 50 80 7", "rapid 50 80 -20", "rapid 50 80 7", //
+        "rapid 0 5 7",
+    ];
+    assert_eq!(moves_of(&calls), expected);
+    // The manual's order of two macros, one inside of the other: (1-1) (2-1) (1-2) (3-1) (2-1) (3-2) (2-1) (1-3).
+    let text = "\
+O1
+G21 G91
+G66 P9100
+G0 Z1.
+G66 P9200 L2
+Z15.
+G67
+G67
+Z-25.
+M30
+O9100
+X50.
+M99
+O9200
+Z60.
+Z70.
+M99
+";
+    let (calls, outcome) = run_fanuc("fanuc-mill", text);
+    assert!(outcome.ok(), "{:?}", outcome.findings);
+    let once = |x: f64, z: f64| [(x, z + 60.0), (x + 50.0, z + 60.0), (x + 50.0, z + 130.0), (x + 100.0, z + 130.0)];
+    let mut points = vec![(0.0, 1.0), (50.0, 1.0), (50.0, 16.0)];
+    points.extend(once(50.0, 16.0));
+    points.extend(once(150.0, 146.0));
+    points.push((250.0, 251.0));
+    let expected: Vec<String> = points.iter().map(|(x, z)| format!("rapid {x} 0 {z}")).collect();
+    assert_eq!(moves_of(&calls), expected);
+    for (text, wanted) in [
+        ("G66 A1.\nM30\n", code::WORD_MISSING),
+        ("G0 Z5.\nG66 P1\nG81 X1. Z-1. R1. F100.\nM30\n", code::CODE_NOT_CARRIED_OUT),
+        ("G66 P1\nG28 X1.\nM30\n", code::CODE_NOT_CARRIED_OUT),
+        ("G66 P1\nG67 X1.\nM30\n", code::CODE_NOT_CARRIED_OUT),
+        ("G66 P1\nG0 X1.\nM30\nO1\nG67\nM99\n", code::CODE_NOT_CARRIED_OUT),
+        ("G66 P1\nG66 P1\nG66 P1\nG66 P1\nG66 P1\nM30\n", code::SUB_LIMIT),
+        ("G66 P8\nG0 X1.\nM30\n", code::SUB_NOT_FOUND),
+        ("G66 G65 P8\nG0 X1.\nM30\n", code::MACRO_MALFORMED),
     ] {
         let (_, outcome) = run_fanuc("fanuc-mill", text);
         assert_eq!(outcome.findings[0].fault.code, wanted, "{text}: {:?}", outcome.findings);
