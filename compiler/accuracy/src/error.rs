@@ -5,12 +5,14 @@ use gr_machine::math::{V3, add, cross, dot, norm, scale, sub};
 use gr_machine::{Chain, KinematicsError, Machine, ParameterKind, TwoLegs, differential, parameter_columns};
 
 /// How far each joint and each number of the geometry may be off, mm or rad.
-#[derive(Clone, PartialEq, Debug)]
+#[derive(Clone, PartialEq, Debug, Default)]
 pub struct Budget {
     /// Of the joints, plus or minus; none = the machine file doesn't say.
     pub joints: Option<Vec<f64>>,
     /// Of the geometry, plus or minus, in the order of `Machine::parameters`; none = the file says nothing of it.
     pub geometry: Option<Vec<f64>>,
+    /// Deviations of the geometry with their signs, in place of the worst pattern of `geometry`.
+    pub known: Option<Vec<f64>>,
     /// What the file does not say and no grade covers: names of joints and parameters, taken as exact.
     pub unsaid: Vec<String>,
 }
@@ -65,9 +67,27 @@ impl Budget {
         if !said_of_any {
             // A grade says nothing of a machine whose numbers are all angles.
             unsaid.truncate(joints_unsaid);
-            return Budget { joints, geometry: None, unsaid };
+            return Budget { joints, geometry: None, known: None, unsaid };
         }
-        Budget { joints, geometry, unsaid }
+        Budget { joints, geometry, known: None, unsaid }
+    }
+
+    /// With deviations of the geometry that are known, in the order of `Machine::parameters`: they go before tolerances.
+    pub fn with_known(self, machine: &Machine, deviations: Option<Vec<f64>>) -> Budget {
+        let Some(known) = deviations else { return self };
+        let joint = |name: &String| machine.joints.iter().any(|j| j.name == *name);
+        let unsaid = self.unsaid.into_iter().filter(joint).collect();
+        Budget { joints: self.joints, geometry: None, known: Some(known), unsaid }
+    }
+
+    /// Whether anything is known of the geometry's error.
+    pub fn tells_geometry(&self) -> bool {
+        self.geometry.is_some() || self.known.is_some()
+    }
+
+    /// Whether anything is known of joints or geometry.
+    pub fn tells_any(&self) -> bool {
+        self.joints.is_some() || self.tells_geometry()
     }
 }
 
@@ -160,6 +180,13 @@ impl Spread {
         out.typical = libm::sqrt(out.rss.iter().sum());
         out.rss = out.rss.map(libm::sqrt);
         out
+    }
+
+    /// By causes whose sizes and signs are known: one movement.
+    pub fn known(columns: &[V3], sizes: &[f64]) -> Spread {
+        let moved = columns.iter().zip(sizes).fold([0.0; 3], |sum, (c, s)| add(sum, scale(*c, *s)));
+        let each = moved.map(f64::abs);
+        Spread { worst: each, rss: each, longest: norm(moved), typical: norm(moved) }
     }
 }
 
@@ -291,7 +318,10 @@ impl Errors {
     pub fn new(at: &Sensitivity, budget: &Budget, force: Option<V3>) -> Errors {
         Errors {
             kinematic: budget.joints.as_ref().map(|b| Spread::new(&at.joints, b)),
-            geometric: budget.geometry.as_ref().map(|b| Spread::new(&at.geometry, b)),
+            geometric: match &budget.known {
+                Some(d) => Some(Spread::known(&at.geometry, d)),
+                None => budget.geometry.as_ref().map(|b| Spread::new(&at.geometry, b)),
+            },
             elastic: force.and_then(|f| at.deflection(f)),
         }
     }

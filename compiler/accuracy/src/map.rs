@@ -151,8 +151,6 @@ pub struct Request {
     pub force: V3,
     /// Signs of the joint errors; none = the worst pattern.
     pub signs: Option<Vec<f64>>,
-    /// Deviations of the geometry with their signs, mm or rad; none = the worst pattern of the budget.
-    pub deviations: Option<Vec<f64>>,
 }
 
 /// A map: row by row from the bottom; not a number = out of reach.
@@ -248,15 +246,21 @@ impl Map {
             ..s
         })
     }
-    /// As a table: one row per node within reach.
-    pub fn csv(&self) -> String {
+    /// As a table: one row per node within reach; what must be known to read it stands in the head of the last column.
+    pub fn csv(&self, notes: &[String]) -> String {
         use std::fmt::Write as _;
         let (a, b) = self.plane.axes();
         let unit = self.quantity.unit();
         let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
         let name = |i: usize| ["x", "y", "z"][i];
-        let doubt = if self.elastic { " (deflection: to a factor of 2 at best)" } else { "" };
-        let mut out = format!("{} mm,{} mm,{}{unit}{doubt}\n", name(a), name(b), self.quantity.name());
+        let mut notes: Vec<&str> = notes.iter().map(String::as_str).collect();
+        if self.elastic {
+            notes.push("deflection: to a factor of 2 at best");
+        }
+        let notes = if notes.is_empty() { String::new() } else { format!(" ({})", notes.join("; ")) };
+        let value = format!("{}{unit}{notes}", self.quantity.name());
+        let value = if value.contains([',', '"']) { format!("\"{}\"", value.replace('"', "\"\"")) } else { value };
+        let mut out = format!("{} mm,{} mm,{value}\n", name(a), name(b));
         for (n, v) in self.values.iter().enumerate().filter(|(_, v)| !v.is_nan()) {
             let [x, y] = self.place(n % self.size.0, n / self.size.0);
             let _ = writeln!(out, "{x:.4},{y:.4},{v}");
@@ -351,6 +355,15 @@ impl<'a> Probe<'a> {
             let _ = i;
         }
         best.map(|(_, q)| q)
+    }
+
+    /// Looks whether so many places spread over the reach can be reached: to tell how long that takes.
+    pub fn sample_reach(&self, count: usize) {
+        let extent = self.extent();
+        for n in 1..=u32::try_from(count).unwrap_or(u32::MAX) {
+            let at = [(0, 2), (1, 3), (2, 5)].map(|(i, base): (usize, u32)| extent[i].0 + (extent[i].1 - extent[i].0) * halton(n, base));
+            self.reaches(at);
+        }
     }
 
     /// Whether the tool can be put there.
@@ -539,7 +552,7 @@ impl<'a> Probe<'a> {
                 }
                 (_, sizes) => um * worst(&s.joints, sizes.as_ref()?, part),
             },
-            Quantity::Geometric(part) => match &request.deviations {
+            Quantity::Geometric(part) => match &budget.known {
                 Some(d) => um * fixed(&s.geometry, d, part),
                 None => um * worst(&s.geometry, budget.geometry.as_ref()?, part),
             },
@@ -550,12 +563,15 @@ impl<'a> Probe<'a> {
             Quantity::Total => {
                 let elastic = self.yields(&s, request.force);
                 let of = |c: &[V3], b: &Option<Vec<f64>>| b.as_ref().map_or(0.0, |b| worst(c, b, Part::Length));
-                um * (of(&s.joints, &budget.joints) + of(&s.geometry, &budget.geometry) + elastic)
+                let known = budget.known.as_ref().map_or(0.0, |d| fixed(&s.geometry, d, Part::Length));
+                um * (of(&s.joints, &budget.joints) + of(&s.geometry, &budget.geometry) + known + elastic)
             }
             Quantity::TotalRss => {
                 let elastic = self.yields(&s, request.force);
                 let of = |c: &[V3], b: &Option<Vec<f64>>| b.as_ref().map_or(0.0, |b| typical(c, b));
-                um * libm::hypot(libm::hypot(of(&s.joints, &budget.joints), of(&s.geometry, &budget.geometry)), elastic)
+                let known = budget.known.as_ref().map_or(0.0, |d| fixed(&s.geometry, d, Part::Length));
+                let geometry = of(&s.geometry, &budget.geometry).max(known);
+                um * libm::hypot(libm::hypot(of(&s.joints, &budget.joints), geometry), elastic)
             }
             Quantity::Stiffness => {
                 let Some(c) = s.compliance() else { return Some(f64::NAN) };
@@ -592,7 +608,7 @@ fn longest_lever(machine: &Machine) -> f64 {
 }
 
 /// Limits of a joint; half a turn or half a metre where it has none.
-fn limits(j: &gr_machine::Joint) -> (f64, f64) {
+pub(crate) fn limits(j: &gr_machine::Joint) -> (f64, f64) {
     let wide = if j.kind == JointKind::Revolute { std::f64::consts::PI } else { 500.0 };
     (j.min.unwrap_or(-wide), j.max.unwrap_or(wide))
 }
@@ -730,11 +746,11 @@ fn map_of(
     out
 }
 
-/// Volume of the work space, mm³, by layers of a grid.
-pub fn volume(probe: &Probe<'_>, layers: usize, nodes: usize) -> f64 {
+/// Volume of the work space, mm³, by layers of a grid. `progress` hears how many layers of how many are done.
+pub fn volume(probe: &Probe<'_>, layers: usize, nodes: usize, progress: &dyn Fn(usize, usize)) -> f64 {
     let extent = probe.extent();
     let height = (extent[2].1 - extent[2].0) / layers.max(1) as f64;
-    let budget = Budget { joints: None, geometry: None, unsaid: Vec::new() };
+    let budget = Budget::default();
     (0..layers)
         .map(|i| {
             let request = Request {
@@ -744,9 +760,10 @@ pub fn volume(probe: &Probe<'_>, layers: usize, nodes: usize) -> f64 {
                 window: None,
                 force: [0.0; 3],
                 signs: None,
-                deviations: None,
             };
-            map_of(probe, &budget, &request, &extent, &|_, _| {}).summary().map_or(0.0, |s| s.area) * height
+            let area = map_of(probe, &budget, &request, &extent, &|_, _| {}).summary().map_or(0.0, |s| s.area);
+            progress(i + 1, layers);
+            area * height
         })
         .sum()
 }

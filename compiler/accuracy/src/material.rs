@@ -164,7 +164,8 @@ impl Bore {
 }
 
 impl Force {
-    /// The force on the tool as a vector: against the motion, for a feed direction and the tool axis (unit vectors).
+    /// The force on the tool as a vector: against the motion, for a feed direction and the tool axis (unit vectors) from the
+    /// tip to the spindle, the tool turning clockwise as seen from there (M3); with the axis turned round it turns the other way.
     /// None for a feed along the axis: the law is that of milling across it, and a drill's thrust is [`Bore`]'s.
     pub fn vector(&self, feed: [f64; 3], axis: [f64; 3]) -> Option<[f64; 3]> {
         use gr_machine::math::{add, cross, dot, norm, scale, sub};

@@ -1,10 +1,17 @@
-//! Where on the machine a part is best put.
+//! Where on the machine a part is best put. What a program asks of the reach is a matter of [`Arm`] and [`Mill`]; here is the
+//! search: places on a grid, the most promising first, each refined.
 
-use crate::clearance::{Lattice, border};
-use crate::error::{Budget, Errors};
+mod arm;
+mod mill;
+
+pub use arm::{Arm, Part};
+pub use mill::Mill;
+
+use crate::error::Budget;
 use crate::map::Probe;
-use gr_machine::Chain;
-use gr_machine::math::{M3, V3, add, dot, sub};
+use gr_machine::math::{V3, dot};
+use std::cmp::Ordering;
+use std::collections::BinaryHeap;
 
 /// A place for the part and what it is worth.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -13,9 +20,11 @@ pub struct Found {
     pub position: V3,
     /// How far the part may be moved any way, mm: at every place up to there all its points are within reach.
     pub margin: f64,
-    /// The places that were looked at for the margin are so far apart, mm: a hole in the reach that is narrower is not seen.
+    /// The places that were looked at for the margin are so far apart, mm: a hole in the reach that is narrower is not seen;
+    /// 0 = the margin is exact.
     pub apart: f64,
-    /// The greatest error on the part (rule sum), mm; none = the machine file has no accuracy data.
+    /// The greatest error of the cuts (rule sum), mm, at the points that are looked at; none = the machine file has no accuracy
+    /// data. A report says it along the whole path.
     pub error: Option<f64>,
 }
 
@@ -28,96 +37,40 @@ pub enum Aim {
     Error,
 }
 
-/// What one tool does of a program.
-pub struct Part<'a> {
-    /// The machine with that tool.
-    pub probe: Probe<'a>,
-    /// Points of the tool, from the part's origin in the directions of the base, mm.
-    pub points: Vec<V3>,
+/// How many points of a part are looked at.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Look {
+    /// One or a few, for a bound.
+    Glance,
+    /// Those that tell most.
+    Some,
+    /// Every one.
+    All,
 }
 
-impl Part<'_> {
-    fn fits(&self, at: V3) -> bool {
-        self.points.iter().all(|p| self.probe.reaches(add(at, *p)))
-    }
-}
-
-/// Paths that the flange makes in the same direction, whatever the tools' lengths: what is free about one is so for all.
-struct Group<'a> {
-    probe: &'a Probe<'a>,
-    /// From the tool point to the flange with the tool of that probe.
-    offset: V3,
-    /// Places of the flange, from the part's origin; first those that tell most.
-    points: Vec<V3>,
-    lattice: Lattice,
-    /// Distance of each node from what is out of reach, mm.
-    free: Vec<f32>,
-}
-
-/// Nodes over the work space and about the path: so many as take about a second; a search at each of them takes longer.
-fn nodes(probe: &Probe<'_>) -> usize {
-    if matches!(probe.machine().chain, Chain::Serial(_)) { 8_000 } else { 150_000 }
-}
-
-impl Group<'_> {
-    fn of<'a>(parts: &'a [Part<'_>], progress: &dyn Fn(usize, usize)) -> Vec<Group<'a>> {
-        let mut turns: Vec<(M3, &'a Probe<'a>, V3, Vec<V3>)> = Vec::new();
-        for part in parts {
-            let flange = part.probe.flange([0.0; 3]);
-            let points = part.points.iter().map(|p| add(*p, flange.position));
-            match turns.iter_mut().find(|t| t.0 == flange.turn) {
-                Some(t) => t.3.extend(points),
-                None => turns.push((flange.turn, &part.probe, flange.position, points.collect())),
-            }
-        }
-        let count = turns.len();
-        let one = |(i, (_, probe, offset, points)): (usize, (M3, &'a Probe<'a>, V3, Vec<V3>))| {
-            let reaches = |f: V3| probe.reaches(sub(f, offset));
-            let lattice = Lattice::new(probe.extent(), nodes(probe), &reaches, &|done, of| progress(i * of + done, count * of));
-            let (mut first, free) = (telling(&points), lattice.free());
-            first.extend(points);
-            Group { probe, offset, points: first, lattice, free }
-        };
-        turns.into_iter().enumerate().map(one).collect()
-    }
-
-    /// How far the part may be moved any way from there, and how finely that was looked at, mm.
-    fn margin(&self, at: V3, about: f64) -> (f64, f64) {
-        let points: Vec<V3> = self.points.iter().map(|p| add(at, *p)).collect();
-        let most = about + 2.0 * self.lattice.step();
-        let most = self.probe.extent().map(|(low, high)| if high > low { most } else { 0.0 });
-        border(&points, most, nodes(self.probe), &|f| self.probe.reaches(sub(f, self.offset)))
-    }
-}
-
-/// Whether all points are within reach when the part's origin is there.
-fn fits(parts: &[Part<'_>], at: V3) -> bool {
-    parts.iter().all(|part| part.fits(at))
-}
-
-fn error<'a>(parts: &[Part<'_>], budget: &Budget, points: impl Iterator<Item = &'a [V3]>, at: V3) -> Option<f64> {
-    if budget.joints.is_none() && budget.geometry.is_none() {
-        return None;
-    }
-    let mut most = 0.0f64;
-    for (part, points) in parts.iter().zip(points) {
-        for p in points {
-            let s = part.probe.sensitivity(add(at, *p), budget.geometry.is_some())?;
-            most = most.max(Errors::new(&s, budget, None).sum());
-        }
-    }
-    Some(most)
+/// What a program asks of the reach of a machine, for every place of the part's origin.
+pub trait Reach: Sync {
+    /// Where the origin can be at most: least and greatest X, Y and Z; none when it fits nowhere.
+    fn room(&self) -> Option<[(f64, f64); 3]>;
+    /// About how far the part is free there, mm, by the points looked at; none when that is no more than `least`.
+    fn free(&self, at: V3, look: Look, least: f64) -> Option<f64>;
+    /// Whether all is within reach there.
+    fn fits(&self, at: V3) -> bool;
+    /// How far the part may be moved any way from a place that fits, and how finely that was looked at, mm; it is about `about`.
+    fn margin(&self, at: V3, about: f64) -> (f64, f64);
+    /// The greatest error there, mm, of the points looked at; none when one is out of reach or it is more than `most`.
+    fn error(&self, budget: &Budget, at: V3, look: Look, most: f64) -> Option<f64>;
 }
 
 /// So many points of a part are looked at first, and for the error along the search.
 const FIRST: usize = 60;
 
-/// The points that stand out along the axes and across them, and some of the rest.
-fn telling(points: &[V3]) -> Vec<V3> {
-    let mut out: Vec<V3> = points.iter().step_by(points.len().div_ceil(FIRST).max(1)).copied().collect();
+/// Indices of the points that stand out along the axes and across them, and of some of the rest.
+fn telling(count: usize, point: impl Fn(usize) -> V3) -> Vec<usize> {
+    let mut out: Vec<usize> = (0..count).step_by(count.div_ceil(FIRST).max(1)).collect();
     for way in 0..27 {
         let u = [way % 3, way / 3 % 3, way / 9].map(|v| f64::from(v) - 1.0);
-        out.extend(points.iter().max_by(|a, b| dot(**a, u).total_cmp(&dot(**b, u))));
+        out.extend((0..count).max_by(|a, b| dot(point(*a), u).total_cmp(&dot(point(*b), u))));
     }
     out
 }
@@ -125,7 +78,29 @@ fn telling(points: &[V3]) -> Vec<V3> {
 /// Places along each side of the search's grid.
 const GRID: usize = 24;
 
-/// The best place so far.
+/// A place of the grid and what it is worth: exactly, or at most.
+#[derive(Clone, Copy, PartialEq)]
+struct Candidate {
+    worth: f64,
+    node: usize,
+    exact: bool,
+}
+
+impl Eq for Candidate {}
+
+impl Ord for Candidate {
+    fn cmp(&self, other: &Candidate) -> Ordering {
+        self.worth.total_cmp(&other.worth).then(other.node.cmp(&self.node))
+    }
+}
+
+impl PartialOrd for Candidate {
+    fn partial_cmp(&self, other: &Candidate) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+/// A place that is worth something.
 #[derive(Clone, Copy)]
 struct Best {
     worth: f64,
@@ -135,98 +110,152 @@ struct Best {
 }
 
 struct Search<'a> {
-    parts: &'a [Part<'a>],
+    reach: &'a dyn Reach,
     budget: &'a Budget,
-    groups: Vec<Group<'a>>,
-    /// Of each part, for its error; none = the margin counts.
-    few: Option<Vec<Vec<V3>>>,
-    /// The longest side of the reach, mm.
-    most: f64,
-    best: Option<Best>,
+    by_error: bool,
+    room: [(f64, f64); 3],
 }
 
 impl Search<'_> {
-    /// About how far the part is free there; none when that is no more than `least`.
-    fn free(&self, at: V3, least: f64) -> Option<f64> {
-        let mut out = self.most;
-        for group in &self.groups {
-            for p in &group.points {
-                out = out.min(group.lattice.between(&group.free, add(at, *p)));
-                if out <= least {
-                    return None;
-                }
-            }
-        }
-        Some(out)
+    fn count(&self) -> [usize; 3] {
+        self.room.map(|(low, high)| if high > low { GRID } else { 1 })
     }
 
-    fn consider(&mut self, at: V3) {
-        let least = if self.few.is_some() { 0.0 } else { self.best.map_or(0.0, |b| b.worth) };
-        let Some(free) = self.free(at, least) else { return };
-        let worth = match &self.few {
-            None => free,
-            Some(few) => match error(self.parts, self.budget, few.iter().map(Vec::as_slice), at) {
-                Some(e) => -e,
-                None => return,
-            },
+    fn step(&self) -> V3 {
+        self.room.map(|(low, high)| (high - low) / GRID as f64)
+    }
+
+    fn node(&self, n: usize) -> V3 {
+        let [x, y, _] = self.count();
+        let at = [n % x, n / x % y, n / (x * y)];
+        [0, 1, 2]
+            .map(|i| self.room[i].0 + (self.room[i].1 - self.room[i].0) * (at[i] as f64 + 0.5) / self.count()[i] as f64)
+    }
+
+    /// No less than what a place is worth.
+    fn bound(&self, at: V3) -> Option<f64> {
+        let free = self.reach.free(at, Look::Some, 0.0)?;
+        if !self.by_error {
+            return Some(free);
+        }
+        self.reach.error(self.budget, at, Look::Glance, f64::INFINITY).map(|e| -e)
+    }
+
+    /// What a place is worth, where that is more than `least`.
+    fn worth(&self, at: V3, least: f64) -> Option<Best> {
+        if !self.by_error {
+            let free = self.reach.free(at, Look::All, least.max(0.0))?;
+            return Some(Best { worth: free, at, free });
+        }
+        let free = self.reach.free(at, Look::All, 0.0)?;
+        let worth = -self.reach.error(self.budget, at, Look::Some, -least)?;
+        (worth > least).then_some(Best { worth, at, free })
+    }
+
+    /// All places of the grid with what they are worth at most, on all cores.
+    fn bounds(&self, progress: &dyn Fn(usize, usize)) -> BinaryHeap<Candidate> {
+        let all: usize = self.count().iter().product();
+        let threads = std::thread::available_parallelism().map_or(1, usize::from).min(16);
+        let share = all.div_ceil(GRID).max(1);
+        let look = |from: usize| -> Vec<Candidate> {
+            let one = |node| self.bound(self.node(node)).map(|worth| Candidate { worth, node, exact: false });
+            (from..(from + share).min(all)).filter_map(one).collect()
         };
-        if self.best.is_none_or(|b| worth > b.worth + 1e-9) && fits(self.parts, at) {
-            self.best = Some(Best { worth, at, free });
+        let starts: Vec<usize> = (0..all).step_by(share).collect();
+        let mut out = BinaryHeap::new();
+        for (n, some) in starts.chunks(threads).enumerate() {
+            let found: Vec<Vec<Candidate>> = std::thread::scope(|s| {
+                let running: Vec<_> = some.iter().map(|from| s.spawn(|| look(*from))).collect();
+                running.into_iter().filter_map(|r| r.join().ok()).collect()
+            });
+            out.extend(found.into_iter().flatten());
+            progress(((n + 1) * threads).min(starts.len()), starts.len());
         }
+        out
     }
 
-    /// Places about the best one, nearer and nearer to it.
-    fn refine(&mut self, mut step: V3) {
+    /// Places about a good one, nearer and nearer to the best of them.
+    fn refined(&self, from: Best) -> Best {
+        let mut best = from;
+        let mut step = self.step().map(|s| s / 2.0);
         for _ in 0..24 {
-            let Some(around) = self.best else { return };
+            let around = best.at;
             for way in 0..27 {
                 let by = [way % 3, way / 3 % 3, way / 9].map(|v| f64::from(v) - 1.0);
-                self.consider([0, 1, 2].map(|i| around.at[i] + by[i] * step[i]));
+                let at = [0, 1, 2].map(|i| around[i] + by[i] * step[i]);
+                if let Some(better) = self.worth(at, best.worth + 1e-9).filter(|_| self.reach.fits(at)) {
+                    best = better;
+                }
             }
-            if self.best.is_none_or(|b| b.at == around.at) {
+            if best.at == around {
                 step = step.map(|s| s / 2.0);
             }
         }
+        best
     }
 }
 
-/// Where the part's origin may be so that its box is within that of the reach: least and greatest.
-fn room(parts: &[Part<'_>], groups: &[Group<'_>]) -> Option<[(f64, f64); 3]> {
-    let extent = parts.first()?.probe.extent();
-    Some([0, 1, 2].map(|i| {
-        let ends = groups.iter().flat_map(|g| &g.points).fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), p| (a.min(p[i]), b.max(p[i])));
-        let (low, high) = (extent[i].0 - ends.0, extent[i].1 - ends.1);
-        if low <= high { (low, high) } else { ((low + high) / 2.0, (low + high) / 2.0) }
-    }))
+/// A place as it is told, in thousandths of a mm, where the part still fits so.
+fn told(at: V3, reach: &dyn Reach) -> V3 {
+    let round = at.map(|v| libm::round(v * 1e3) / 1e3 + 0.0);
+    if reach.fits(round) { round } else { at }
 }
 
 /// The best place of a part: looked for on a grid of the work space, by the distance of its points from what is out of
-/// reach, then refined; there every point is looked at. None when the part fits nowhere on the grid.
-pub fn place(parts: &[Part<'_>], budget: &Budget, aim: Aim, progress: &dyn Fn(usize, usize)) -> Option<Found> {
-    let groups = Group::of(parts, &|done, of| progress(done * GRID, of * GRID * 2));
-    let room = room(parts, &groups)?;
-    let by_error = aim == Aim::Error && (budget.joints.is_some() || budget.geometry.is_some());
-    let few = by_error.then(|| parts.iter().map(|p| telling(&p.points)).collect());
-    let most = parts.first()?.probe.extent().iter().map(|(low, high)| high - low).fold(0.0, f64::max);
-    let mut search = Search { parts, budget, groups, few, most, best: None };
-    let at = |n: [usize; 3]| [0, 1, 2].map(|i| room[i].0 + (room[i].1 - room[i].0) * (n[i] as f64 + 0.5) / GRID as f64);
-    for n in 0..GRID {
-        (0..GRID * GRID).for_each(|m| search.consider(at([n, m / GRID, m % GRID])));
-        progress(GRID + n + 1, GRID * 2);
-    }
-    if search.best.is_none() {
-        // Where it only just fits, the lattice is too coarse.
-        let mut all = (0..GRID * GRID * GRID).map(|m| at([m / GRID / GRID, m / GRID % GRID, m % GRID]));
+/// reach or by its error, then refined; there every point is looked at. A place that is not `allowed` is left, and the search
+/// goes on with the next best away from it, at most `tries` times. None that is allowed: the best of those that were not.
+pub fn place(
+    reach: &dyn Reach,
+    budget: &Budget,
+    aim: Aim,
+    tries: usize,
+    allowed: &mut dyn FnMut(V3) -> bool,
+    progress: &dyn Fn(usize, usize),
+) -> Result<Found, Option<V3>> {
+    let room = reach.room().ok_or(None)?;
+    let by_error = aim == Aim::Error && budget.tells_any();
+    let search = Search { reach, budget, by_error, room };
+    let mut heap = search.bounds(progress);
+    if heap.is_empty() {
+        // Where it only just fits, the search is too coarse.
+        let all: usize = search.count().iter().product();
         let worth = if by_error { f64::NEG_INFINITY } else { 0.0 };
-        search.best = all.find(|at| fits(parts, *at)).map(|at| Best { worth, at, free: 0.0 });
+        heap.extend((0..all).find(|n| reach.fits(search.node(*n))).map(|node| Candidate { worth, node, exact: true }));
     }
-    search.refine(room.map(|(a, b)| (b - a) / GRID as f64 / 2.0));
-    let best = search.best?;
-    let margins: Vec<(f64, f64)> = search.groups.iter().map(|g| g.margin(best.at, best.free)).collect();
-    let (margin, apart) = margins.into_iter().fold((f64::INFINITY, 0.0f64), |(m, a), (margin, apart)| (m.min(margin), a.max(apart)));
-    // Never more than there is, the place being told to 0.001 mm too.
-    let margin = (libm::floor((margin - 1e-3) * 10.0) / 10.0).max(0.0);
-    Some(Found { position: best.at, margin, apart, error: error(parts, budget, parts.iter().map(|p| p.points.as_slice()), best.at) })
+    let step = search.step();
+    let mut refused: Vec<V3> = Vec::new();
+    while let Some(candidate) = heap.pop() {
+        let at = search.node(candidate.node);
+        let known = |at: V3| refused.iter().any(|r| (0..3).all(|i| (r[i] - at[i]).abs() <= step[i] * 1.01));
+        if known(at) {
+            continue;
+        }
+        if !candidate.exact {
+            let exact =
+                search.worth(at, f64::NEG_INFINITY).map(|b| Candidate { worth: b.worth, exact: true, ..candidate });
+            heap.extend(exact);
+            continue;
+        }
+        if !reach.fits(at) {
+            continue;
+        }
+        let free = reach.free(at, Look::All, 0.0).unwrap_or(0.0);
+        let here = Best { worth: candidate.worth, at, free };
+        let best = Some(search.refined(here)).filter(|b| !known(b.at)).unwrap_or(here);
+        let position = told(best.at, reach);
+        if allowed(position) {
+            let (margin, apart) = reach.margin(position, best.free);
+            // Never more than there is.
+            let margin = (libm::floor((margin - 1e-3) * 10.0) / 10.0).max(0.0);
+            let error = reach.error(budget, position, Look::All, f64::INFINITY);
+            return Ok(Found { position, margin, apart, error });
+        }
+        refused.push(position);
+        if refused.len() >= tries {
+            break;
+        }
+    }
+    Err(refused.first().copied())
 }
 
 /// A rectangle of stock.
@@ -253,7 +282,8 @@ pub fn rectangle(probe: &Probe<'_>, heights: &[f64]) -> Option<Rectangle> {
     // Half width at each X between the grid lines too: the border is not straight.
     let wide = |x: f64| -> f64 {
         let mut y = 0.0;
-        let reached = |y: f64| heights.iter().all(|z| probe.reaches([x, middle + y, *z]) && probe.reaches([x, middle - y, *z]));
+        let reached =
+            |y: f64| heights.iter().all(|z| probe.reaches([x, middle + y, *z]) && probe.reaches([x, middle - y, *z]));
         while y <= most && reached(y) {
             y += 1.0;
         }

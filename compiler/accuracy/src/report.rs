@@ -3,6 +3,7 @@
 mod mill;
 
 pub use mill::report_of_words;
+pub(crate) use mill::turns_apart;
 
 use crate::error::{Budget, Errors, Sensitivity};
 use crate::material::{Bore, Cut, Material};
@@ -43,6 +44,10 @@ impl CutData {
             point: self.point.or(other.point),
             before: self.before.or(other.before),
         }
+    }
+    /// A tool does not cut wider than it is.
+    pub fn too_wide(&self) -> bool {
+        matches!((self.width, self.diameter), (Some(w), Some(d)) if w > d * (1.0 + 1e-9))
     }
     /// Names of what is not known for this kind of work.
     pub fn missing(&self, work: Work) -> Vec<&'static str> {
@@ -112,15 +117,20 @@ pub struct Operations {
 #[derive(Clone, Copy, PartialEq, Debug)]
 struct Place {
     operation: usize,
-    /// Turns per minute.
+    /// Turns per minute, above zero clockwise as the spindle sees it (M3), below it the other way (M4).
     turns: f64,
     work: Work,
 }
 
-/// Turns per minute; 0 where it stands still or a surface speed decides.
+/// Turns per minute with the sense of the turn; 0 where it stands still or a surface speed decides.
 fn turns(state: &State) -> f64 {
     let s = state.spindle(0);
-    if s.turn == Turn::Stop || s.surface.is_some() { 0.0 } else { s.speed.abs() }
+    match s.turn {
+        _ if s.surface.is_some() => 0.0,
+        Turn::Stop => 0.0,
+        Turn::Cw => s.speed.abs(),
+        Turn::Ccw => -s.speed.abs(),
+    }
 }
 
 impl Operations {
@@ -226,6 +236,10 @@ pub enum Unforced {
     NoLaw,
     /// No turns per minute are known.
     NoSpeed,
+    /// Only rotary axes move: the tool turns about its point, which stays where it is on the part.
+    Turning,
+    /// The width of cut is more than the tool.
+    TooWide,
 }
 
 /// One row of the report.
@@ -263,6 +277,8 @@ pub struct Report {
 const APART: f64 = 10.0;
 /// Places nearer than this to one that was looked at in the same operation are left out, mm.
 const NEAR: f64 = 1.0;
+/// Unless a rotary axis has turned by more than this, rad.
+const LEAN: f64 = std::f64::consts::PI / 180.0;
 
 /// Draws up a report; `progress` hears how many steps of how many are done.
 pub fn report(
@@ -323,6 +339,10 @@ struct Spot {
     axis: V3,
     /// Speed of the tool point, mm/s.
     speed: f64,
+    /// Only its turn changes here.
+    turns: bool,
+    /// Rotary words of a machine tool, rad.
+    rotary: [f64; 3],
 }
 
 struct Walk<'a> {
@@ -336,7 +356,9 @@ struct Walk<'a> {
     frame: Frame,
     tool: Frame,
     rows: Vec<Row>,
-    last: Option<(usize, V3)>,
+    last: Option<(usize, V3, [f64; 3])>,
+    /// The move that is looked at only turns the tool.
+    turning: bool,
     /// The operation whose stretch over the tolerance is going on.
     over: Option<usize>,
     /// Joints beyond their limits.
@@ -354,25 +376,29 @@ impl<'a> Walk<'a> {
         let rows = operations.list.iter().map(|o| row(o.clone())).collect();
         let (frame, tool) = (Frame::IDENTITY, Frame::IDENTITY);
         let measured = crate::compensate::deviations(machine);
-        Walk { machine, operations, budget, material, kinematics, measured, frame, tool, rows, last: None, over: None, outside: Vec::new() }
+        Walk { machine, operations, budget, material, kinematics, measured, frame, tool, rows, last: None, turning: false, over: None, outside: Vec::new() }
     }
 
     fn finish(self) -> Report {
         Report { rows: self.rows.into_iter().filter(|r| r.places > 0).collect(), outside: self.outside }
     }
 
-    /// What happens at a place of the source, where it is not too near to the one before.
-    fn place(&self, source: Source, point: V3) -> Option<Place> {
+    /// What happens at a place of the source, where it is not too near to the one before; with the rotary words of machine tools.
+    fn place(&self, source: Source, point: V3, rotary: [f64; 3]) -> Option<Place> {
         let mut place = *self.operations.places.get(&source)?;
         let operation = self.operations.list.get(place.operation)?;
         place.work = operation.work.unwrap_or(place.work);
-        let near = self.last.is_some_and(|(o, q)| o == place.operation && norm(sub(q, point)) < NEAR);
-        (!near).then_some(place)
+        let near = self.last.is_some_and(|(o, q, r)| {
+            let turned = r.iter().zip(rotary).any(|(a, b)| (a - b).abs() > LEAN);
+            o == place.operation && norm(sub(q, point)) < NEAR && !turned
+        });
+        (!near || self.turning).then_some(place)
     }
 
     fn line(&mut self, from: &Target, end: &Target, speed: f64, source: Source) {
         let way = sub(end.position, from.position);
         let length = norm(way);
+        self.turning = length < 1e-9 && from.quaternion != end.quaternion;
         let pieces = pieces(length);
         let feed = if length > 0.0 { scale(way, 1.0 / length) } else { [0.0; 3] };
         for i in 1..=pieces {
@@ -383,6 +409,7 @@ impl<'a> Walk<'a> {
     }
 
     fn arc(&mut self, from: &Target, end: &Target, (center, normal, angle): (V3, V3, f64), speed: f64, source: Source) {
+        self.turning = false;
         let spoke = sub(from.position, center);
         let rise = dot(sub(end.position, from.position), normal);
         let pieces = pieces(norm(spoke) * angle);
@@ -412,7 +439,7 @@ impl<'a> Walk<'a> {
     #[allow(clippy::too_many_arguments)]
     fn look(&mut self, p: V3, from: &Target, end: &Target, t: f64, feed: V3, speed: f64, source: Source) {
         let here = self.frame.then(&Frame { position: p, turn: turn_of(end.quaternion) });
-        let Some(place) = self.place(source, here.position) else { return };
+        let Some(place) = self.place(source, here.position, [0.0; 3]) else { return };
         let flange = here.then(&self.tool.inverse());
         let Some(joints) = self.joints(&flange, from, end, t) else { return };
         // A machine that decides the turn of its tool itself stands otherwise than asked; the tool point is the same.
@@ -420,14 +447,14 @@ impl<'a> Walk<'a> {
         let lever = rotate(&real.turn, self.tool.position);
         let axis = self.towards_spindle(&here, &real);
         let feed = rotate(&self.frame.turn, feed);
-        self.record(&Spot { place, source, joints, point: here.position, lever, feed, axis, speed });
+        self.record(&Spot { place, source, joints, point: here.position, lever, feed, axis, speed, turns: self.turning, rotary: [0.0; 3] });
     }
 
     /// Puts what is predicted at a place into its row.
     fn record(&mut self, spot: &Spot) {
         let Ok(at) = Sensitivity::new(self.machine, &spot.joints, spot.lever) else { return };
         let (source, operation) = (spot.source, spot.place.operation);
-        self.last = Some((operation, spot.point));
+        self.last = Some((operation, spot.point, spot.rotary));
         let force = match spot.place.work {
             Work::Drill => self.thrust(spot),
             Work::Mill => self.force(spot),
@@ -499,12 +526,15 @@ impl<'a> Walk<'a> {
     fn unforced(&self, spot: &Spot) -> Option<Unforced> {
         self.material?;
         let cut = self.operations.list.get(spot.place.operation)?.cut;
-        if norm(spot.feed) < 0.5 || !cut.missing(spot.place.work).is_empty() {
+        if !cut.missing(spot.place.work).is_empty() {
             return None;
         }
         Some(match spot.place {
             Place { work: Work::Other, .. } => Unforced::NoLaw,
-            Place { turns, .. } if !(turns > 0.0) => Unforced::NoSpeed,
+            Place { turns, .. } if !(turns.abs() > 0.0) => Unforced::NoSpeed,
+            Place { work: Work::Mill, .. } if cut.too_wide() => Unforced::TooWide,
+            // A move of no length at all cuts nothing.
+            _ if norm(spot.feed) < 0.5 => return spot.turns.then_some(Unforced::Turning),
             _ => Unforced::Axial,
         })
     }
@@ -521,7 +551,7 @@ impl<'a> Walk<'a> {
             lips: cut.lips.unwrap_or(LIPS),
             edge: cut.point?,
             feed: spot.speed * 60.0,
-            speed: spot.place.turns,
+            speed: spot.place.turns.abs(),
         };
         let (thrust, chip) = bore.thrust(self.material?)?;
         Some((scale(spot.feed, -thrust), Some(chip)))
@@ -530,17 +560,22 @@ impl<'a> Walk<'a> {
     /// Force on a mill and the thickness of the chip; straight out of the material there is none.
     fn force(&self, spot: &Spot) -> Option<(V3, Option<f64>)> {
         let cut = self.operations.list.get(spot.place.operation)?.cut;
+        if cut.too_wide() {
+            return None;
+        }
         let cut = Cut {
             diameter: cut.diameter?,
             teeth: cut.teeth?,
             feed: spot.speed * 60.0,
-            speed: spot.place.turns,
+            speed: spot.place.turns.abs(),
             depth: cut.depth?,
             width: cut.width?,
             edge: std::f64::consts::FRAC_PI_2,
         };
         let force = cut.force(self.material?)?;
-        match force.vector(spot.feed, spot.axis) {
+        // Seen from the other side a tool turns the other way.
+        let sense = if spot.place.turns < 0.0 { -1.0 } else { 1.0 };
+        match force.vector(spot.feed, scale(spot.axis, sense)) {
             Some(v) => Some((v, Some(force.chip))),
             None => (dot(spot.feed, spot.axis) > 0.0).then_some(([0.0; 3], None)),
         }
@@ -561,8 +596,9 @@ fn causes(machine: &Machine, at: &Sensitivity, budget: &Budget) -> Vec<(String, 
         all.push((name, norm(*column) * size));
     }
     let parameters = machine.parameters().into_iter().map(|p| p.name);
-    for (name, (column, size)) in parameters.zip(at.geometry.iter().zip(budget.geometry.iter().flatten())) {
-        all.push((name, norm(*column) * size));
+    let sizes = budget.known.iter().chain(&budget.geometry).flatten();
+    for (name, (column, size)) in parameters.zip(at.geometry.iter().zip(sizes)) {
+        all.push((name, norm(*column) * size.abs()));
     }
     all.retain(|(_, v)| *v > 0.0);
     all.sort_by(|a, b| b.1.total_cmp(&a.1));

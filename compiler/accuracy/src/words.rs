@@ -102,9 +102,21 @@ pub(crate) fn rotary(axes: &Axes, state: &State) -> [f64; 3] {
     [3, 4, 5].map(|i| axes[i] + state.work_offset[i] + state.local_offset[i] + state.tool_offset[i])
 }
 
+/// Names of the frames that a machine file may have for work offsets.
+const NAMES: [&str; 10] = ["", "G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3"];
+
+/// The machine with the part put down there in its base, whatever its file says of tables and work offsets.
+pub fn put_down(machine: &Machine, part: Frame) -> Machine {
+    let mut put = machine.clone();
+    (put.cell.table, put.cell.part) = (Frame::IDENTITY, part);
+    for name in NAMES {
+        put.cell.frames.remove(name);
+    }
+    put
+}
+
 /// The work frame in the base.
 pub(crate) fn frame(machine: &Machine, state: &State) -> Frame {
-    const NAMES: [&str; 10] = ["", "G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3"];
     let cell = &machine.cell;
     let placed = NAMES.get(usize::from(state.work)).and_then(|n| cell.frames.get(*n)).copied();
     placed.unwrap_or_else(|| cell.part_in_base()).then(&work_shift(state))

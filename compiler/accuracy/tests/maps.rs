@@ -5,9 +5,9 @@ use gr_accuracy::map::{Map, Part, Plane, Probe, Quantity, Request, map};
 use gr_machine::{Machine, Spring, builtin};
 
 fn drawn(machine: &Machine, quantity: Quantity, force: [f64; 3]) -> Map {
-    let budget = Budget { joints: Some(vec![1e-3; machine.joints.len()]), geometry: None, unsaid: Vec::new() };
+    let budget = Budget { joints: Some(vec![1e-3; machine.joints.len()]), ..Budget::default() };
     let plane = Plane { axis: 2, at: 0.0 };
-    let request = Request { quantity, plane, size: (40, 40), window: None, force, signs: None, deviations: None };
+    let request = Request { quantity, plane, size: (40, 40), window: None, force, signs: None };
     map(&Probe::downward(machine), &budget, &request, &|_, _| {})
 }
 

@@ -52,7 +52,6 @@ fn maps_of_machines_in_closed_form_are_quick() {
                 window: None,
                 force: [0.0; 3],
                 signs: None,
-                deviations: None,
             };
             let before = spent();
             let got = map(&probe, &budget, &request, &|_, _| {});

@@ -267,7 +267,7 @@ fn rectangles_and_volume() {
         assert!(!all(from, to, half + 20.0) && !all(got.x.0, got.x.1, got.half + 20.0));
         assert!((got.x.1 - got.x.0) * got.half >= (to - from) * half, "{got:?}");
     }
-    let v = volume(&probe, 68, 120) / 1e6;
+    let v = volume(&probe, 68, 120, &|_, _| {}) / 1e6;
     assert!((v - 212.3).abs() < 1.0, "{v}");
 }
 

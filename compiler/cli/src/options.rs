@@ -520,7 +520,7 @@ pub struct AccuracyArgs {
     #[arg(long, value_name = "MM")]
     pub width: Option<f64>,
     /// Teeth of the mills, where the program states none
-    #[arg(long, value_name = "COUNT")]
+    #[arg(long, value_name = "COUNT", allow_hyphen_values = true)]
     pub teeth: Option<f64>,
     /// Point angle of the drills, where the program states none, degrees; such drills have two lips
     #[arg(long, value_name = "DEGREES")]
@@ -528,6 +528,10 @@ pub struct AccuracyArgs {
     /// Diameter of the tools, where neither program nor tool table states it, mm
     #[arg(long, value_name = "MM")]
     pub diameter: Option<f64>,
+    /// Deviations of the geometry, such as ls1x=0.0077,lu2y=-0.013 (mm or degrees), in place of the worst pattern of the
+    /// tolerances
+    #[arg(long, value_name = "NAME=VALUE,…", allow_hyphen_values = true)]
+    pub deviations: Option<String>,
     /// Map of the errors by joints and geometry over the work space, at the height of the largest error (.png, .svg, .csv)
     #[arg(long, value_name = "FILE")]
     pub map: Option<PathBuf>,

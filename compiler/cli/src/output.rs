@@ -19,7 +19,8 @@ fn make_folders(goal: &Path) -> std::io::Result<Vec<PathBuf>> {
     let missing = |f: &&Path| !f.as_os_str().is_empty() && !f.exists();
     let made: Vec<PathBuf> = goal.ancestors().skip(1).take_while(missing).map(Path::to_path_buf).collect();
     if let Some(folder) = made.first() {
-        std::fs::create_dir_all(folder)?;
+        // Not half of them.
+        std::fs::create_dir_all(folder).inspect_err(|_| made.iter().for_each(|f| _ = std::fs::remove_dir(f)))?;
     }
     Ok(made)
 }

@@ -227,8 +227,8 @@ pub struct Feature {
     pub copies: Vec<Frame>,
     /// The least plus-or-minus tolerance that its own lengths are written with, mm; half the band where it is on one side.
     pub tolerance: Option<f64>,
-    /// A fit that one of its lengths is written with: its limits are not read.
-    pub fit: Option<u64>,
+    /// A fit that one of its lengths is written with and that can't be read as a band.
+    pub fit: Option<Origin>,
 }
 
 /// Shapes.

@@ -62,7 +62,8 @@ impl Mill<'_> {
         geometry::flatten(&view.op, view.start, view.end, CHORD, |to| {
             let way: V3 = [0, 1, 2].map(|i| to[i] - from[i]);
             let turned = (3..6).map(|i| (to[i] - from[i]).abs()).fold(0.0, f64::max);
-            let count = pieces(norm(way)).max(libm::ceil(turned / TURN).min(1e4) as usize);
+            let count = pieces(norm(way)).max(turns_apart(&from, to));
+            self.walk.turning = !(norm(way) > 0.0) && turned > 0.0;
             let feed = if norm(way) > 0.0 { scale(way, 1.0 / norm(way)) } else { [0.0; 3] };
             since += norm(way);
             // Of the many chords of a curve only some are looked at, and always its end.
@@ -81,7 +82,7 @@ impl Mill<'_> {
     fn look(&mut self, axes: &Axes, state: &State, feed: V3, speed: f64, view: &View<'_, '_>) {
         let machine = self.walk.machine;
         let asked = Asked::new(machine, axes, state);
-        let Some(place) = self.walk.place(view.source, asked.tip) else { return };
+        let Some(place) = self.walk.place(view.source, asked.tip, asked.rotary) else { return };
         let begun = started(machine, &asked, &self.sliding, &self.turning);
         let kinematics: &dyn Kinematics = self.walk.kinematics;
         let Ok(joints) = slid(kinematics, &begun, &self.sliding, &asked) else { return };
@@ -94,9 +95,15 @@ impl Mill<'_> {
         let lever = sub(real.then(&Frame::shift(asked.tool.position)).position, real.position);
         let feed = rotate(&crate::words::frame(machine, state).turn, feed);
         let axis = real.turn.map(|r| r[2]);
-        self.walk.record(&Spot { place, source: view.source, joints, point: asked.tip, lever, feed, axis, speed });
+        self.walk.record(&Spot { place, source: view.source, joints, point: asked.tip, lever, feed, axis, speed, turns: self.walk.turning, rotary: asked.rotary });
     }
 }
 
 /// Rotary words are looked at in steps of 2°.
 const TURN: f64 = std::f64::consts::PI / 90.0;
+
+/// In how many steps rotary words are looked at.
+pub(crate) fn turns_apart(from: &Axes, to: &Axes) -> usize {
+    let turned = (3..6).map(|i| (to[i] - from[i]).abs()).fold(0.0, f64::max);
+    libm::ceil(turned / TURN).clamp(1.0, 1e4) as usize
+}

@@ -6,11 +6,11 @@ use std::path::Path;
 use gr_accuracy::material::{self, Material};
 use gr_accuracy::map::DOUBT;
 use gr_accuracy::report::{CutData, Operations, Report, Row, Stretch, Unforced, Work, report, report_of_words};
-use gr_accuracy::{Budget, BudgetOptions};
+use gr_accuracy::{Budget, BudgetOptions, put_down};
 use gr_ir::{Source, Sources as _};
 use gr_machine::Machine;
 use gr_machine::math::{Frame, norm};
-use gr_planner::process::{Element, OperationKind, Process, Workingstep};
+use gr_planner::process::{Element, OperationKind, Origin, Process, Workingstep};
 use gr_text::{Diagnostic, FileId, Severity, Span, code};
 use serde_json::json;
 
@@ -50,10 +50,16 @@ pub fn run(global: &Global, args: &AccuracyArgs) -> Exit {
     let Some(machine) = station.machine.clone() else {
         return refuse("accuracy", "it needs a machine: `--machine`, or `machine` in gcc-robot.toml");
     };
-    if let Some((what, why)) = senseless(args).or_else(|| misfit(&machine, args.reference, args.grade)) {
+    let doubled = || super::map::graded(args.grade, args.deviations.as_deref()).err();
+    if let Some((what, why)) = senseless(args).or_else(|| misfit(&machine, args.reference, args.grade)).or_else(doubled) {
         return refuse(&what, &why);
     }
     let machine = referenced(machine, args.reference);
+    let known = match args.deviations.as_deref().map(|text| super::map::deviations(text, &machine)).transpose() {
+        Ok(known) => known,
+        Err(why) => return refuse("--deviations", &why),
+    };
+    let budget = Budget::new(&machine, BudgetOptions { grade: args.grade, usp2009: args.reference.is_some() }).with_known(&machine, known);
     let part = match &args.part {
         None => None,
         Some(text) => match triple(text) {
@@ -76,9 +82,8 @@ pub fn run(global: &Global, args: &AccuracyArgs) -> Exit {
             return if checked.unreadable { Exit::Io } else { Exit::Findings };
         }
     };
-    let result = predict(args, &unit, &motion, &machine, part, &progress).and_then(|(text, found, height)| {
+    let result = predict(args, &unit, &motion, &machine, &budget, part, &progress).and_then(|(text, found, height)| {
         let Some(goal) = &args.map else { return Ok(((text, Vec::new()), found)) };
-        let budget = Budget::new(&machine, BudgetOptions { grade: args.grade, usp2009: args.reference.is_some() });
         match super::map::beside(global, &machine, &budget, height, goal) {
             Ok(files) => Ok(((text, files), found)),
             Err((what, why)) => Err(vec![Diagnostic::new(code::ACCURACY_BAD_OPTION, FileId(0), Span::default(), &[what, why])]),
@@ -112,6 +117,9 @@ pub fn run(global: &Global, args: &AccuracyArgs) -> Exit {
     exit
 }
 
+/// More teeth than any tool has.
+const MOST_TEETH: f64 = 1000.0;
+
 /// An option whose number no tool and no part can have.
 fn senseless(args: &AccuracyArgs) -> Option<(String, String)> {
     let above_zero = [
@@ -124,12 +132,16 @@ fn senseless(args: &AccuracyArgs) -> Option<(String, String)> {
         let v = v.filter(|v| !(*v > 0.0 && v.is_finite()))?;
         Some((name.to_string(), format!("a length above zero is wanted, not {v}")))
     };
-    let teeth = args.teeth.filter(|t| !(*t >= 1.0 && t.is_finite()));
+    let teeth = args.teeth.filter(|t| !(*t >= 1.0 && *t <= MOST_TEETH && t.fract() == 0.0));
     let point = args.point.filter(|p| !(*p > 10.0 && *p <= 180.0));
     above_zero
         .into_iter()
         .find_map(wrong)
-        .or_else(|| teeth.map(|t| ("--teeth".to_string(), format!("a tool has one tooth or more, not {t}"))))
+        .or_else(|| teeth.map(|t| ("--teeth".to_string(), format!("a tool has one tooth or more, and whole ones, not {t}"))))
+        .or_else(|| {
+            let wider = args.width.zip(args.diameter).filter(|(w, d)| w > d);
+            wider.map(|(w, d)| ("--width".to_string(), format!("a tool of {d} mm does not cut {w} mm wide")))
+        })
         .or_else(|| point.map(|p| ("--point".to_string(), format!("a point angle is between 10° and 180°, such as 118, not {p}"))))
 }
 
@@ -155,6 +167,7 @@ fn predict(
     unit: &Unit,
     motion: &Motion,
     machine: &Machine,
+    budget: &Budget,
     part: Option<Frame>,
     progress: &Progress,
 ) -> Result<(String, Vec<Diagnostic>, f64), Vec<Diagnostic>> {
@@ -168,10 +181,10 @@ fn predict(
     let wanted = args.material.clone().or_else(|| process.as_ref().and_then(|p| p.workpieces.iter().map(|w| w.material.clone()).find(|m| !m.is_empty())));
     let found_material = wanted.as_deref().map(|name| (name, material::find(name)));
     let mut found = Vec::new();
-    for (operation, fit) in fits.into_iter().filter(|_| args.tolerance.is_none()) {
-        let what = [format!("the tolerance #{fit} of {operation}"), "limits and fits are not read; `--tolerance` says what is allowed".to_string()];
-        found.push(say(code::ACCURACY_NO_DATA, &what));
+    if args.tolerance.is_none() {
+        found.extend(unread(fits));
     }
+    too_wide(args, &operations)?;
     let material = match found_material {
         Some((name, None)) => {
             let known: Vec<&str> = material::materials().iter().filter_map(|m| m.names.first().map(String::as_str)).collect();
@@ -190,34 +203,29 @@ fn predict(
     };
     let texts = gr_ir::Texts::new(motion.sources.iter().map(|(id, f)| (id, &*f.text)));
     let options = gr_robot::Options { name: unit.name(), ..gr_robot::Options::default() };
-    let mut planned_on = machine.clone();
-    if let Some(part) = part {
-        // Put down there, turned as the machine file has it.
-        let turn = machine.cell.part_in_base().turn;
-        (planned_on.cell.table, planned_on.cell.part) = (Frame::IDENTITY, Frame { turn, ..part });
-    }
+    // Put down there, turned as the machine file has it.
+    let mut planned_on = match part {
+        Some(part) => put_down(machine, Frame { turn: machine.cell.part_in_base().turn, ..part }),
+        None => machine.clone(),
+    };
     tool_points(&mut found, &mut planned_on, &motion.program, &say);
-    let budget = Budget::new(machine, BudgetOptions { grade: args.grade, usp2009: args.reference.is_some() });
-    found.extend(unsaid(machine, &budget).into_iter().map(|args| say(code::ACCURACY_NO_DATA, &args)));
+    found.extend(unsaid(machine, budget).into_iter().map(|args| say(code::ACCURACY_NO_DATA, &args)));
     missing(&mut found, machine, &operations, material, &say);
     let tell = |done: usize, of: usize| progress.tell(|| format!("errors at step {done} of {of}"));
-    let report = match report_of_words(&motion.program, &planned_on, &operations, &budget, material, &tell) {
+    let report = match report_of_words(&motion.program, &planned_on, &operations, budget, material, &tell) {
         Some(report) => report,
         None => {
             let planned = gr_robot::plan(&motion.program, &planned_on, &texts, &options)?;
             // What switches the spindle has no part in errors.
             let kept = |d: &Diagnostic| d.code != code::ROBOT_BY_HAND;
             found.extend(planned.warnings.into_iter().filter(kept));
-            report(&planned.program, &operations, &budget, material, &tell)
+            report(&planned.program, &operations, budget, material, &tell)
         }
     };
     // Without a place of the part nobody knows where its zero was touched.
     for (source, joint, value) in report.outside.iter().filter(|_| args.part.is_some()) {
         let (file, span) = place(motion, *source);
-        let Some(j) = machine.joints.get(*joint) else { continue };
-        let bound = if j.max.is_some_and(|m| *value > m) { j.max } else { j.min };
-        let told = [j.name.clone(), j.show(*value), bound.map_or(String::new(), |b| j.show(b))];
-        found.push(Diagnostic::new(code::ROBOT_JOINT_LIMIT, file, span, &told));
+        found.extend(beyond(machine, *joint, *value, file, span));
     }
     if found.iter().any(|d| d.code == code::ROBOT_JOINT_LIMIT) {
         return Err(found);
@@ -225,19 +233,62 @@ fn predict(
     for row in &report.rows {
         judge(&mut found, row, material, motion);
         lawless(&mut found, row, machine, motion);
-        if let Some((off, source)) = row.measured {
+        if let Some((off, source)) = row.measured.filter(|_| budget.known.is_none()) {
             let (file, span) = place(motion, source);
             let why = format!("up to {} µm in {}, here, unless the program is built with `--compensate`", um(off), row.operation.name);
             found.push(Diagnostic::new(code::ACCURACY_NO_DATA, file, span, &["the error by the measured deviations".to_string(), why]));
         }
     }
     let text = match args.format {
-        TableFormat::Text => text(&report, motion, machine, material, &budget),
-        TableFormat::Json => format!("{:#}\n", as_json(&report, motion, machine, material, &budget)),
+        TableFormat::Text => text(&report, motion, machine, material, budget, args),
+        TableFormat::Json => format!("{:#}\n", as_json(&report, motion, machine, material, budget, args)),
         TableFormat::Csv => csv(&report, motion),
     };
     let worst = report.rows.iter().filter_map(|r| r.worst.as_ref()).max_by(|a, b| a.errors.sum().total_cmp(&b.errors.sum()));
     Ok((text, found, worst.map_or(0.0, |w| (w.point[2] * 10.0).round() / 10.0 + 0.0)))
+}
+
+/// A joint beyond its limit.
+pub fn beyond(machine: &Machine, joint: usize, value: f64, file: FileId, span: Span) -> Option<Diagnostic> {
+    let j = machine.joints.get(joint)?;
+    let bound = if j.max.is_some_and(|m| value > m) { j.max } else { j.min };
+    let told = [j.name.clone(), j.show(value), bound.map_or(String::new(), |b| j.show(b))];
+    Some(Diagnostic::new(code::ROBOT_JOINT_LIMIT, file, span, &told))
+}
+
+/// Fits that can't be read, each with the operations that it is of.
+fn unread(fits: Vec<(String, Origin)>) -> Vec<Diagnostic> {
+    const NAMED: usize = 3;
+    let mut by_fit: Vec<(Origin, Vec<String>)> = Vec::new();
+    for (operation, fit) in fits {
+        match by_fit.iter_mut().find(|f| f.0 == fit) {
+            Some(f) => f.1.push(operation),
+            None => by_fit.push((fit, vec![operation])),
+        }
+    }
+    let one = |(fit, operations): (Origin, Vec<String>)| {
+        let more = operations.len().saturating_sub(NAMED);
+        let names = operations[..operations.len() - more].join(", ");
+        let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+        let why = "a `grade` of LIMITS_AND_FITS is the width of the band, a length above 0 and below 1 mm; the number of a grade is not read. `--tolerance` says what is allowed";
+        let what = [format!("the tolerance #{} of {names}{more}", fit.id), why.to_string()];
+        Diagnostic::new(code::ACCURACY_NO_DATA, FileId(0), fit.span, &what)
+    };
+    by_fit.into_iter().map(one).collect()
+}
+
+/// A width of cut that no mill of the program has is refused.
+fn too_wide(args: &AccuracyArgs, operations: &Operations) -> Result<(), Vec<Diagnostic>> {
+    let Some(width) = args.width else { return Ok(()) };
+    let mills = operations.list.iter().enumerate().filter(|(i, o)| operations.works(*i).contains(&Work::Mill) && o.cut.width == Some(width));
+    let widest = mills.filter_map(|(_, o)| Some((o.cut.diameter?, o.tool))).max_by(|a, b| a.0.total_cmp(&b.0));
+    match widest.filter(|(d, _)| width > *d) {
+        None => Ok(()),
+        Some((d, tool)) => {
+            let why = format!("the widest mill of the program, T{tool}, has {d} mm and does not cut {width} mm wide");
+            Err(vec![Diagnostic::new(code::ACCURACY_BAD_OPTION, FileId(0), Span::default(), &["--width".to_string(), why])])
+        }
+    }
 }
 
 /// A tool that the machine file does not have and whose length the program never uses is looked at as if its point were
@@ -280,7 +331,7 @@ pub fn unsaid(machine: &Machine, budget: &Budget) -> Vec<[String; 2]> {
     if budget.joints.is_none() {
         none("the error by the joints", format!("the file of {id} has no `joints` in `[accuracy]`"));
     }
-    if budget.geometry.is_none() {
+    if !budget.tells_geometry() {
         none("the error by the geometry", format!("the file of {id} has neither `parameter` nor a `grade` that fits in `[accuracy]`"));
     }
     if !budget.unsaid.is_empty() {
@@ -352,6 +403,8 @@ fn lawless(found: &mut Vec<Diagnostic>, row: &Row, machine: &Machine, motion: &M
         let why = match why {
             Unforced::Axial => "the tool is fed along its axis, and the force law is that of milling across it (a drill is known by its cycle: G73 G81 G82 G83)",
             Unforced::NoLaw => "the force law is that of milling and drilling, not of tapping, boring, reaming and countersinking",
+            Unforced::Turning => "only rotary axes move: the tool turns about its point, which stays where it is on the part, and no force law is about that",
+            Unforced::TooWide => "the width of cut is more than the diameter of the tool",
             Unforced::NoSpeed => "no turns per minute are known: no S, a spindle that is stopped, or a surface speed",
         };
         let (file, span) = place(motion, *source);
@@ -420,15 +473,15 @@ fn most_of_it(causes: &[(String, f64)]) -> Option<String> {
     (!list.is_empty()).then(|| format!("most of it, each alone: {} µm", list.join(", ")))
 }
 
-/// How each operation cuts: the file's word, then the tool table's, then the options'. Operations whose feature has a fit,
-/// and its instance.
+/// How each operation cuts: the file's word, then the tool table's, then the options'. Operations whose feature has a fit
+/// that can't be read, and its instance.
 fn cutting(
     operations: &mut Operations,
     args: &AccuracyArgs,
     unit: &Unit,
     motion: &Motion,
     process: Option<&Process>,
-) -> Vec<(String, u64)> {
+) -> Vec<(String, Origin)> {
     let said = CutData {
         diameter: args.diameter,
         teeth: args.teeth,
@@ -501,10 +554,13 @@ fn line_of(motion: &Motion, source: Source) -> String {
     if source.file == FileId(0) { format!("{}", source.line + 1) } else { format!("{name}:{}", source.line + 1) }
 }
 
-fn text(report: &Report, motion: &Motion, machine: &Machine, material: Option<&Material>, budget: &Budget) -> String {
+fn text(report: &Report, motion: &Motion, machine: &Machine, material: Option<&Material>, budget: &Budget, args: &AccuracyArgs) -> String {
     let mut out = format!("{}: predicted errors of the tool point, plus or minus, µm\n", machine.id);
     if let Some(a) = &machine.cell.accuracy {
         let _ = writeln!(out, "accuracy: {}", a.source);
+    }
+    if let Some(text) = &args.deviations {
+        let _ = writeln!(out, "geometry: by the deviations {text}");
     }
     if let (Some(s), Some(m)) = (&machine.cell.stiffness, material) {
         let _ = writeln!(out, "stiffness: {}\nmaterial: {}, {}", s.source, m.title, m.source);
@@ -573,7 +629,14 @@ fn text(report: &Report, motion: &Motion, machine: &Machine, material: Option<&M
     out
 }
 
-fn as_json(report: &Report, motion: &Motion, machine: &Machine, material: Option<&Material>, budget: &Budget) -> serde_json::Value {
+fn as_json(
+    report: &Report,
+    motion: &Motion,
+    machine: &Machine,
+    material: Option<&Material>,
+    budget: &Budget,
+    args: &AccuracyArgs,
+) -> serde_json::Value {
     let rows: Vec<_> = report
         .rows
         .iter()
@@ -605,7 +668,7 @@ fn as_json(report: &Report, motion: &Motion, machine: &Machine, material: Option
         "machine": machine.id, "unit": "mm", "rules": RULES, "doubt": DOUBT,
         "accuracy_source": machine.cell.accuracy.as_ref().map(|a| a.source.clone()),
         "stiffness_source": machine.cell.stiffness.as_ref().map(|s| s.source.clone()),
-        "material": material.map(|m| m.id.clone()), "taken_as_exact": budget.unsaid, "operations": rows,
+        "material": material.map(|m| m.id.clone()), "deviations": args.deviations, "taken_as_exact": budget.unsaid, "operations": rows,
     })
 }
 

@@ -74,6 +74,29 @@ struct Made {
 
 type Refused = (String, String);
 
+/// Lines of a picture: broken behind spaces and commas where they would be too long.
+fn wrapped(text: &str) -> Vec<String> {
+    const LONG: usize = 72;
+    let mut out = vec![String::new()];
+    for word in text.split_inclusive([' ', ',']) {
+        let line = out.len() - 1;
+        if !out[line].is_empty() && out[line].chars().count() + word.trim_end().chars().count() > LONG {
+            out.push(String::new());
+        }
+        let line = out.len() - 1;
+        out[line].push_str(word);
+    }
+    out
+}
+
+/// What is left out, as a picture and a table carry it.
+fn without([what, why]: &[String; 2]) -> String {
+    match why.strip_prefix("nothing is said of ") {
+        Some(names) => format!("left out: {what}, {names}"),
+        None => format!("left out: {what}"),
+    }
+}
+
 fn plane(text: &str) -> Option<Plane> {
     let (axis, at) = text.split_once('=')?;
     let axis = ["x", "y", "z"].iter().position(|a| a.eq_ignore_ascii_case(axis.trim()))?;
@@ -95,7 +118,8 @@ fn area(global: &Global, args: &MapArgs, machine: &Machine, plane: Plane, budget
         None => None,
         Some(text) => Some(deviations(text, machine).map_err(|why| ("--deviations".to_string(), why))?),
     };
-    if geometry && budget.geometry.is_none() && deviations.is_none() {
+    let budget = &budget.clone().with_known(machine, deviations);
+    if geometry && !budget.tells_geometry() {
         let lengths = machine.parameters().iter().any(|p| p.kind == ParameterKind::Length && !p.name.ends_with(".zero"));
         return match lengths {
             true => lacks("the tolerances of its geometry", "`grade` or `parameter` in `[accuracy]`, or `--it`"),
@@ -127,10 +151,11 @@ fn area(global: &Global, args: &MapArgs, machine: &Machine, plane: Plane, budget
     let total = matches!(quantity, Quantity::Total | Quantity::TotalRss);
     let by_force = matches!(quantity, Quantity::Elastic(_)) || total;
     let by_grade = matches!(quantity, Quantity::Geometric(_)) || total;
-    heeds("--deviations", args.deviations.is_some(), matches!(quantity, Quantity::Geometric(_)), "errors by the geometry")?;
+    heeds("--deviations", args.deviations.is_some(), by_grade, "errors by the geometry and the total")?;
     heeds("--signs", args.signs.is_some(), by_joints, "errors by the joints")?;
     heeds("--force", args.force.is_some(), by_force, "deflections and the total")?;
     heeds("--it", args.grade.is_some(), by_grade, "errors by the geometry and the total")?;
+    graded(args.grade, args.deviations.as_deref())?;
     let probe = Probe::downward(machine);
     let size = size(&probe, machine, args, 400)?;
     // The publication counts nodes on the border too.
@@ -138,12 +163,15 @@ fn area(global: &Global, args: &MapArgs, machine: &Machine, plane: Plane, budget
         let (extent, (a, b)) = (probe.extent(), plane.axes());
         [extent[a], extent[b]]
     });
-    let request = Request { quantity, plane, size, window, force, signs, deviations };
+    let request = Request { quantity, plane, size, window, force, signs };
+    // Of the volume.
+    let (layers, nodes) = if closed_form(machine) { (68, 120) } else { (16, 24) };
     let progress = Progress::new(global.quiet, format!("map of {}", machine.id));
     // A search of its own on some machines, which the estimate must not count for each place.
     probe.extent();
     if !closed_form(machine) && !global.quiet {
-        estimate(size, cores(), |count| {
+        let more = if quantity == Quantity::Workspace { layers * nodes * nodes } else { 0 };
+        estimate(size.0 * size.1 + more, |count| {
             map::sample(&probe, budget, &request, count);
         });
     }
@@ -153,7 +181,7 @@ fn area(global: &Global, args: &MapArgs, machine: &Machine, plane: Plane, budget
             p.tell(|| format!("map of {}: row {done} of {of}", machine.id));
         }
     });
-    let mut left_out = if args.deviations.is_some() { Vec::new() } else { left_out(quantity, machine, budget, force) };
+    let mut left_out = left_out(quantity, machine, budget, force);
     left_out.extend(limitless(machine));
     if map.lost > 0 {
         let why = "a member of `[stiffness]` has no length left there: look at its `shorter_by` or `between`".to_string();
@@ -171,9 +199,8 @@ fn area(global: &Global, args: &MapArgs, machine: &Machine, plane: Plane, budget
     let title = format!("{}: {what}, {} = {} mm", machine.id, ["X", "Y", "Z"][plane.axis], plane.at);
     let mut text = told(&map, machine, &what);
     if quantity == Quantity::Workspace {
-        progress.tell(|| format!("volume of {}", machine.id));
-        let (layers, nodes) = if closed_form(machine) { (68, 120) } else { (16, 24) };
-        let volume = map::volume(&probe, layers, nodes) / 1e6;
+        let tell = |done: usize, of: usize| progress.tell(|| format!("volume of {}: layer {done} of {of}", machine.id));
+        let volume = map::volume(&probe, layers, nodes, &tell) / 1e6;
         let _ = writeln!(text, "volume {volume:.1} dm³ (by {layers} layers of {nodes} × {nodes} nodes)");
     }
     drop(progress);
@@ -191,15 +218,17 @@ fn area(global: &Global, args: &MapArgs, machine: &Machine, plane: Plane, budget
         notes.push(DOUBT.to_string());
     }
     notes.iter().for_each(|n| text += &format!("{n}\n"));
+    let without: Vec<String> = left_out.iter().map(without).collect();
+    notes.extend(without.iter().cloned());
     if map.summary().is_none() {
         let (low, high) = probe.extent()[plane.axis];
         let axis = ["X", "Y", "Z"][plane.axis];
         let _ = writeln!(text, "nothing of this plane is within reach; the tool gets to {axis} {low:.1} to {high:.1} mm at most");
     }
     // Lines of a picture are short.
-    let lines: Vec<String> = notes.iter().flat_map(|n| n.split("; ")).map(str::to_string).collect();
+    let lines: Vec<String> = notes.iter().flat_map(|n| n.split("; ")).flat_map(wrapped).collect();
     let picture = Picture::map(&map, &title, &lines);
-    Ok(Made { text, files: files(&args.output, &picture, || map.csv())?, left_out })
+    Ok(Made { text, files: files(&args.output, &picture, || map.csv(&without))?, left_out })
 }
 
 /// A slide without limits reaches as far as one likes: what is drawn is only what was looked at.
@@ -221,11 +250,25 @@ fn left_out(quantity: Quantity, machine: &Machine, budget: &Budget, force: [f64;
     if joints && geometry && force == [0.0; 3] {
         out.push(["the deflection".into(), "no `--force` is given".into()]);
     }
-    if geometry && machine.cell.as_built.is_some() {
-        let why = "they are no tolerances, and `build --compensate` takes them away; `--deviations` draws what they do".to_string();
-        out.push(["the error by the deviations of `[as_built]`".into(), why]);
+    if geometry && budget.known.is_none() {
+        out.extend(measured(machine));
     }
     out
+}
+
+/// Measured deviations of a machine are no part of what is predicted.
+pub fn measured(machine: &Machine) -> Option<[String; 2]> {
+    machine.cell.as_built.as_ref()?;
+    let why = "they are no tolerances, and `build --compensate` takes them away; `--deviations` of `map` and `accuracy` says what they do".to_string();
+    Some(["the error by the deviations of `[as_built]`".into(), why])
+}
+
+/// A grade says nothing where the deviations are known.
+pub fn graded(grade: Option<u8>, deviations: Option<&str>) -> Result<(), Refused> {
+    match (grade, deviations) {
+        (Some(g), Some(_)) => Err((format!("--it {g}"), "`--deviations` says already how the geometry is; leave out one of them".into())),
+        _ => Ok(()),
+    }
 }
 
 /// Nodes along each side.
@@ -251,12 +294,15 @@ fn cores() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from)
 }
 
-/// Says how long a map by search takes, from some places of it.
-fn estimate(size: (usize, usize), cores: usize, some: impl FnOnce(usize)) {
+/// Says how long it takes to look at so many places by search, on all cores, from some of them.
+pub fn estimate(places: usize, some: impl FnOnce(usize)) {
+    estimate_on(cores(), places, some);
+}
+
+fn estimate_on(cores: usize, places: usize, some: impl FnOnce(usize)) {
     const SOME: usize = 64;
     let start = std::time::Instant::now();
     some(SOME);
-    let places = size.0 * size.1;
     let seconds = start.elapsed().as_secs_f64() / SOME as f64 * places as f64 / cores as f64;
     if seconds >= 2.0 {
         // Whoever closed standard error does not want to know.
@@ -265,9 +311,10 @@ fn estimate(size: (usize, usize), cores: usize, some: impl FnOnce(usize)) {
 }
 
 /// Deviations by name, in the order of the machine's parameters, mm and rad.
-fn deviations(text: &str, machine: &Machine) -> Result<Vec<f64>, String> {
+pub fn deviations(text: &str, machine: &Machine) -> Result<Vec<f64>, String> {
     let all = machine.parameters();
     let mut out = vec![0.0; all.len()];
+    let mut given = vec![false; all.len()];
     for one in text.split(',').map(str::trim) {
         let (name, value) = one.split_once('=').ok_or_else(|| format!("`{one}` is no NAME=VALUE"))?;
         let value: f64 = value.trim().parse().ok().filter(|v: &f64| v.is_finite()).ok_or_else(|| format!("`{value}` is no number"))?;
@@ -275,6 +322,9 @@ fn deviations(text: &str, machine: &Machine) -> Result<Vec<f64>, String> {
             let names: Vec<&str> = all.iter().map(|p| p.name.as_str()).collect();
             return Err(format!("there is no parameter `{name}`; this machine has {}", names.join(", ")));
         };
+        if std::mem::replace(&mut given[i], true) {
+            return Err(format!("`{}` is given twice", name.trim()));
+        }
         out[i] = if all[i].kind == ParameterKind::Angle { value.to_radians() } else { value };
     }
     Ok(out)
@@ -330,7 +380,7 @@ fn bars(global: &Global, machine: &Machine, plane: Plane, args: &MapArgs) -> Res
     let progress = Progress::new(global.quiet, format!("sensitivities of {}", machine.id));
     probe.extent();
     if !closed_form(machine) && !global.quiet {
-        estimate(size, 1, |count| map::sample_sensitivity(&probe, plane, count));
+        estimate_on(1, size.0 * size.1, |count| map::sample_sensitivity(&probe, plane, count));
     }
     let tell = |done: usize, of: usize| progress.tell(|| format!("sensitivities of {}: row {done} of {of}", machine.id));
     let published = args.reference.and_then(|_| map::mean_sensitivity_usp2009(&probe, plane, size));
@@ -390,16 +440,22 @@ fn bars(global: &Global, machine: &Machine, plane: Plane, args: &MapArgs) -> Res
 /// The map that belongs to a report: errors by joints and geometry, those that are known, at a height.
 pub fn beside(global: &Global, machine: &Machine, budget: &Budget, height: f64, goal: &PathBuf) -> Result<Vec<(PathBuf, Vec<u8>)>, Refused> {
     let length = gr_accuracy::map::Part::Length;
-    let (quantity, what) = match (&budget.joints, &budget.geometry) {
-        (Some(_), Some(_)) => (Quantity::Total, "sum of the longest errors of joints and geometry".to_string()),
-        (None, Some(_)) => (Quantity::Geometric(length), Quantity::Geometric(length).words()),
-        (Some(_), None) => (Quantity::Kinematic(length), Quantity::Kinematic(length).words()),
+    let (quantity, what) = match (budget.joints.is_some(), budget.tells_geometry()) {
+        (true, true) => (Quantity::Total, "sum of the longest errors of joints and geometry".to_string()),
+        (false, true) => (Quantity::Geometric(length), Quantity::Geometric(length).words()),
+        (true, false) => (Quantity::Kinematic(length), Quantity::Kinematic(length).words()),
         _ => return Err(("--map".into(), format!("the file of {} says nothing of its errors: there is nothing to draw", machine.id))),
     };
     let plane = Plane { axis: 2, at: height };
     let probe = Probe::downward(machine);
-    let request = Request { quantity, plane, size: (400, 400), window: None, force: [0.0; 3], signs: None, deviations: None };
+    let request = Request { quantity, plane, size: (400, 400), window: None, force: [0.0; 3], signs: None };
     let progress = Progress::new(global.quiet, format!("map of {}", machine.id));
+    probe.extent();
+    if !closed_form(machine) && !global.quiet {
+        estimate(400 * 400, |count| {
+            map::sample(&probe, budget, &request, count);
+        });
+    }
     let tell = std::sync::Mutex::new(&progress);
     let map = map::map(&probe, budget, &request, &|done, of| {
         if let Ok(p) = tell.try_lock() {
@@ -408,7 +464,13 @@ pub fn beside(global: &Global, machine: &Machine, budget: &Budget, height: f64, 
     });
     drop(progress);
     let title = format!("{}: {what}, Z = {height} mm", machine.id);
-    files(std::slice::from_ref(goal), &Picture::map(&map, &title, &[]), || map.csv())
+    let mut notes: Vec<String> = unsaid(machine, budget).iter().map(without).collect();
+    notes.push("left out: the deflection".to_string());
+    if budget.known.is_some() {
+        notes.push("geometry: by deviations that are given".to_string());
+    }
+    let lines: Vec<String> = notes.iter().flat_map(|n| wrapped(n)).collect();
+    files(std::slice::from_ref(goal), &Picture::map(&map, &title, &lines), || map.csv(&notes))
 }
 
 fn files(goals: &[PathBuf], picture: &Picture, csv: impl Fn() -> String) -> Result<Vec<(PathBuf, Vec<u8>)>, Refused> {

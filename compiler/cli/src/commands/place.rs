@@ -3,15 +3,16 @@
 use std::path::Path;
 
 use gr_accuracy::map::Probe;
-use gr_accuracy::place::{Aim, Part, Rectangle, place, rectangle};
-use gr_accuracy::{Budget, BudgetOptions};
-use gr_ir::geometry;
+use gr_accuracy::place::{Aim, Arm, Found, Mill, Part, Reach, Rectangle, place, rectangle};
+use gr_accuracy::report::{Operations, report, report_of_words};
+use gr_accuracy::{Budget, BudgetOptions, closed_form, put_down};
+use gr_ir::{Sources as _, geometry};
 use gr_machine::Machine;
-use gr_machine::math::{Frame, add, norm, rotate, scale, sub};
-use gr_text::{Diagnostic, FileId, Span, code};
+use gr_machine::math::{Frame, V3, add, norm, rotate, scale, sub};
+use gr_text::{Diagnostic, FileId, Severity, Span, code};
 use serde_json::json;
 
-use super::accuracy::{misfit, referenced, tool_points, unsaid};
+use super::accuracy::{beyond, misfit, referenced, tool_points, unsaid};
 use super::check::{Checked, show};
 use crate::exit::Exit;
 use crate::options::{Global, LintArgs, PlaceAim, PlaceArgs, TableFormat};
@@ -56,36 +57,36 @@ pub fn run(global: &Global, args: &PlaceArgs) -> Exit {
             return if checked.unreadable { Exit::Io } else { Exit::Findings };
         }
     };
-    let turn = machine.cell.part_in_base().turn;
     let aim = if args.aim == PlaceAim::Error { Aim::Error } else { Aim::Margin };
-    let tell = |done: usize, of: usize| progress.tell(|| format!("places: {done} of {of} layers"));
-    // Where rapids are out of reach everywhere, the place goes by the cuts, and the rapids are told.
-    let found = place(&parts(&motion.program, &machine, true), &budget, aim, &tell)
-        .or_else(|| place(&parts(&motion.program, &machine, false), &budget, aim, &tell));
-    let Some(found) = found else {
-        drop(progress);
-        return super::refuse(global, file, code::PLACE_DOES_NOT_FIT, &[machine.id.clone()]);
-    };
-    let [x, y, z] = found.position.map(|v| (v * 1e3).round() / 1e3 + 0.0);
-    let faults = refused(&motion, &machine, Frame { turn, position: [x, y, z] });
+    let wish = Wish { motion: &motion, machine: &machine, budget: &budget, aim, quiet: global.quiet, progress: &progress };
+    let found = wish.found();
+    let error = found.as_ref().ok().and_then(|f| wish.error(f.position));
     drop(progress);
-    let whole = faults.is_empty();
-    // A machine without any data is looked at for reach alone, which the result says; one with some lacks the rest.
+    let mut told = Vec::new();
+    let top = |args: [String; 2]| Diagnostic::new(code::ACCURACY_NO_DATA, FileId(0), Span::default(), &args);
     let parts_of_error = [("kinematic", budget.joints.is_some()), ("geometric", budget.geometry.is_some())];
     let parts_of_error: Vec<&str> = parts_of_error.into_iter().filter(|(_, known)| *known).map(|(n, _)| n).collect();
-    let mut faults = faults;
+    // A machine without any data is looked at for reach alone, which the result says; one with some lacks the rest.
     if !parts_of_error.is_empty() {
-        let top = |args: [String; 2]| Diagnostic::new(code::ACCURACY_NO_DATA, FileId(0), Span::default(), &args);
-        faults.extend(unsaid(&machine, &budget).into_iter().map(top));
+        told.extend(unsaid(&machine, &budget).into_iter().map(top));
+        told.extend(super::map::measured(&machine).map(top));
     }
-    let top = |args: [String; 2]| Diagnostic::new(code::ACCURACY_NO_DATA, FileId(0), Span::default(), &args);
-    faults.extend(super::map::limitless(&machine).map(top));
-    show(&mut renderer, &Checked { sources: motion.sources, found: faults, ..Checked::nothing() });
+    told.extend(super::map::limitless(&machine).map(top));
+    let found = match found {
+        Ok(found) => Some(found),
+        Err(faults) => {
+            told.splice(0..0, faults);
+            None
+        }
+    };
+    show(&mut renderer, &Checked { sources: motion.sources, found: told, ..Checked::nothing() });
     renderer.finish(false);
-    let error = found.error.map(|e| e * 1e3);
-    let printed = super::print(&match args.format {
+    let Some(found) = found else { return Exit::Findings };
+    let [x, y, z] = found.position;
+    let error = error.map(|e| e * 1e3);
+    super::print(&match args.format {
         TableFormat::Json => {
-            format!("{:#}\n", json!({ "machine": machine.id, "position": [x, y, z], "margin": found.margin, "margin_looked_at_every": found.apart, "error_um": error, "error_of": parts_of_error, "whole_program": whole }))
+            format!("{:#}\n", json!({ "machine": machine.id, "position": [x, y, z], "margin": found.margin, "margin_looked_at_every": found.apart, "error_um": error, "error_of": parts_of_error }))
         }
         TableFormat::Csv => {
             format!("x mm,y mm,z mm,margin mm,error um\n{x},{y},{z},{:.3},{}\n", found.margin, error.map_or(String::new(), |e| format!("{e:.3}")))
@@ -93,32 +94,148 @@ pub fn run(global: &Global, args: &PlaceArgs) -> Exit {
         TableFormat::Text => {
             let error = match error {
                 Some(e) => format!("largest error of the path there: {e:.1} µm ({}, the longest; without deflection)\n", parts_of_error.join(" + ")),
+                None if !parts_of_error.is_empty() => "nothing is cut: no error was looked at\n".to_string(),
                 None => "its machine file has no accuracy data: only reach was looked at\n".to_string(),
             };
-            let whole = if whole { "every move of the program can be made there, rapids too\n" } else { "not every move of the program can be made there\n" };
+            let how = if found.apart > 0.0 { format!("looked at every {:.1} mm", found.apart) } else { "by the limits of its axes".to_string() };
             format!(
-                "part's origin at X {x} Y {y} Z {z} mm in the base of {} (--part {x},{y},{z})\nfree to move {:.1} mm any way: every point of the path stays within reach (looked at every {:.1} mm)\n{error}{whole}",
-                machine.id, found.margin, found.apart
+                "part's origin at X {x} Y {y} Z {z} mm in the base of {} (--part {x},{y},{z})\nfree to move {:.1} mm any way: every point of the path stays within reach ({how})\n{error}every move of the program can be made there, rapids too\n",
+                machine.id, found.margin
             )
         }
-    });
-    if whole { printed } else { Exit::Findings }
+    })
+}
+
+/// What is looked for.
+struct Wish<'a> {
+    motion: &'a Motion,
+    machine: &'a Machine,
+    budget: &'a Budget,
+    aim: Aim,
+    quiet: bool,
+    progress: &'a Progress,
+}
+
+/// Moves that are planned for all places together: so many take some seconds.
+const MOVES: usize = 300_000;
+
+impl Wish<'_> {
+    /// The best place where the program can be made, or what stands in the way.
+    fn found(&self) -> Result<Found, Vec<Diagnostic>> {
+        let program = &self.motion.program;
+        let tries = (MOVES / program.len().max(1)).clamp(4, 60);
+        let texts = gr_ir::Texts::new(self.motion.sources.iter().map(|(id, f)| (id, &*f.text)));
+        let limits = |(source, joint, value): &(gr_ir::Source, usize, f64)| {
+            let (file, span) = texts.place(*source);
+            beyond(self.machine, *joint, *value, file, span)
+        };
+        let nowhere = || Diagnostic::new(code::PLACE_DOES_NOT_FIT, FileId(0), Span::default(), std::slice::from_ref(&self.machine.id));
+        if let Some(mill) = Mill::new(self.machine, program, true) {
+            let turned: Vec<Diagnostic> = mill.turned.iter().filter_map(limits).collect();
+            if !turned.is_empty() {
+                return Err(turned);
+            }
+            return self.best(&mill, 1, &mut |_| true).map_err(|_| {
+                // Where rapids are out of reach everywhere: which, when the cuts fit.
+                let Some(cuts) = Mill::new(self.machine, program, false) else { return vec![nowhere()] };
+                let Ok(found) = self.best(&cuts, 1, &mut |_| true) else { return vec![nowhere()] };
+                let mut out: Vec<Diagnostic> = mill.outside(program, found.position).iter().filter_map(limits).collect();
+                out.push(near(nowhere(), found.position, "its cuts fit"));
+                out
+            });
+        }
+        let mut faults = Vec::new();
+        let mut number = 0;
+        let mut planned = |at: V3| {
+            number += 1;
+            self.progress.tell(|| format!("planning at place {number} of at most {tries}"));
+            let found = refused(self.motion, self.machine, at);
+            let whole = found.is_empty();
+            if number == 1 {
+                faults = found;
+            }
+            whole
+        };
+        match self.best(&self.arm(true), tries, &mut planned) {
+            Ok(found) => Ok(found),
+            Err(Some(at)) => {
+                faults.push(near(nowhere(), at, &format!("the best of {number} places that were planned")));
+                Err(faults)
+            }
+            Err(None) => {
+                let Ok(found) = self.best(&self.arm(false), 1, &mut |_| true) else { return Err(vec![nowhere()]) };
+                let mut out = refused(self.motion, self.machine, found.position);
+                out.push(near(nowhere(), found.position, "its cuts fit"));
+                Err(out)
+            }
+        }
+    }
+
+    /// The largest error of the program there, as `accuracy` has it.
+    fn error(&self, at: V3) -> Option<f64> {
+        if !self.budget.tells_any() {
+            return None;
+        }
+        let program = &self.motion.program;
+        let put = put(self.motion, self.machine, at);
+        let operations = Operations::new(program);
+        let tell = |done: usize, of: usize| self.progress.tell(|| format!("errors at step {done} of {of}"));
+        let report = match report_of_words(program, &put, &operations, self.budget, None, &tell) {
+            Some(report) => report,
+            None => {
+                let texts = gr_ir::Texts::new(self.motion.sources.iter().map(|(id, f)| (id, &*f.text)));
+                let planned = gr_robot::plan(program, &put, &texts, &gr_robot::Options::default()).ok()?;
+                report(&planned.program, &operations, self.budget, None, &tell)
+            }
+        };
+        report.rows.iter().filter_map(|r| r.worst.as_ref()).map(|w| w.errors.sum()).reduce(f64::max)
+    }
+
+    fn arm(&self, rapids: bool) -> Arm<'_> {
+        let parts = parts(&self.motion.program, self.machine, rapids);
+        if let Some(first) = parts.first().filter(|_| rapids && !self.quiet && !closed_form(self.machine)) {
+            first.probe.extent();
+            super::map::estimate(Arm::looks(&parts), |count| first.probe.sample_reach(count));
+        }
+        Arm::new(parts, &|done, of| self.progress.tell(|| format!("reach: {done} of {of} layers")))
+    }
+
+    fn best(&self, reach: &dyn Reach, tries: usize, allowed: &mut dyn FnMut(V3) -> bool) -> Result<Found, Option<V3>> {
+        let tell = |done: usize, of: usize| self.progress.tell(|| format!("places: {done} of {of} parts of the grid"));
+        place(reach, self.budget, self.aim, tries, allowed, &tell)
+    }
+}
+
+/// A finding with the place that was nearest to what is wanted.
+fn near(mut finding: Diagnostic, at: V3, what: &str) -> Diagnostic {
+    let [x, y, z] = at;
+    finding.notes.push(format!("at X {x} Y {y} Z {z} (--part {x},{y},{z}), {what}, but not every move can be made there"));
+    finding
+}
+
+/// The machine with the part there, turned as its file has it.
+fn put(motion: &Motion, machine: &Machine, at: V3) -> Machine {
+    let mut put = put_down(machine, Frame { position: at, ..machine.cell.part_in_base() });
+    let say = |code, args: &[String]| Diagnostic::new(code, FileId(0), Span::default(), args);
+    tool_points(&mut Vec::new(), &mut put, &motion.program, &say);
+    put
 }
 
 /// What keeps the program from being made there: its plan is the one that a build would take.
-fn refused(motion: &Motion, machine: &Machine, part: Frame) -> Vec<Diagnostic> {
-    let mut put = machine.clone();
-    (put.cell.table, put.cell.part) = (Frame::IDENTITY, part);
-    let say = |code, args: &[String]| Diagnostic::new(code, FileId(0), Span::default(), args);
-    tool_points(&mut Vec::new(), &mut put, &motion.program, &say);
+fn refused(motion: &Motion, machine: &Machine, at: V3) -> Vec<Diagnostic> {
+    let put = put(motion, machine, at);
     let texts = gr_ir::Texts::new(motion.sources.iter().map(|(id, f)| (id, &*f.text)));
-    gr_robot::plan(&motion.program, &put, &texts, &gr_robot::Options::default()).err().unwrap_or_default()
+    let found = gr_robot::plan(&motion.program, &put, &texts, &gr_robot::Options::default()).err().unwrap_or_default();
+    found.into_iter().filter(|d| d.severity == Severity::Error).collect()
 }
+
+/// What one tool does: its frame, points of its cuts, ends of its rapids.
+type Way = (Frame, Vec<V3>, Vec<V3>);
 
 /// The path of each tool, from the part's origin in the directions of the base; of rapids their ends.
 fn parts<'m>(program: &gr_ir::Program, machine: &'m Machine, rapids: bool) -> Vec<Part<'m>> {
     let turn = machine.cell.part_in_base().turn;
-    let mut out: Vec<(Frame, Vec<[f64; 3]>)> = Vec::new();
+    let mut out: Vec<Way> = Vec::new();
     let mut known = std::collections::HashSet::new();
     let mut cursor = program.cursor();
     while let Some(view) = cursor.next() {
@@ -126,15 +243,16 @@ fn parts<'m>(program: &gr_ir::Program, machine: &'m Machine, rapids: bool) -> Ve
             continue;
         }
         let tool = tool(machine, view.state);
-        let n = out.iter().position(|(t, _)| *t == tool).unwrap_or_else(|| {
-            out.push((tool, Vec::new()));
+        let n = out.iter().position(|(t, ..)| *t == tool).unwrap_or_else(|| {
+            out.push((tool, Vec::new(), Vec::new()));
             out.len() - 1
         });
         let work = gr_accuracy::work_shift(view.state);
-        let mut push = |p: [f64; 3]| {
+        let cuts = view.op.feeds();
+        let mut push = |p: V3| {
             let p = rotate(&turn, work.apply(p));
-            if known.insert((n, p.map(|v| (v / SAME).round() as i64))) {
-                out[n].1.push(p);
+            if known.insert((n, cuts, p.map(|v| (v / SAME).round() as i64))) {
+                if cuts { out[n].1.push(p) } else { out[n].2.push(p) }
             }
         };
         if !view.op.feeds() {
@@ -152,9 +270,13 @@ fn parts<'m>(program: &gr_ir::Program, machine: &'m Machine, rapids: bool) -> Ve
         });
     }
     if out.is_empty() {
-        out.push((Frame::IDENTITY, vec![[0.0; 3]]));
+        out.push((Frame::IDENTITY, Vec::new(), vec![[0.0; 3]]));
     }
-    let part = |(tool, points)| Part { probe: Probe::downward(machine).with_tool(tool, &turn), points };
+    let part = |(tool, mut points, ends): Way| {
+        let cuts = points.len();
+        points.extend(ends);
+        Part { probe: Probe::downward(machine).with_tool(tool, &turn), points, cuts }
+    };
     out.into_iter().map(part).collect()
 }
 

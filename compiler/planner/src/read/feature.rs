@@ -10,12 +10,18 @@ use crate::process::*;
 /// More copies of one feature than this are a mistake.
 const MOST_COPIES: usize = 100_000;
 
+/// Half the band of a fit. The schema has `deviation` and `grade` as lengths: a fundamental deviation is the limit next to the
+/// zero line (ISO 286-1), so the whole band, as wide as the standard tolerance, lies on one side of it, and half
+/// of it is left each way. A `grade` of 1 and more is the number of a grade, not a length of anything that is called a fit.
+fn half_of_fit(fit: Node<'_>) -> Option<f64> {
+    fit.real("grade").filter(|g| *g > 0.0 && *g < 1.0).map(|g| g / 2.0)
+}
+
 /// The least of the plus-or-minus tolerances of the lengths that a feature is made of: its diameter, the sides of its
-/// profile, its radii; and a length whose limits are those of a fit, which are not read. Its workpiece, its operations and
-/// other features are none of its lengths.
-fn tolerance(feature: Node<'_>) -> (Option<f64>, Option<u64>) {
+/// profile, its radii; and a fit that can't be read. Its workpiece, its operations and other features are none of its lengths.
+fn tolerance(feature: Node<'_>) -> (Option<f64>, Option<Origin>) {
     let mut least: Option<f64> = None;
-    let mut fit = None;
+    let mut fit: Option<Origin> = None;
     let mut seen = std::collections::BTreeSet::from([feature.index()]);
     let mut open = vec![feature];
     while let Some(node) = open.pop() {
@@ -28,7 +34,10 @@ fn tolerance(feature: Node<'_>) -> (Option<f64>, Option<u64>) {
             }
         }
         if node.is_a("limits_and_fits") {
-            fit = Some(fit.map_or(node.id(), |f: u64| f.min(node.id())));
+            match half_of_fit(node) {
+                Some(t) => least = Some(least.map_or(t, |l| l.min(t))),
+                None => fit = Some(fit.filter(|f| f.id < node.id()).unwrap_or(origin(node))),
+            }
         }
         let foreign = |n: &Node<'_>| n.is_a("workpiece") || n.is_a("machining_operation") || n.is_a("manufacturing_feature");
         for next in node.references().filter(|n| !foreign(n)) {

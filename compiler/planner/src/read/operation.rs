@@ -348,6 +348,15 @@ impl<'m> Reader<'m> {
             bar: node.real("tool_holder_diameter_for_spindle_orientation").filter(|d| *d > 0.0),
             number: 0,
         };
+        if self.units == crate::process::Units::StepModeler && tool.is_pointed() && tool.tip_angle.is_some_and(|a| a > std::f64::consts::FRAC_PI_2 + 1e-3) {
+            let (of, name) = match dimension.filter(|d| d.real("tool_tip_half_angle").is_some()) {
+                Some(d) => (d, "tool_tip_half_angle"),
+                None => (node, "point_angle"),
+            };
+            let value = of.real(name).unwrap_or(0.0).to_string();
+            self.say_at(code::PLAN_BAD_SIZE, of, name, &[&super::title(node), name, &value, "a quarter of a turn at most: with `--step-units step-modeler` angles are radians"]);
+            return None;
+        }
         self.unused_of_tool(node, body, dimension, &tool);
         tool = self.numbered(tool);
         Some(tool)
