@@ -58,6 +58,8 @@ pub trait Reach: Sync {
     fn fits(&self, at: V3) -> bool;
     /// How far the part may be moved any way from a place that fits, and how finely that was looked at, mm; it is about `about`.
     fn margin(&self, at: V3, about: f64) -> (f64, f64);
+    /// Whether [`Reach::free`] is exact, and no more in the middle between two places than the less of theirs.
+    fn exact(&self) -> bool;
     /// The greatest error there, mm, of the points looked at; none when one is out of reach or it is more than `most`.
     fn error(&self, budget: &Budget, at: V3, look: Look, most: f64) -> Option<f64>;
 }
@@ -193,6 +195,40 @@ impl Search<'_> {
         }
         best
     }
+
+    /// The same worth in the middle of where it is that much, axis by axis: of many places that are as free the one that people
+    /// would choose.
+    fn centred(&self, best: Best) -> Best {
+        const HALVINGS: usize = 40;
+        if self.by_error || !self.reach.exact() {
+            return best;
+        }
+        let mut out = best;
+        for i in 0..3 {
+            let with = |v: f64| {
+                let mut at = out.at;
+                at[i] = v;
+                at
+            };
+            let as_free = |v: f64| self.reach.free(with(v), Look::All, best.worth - 1e-6).is_some();
+            let end = |far: f64| {
+                let (mut good, mut bad) = (out.at[i], far);
+                if as_free(bad) {
+                    return bad;
+                }
+                for _ in 0..HALVINGS {
+                    let mid = (good + bad) / 2.0;
+                    if as_free(mid) { good = mid } else { bad = mid }
+                }
+                good
+            };
+            let at = with((end(self.room[i].0) + end(self.room[i].1)) / 2.0);
+            if let Some(free) = self.reach.free(at, Look::All, 0.0).filter(|_| self.reach.fits(at)) {
+                out = Best { at, free, worth: free };
+            }
+        }
+        out
+    }
 }
 
 /// A place as it is told, in thousandths of a mm, where the part still fits so.
@@ -241,7 +277,7 @@ pub fn place(
         }
         let free = reach.free(at, Look::All, 0.0).unwrap_or(0.0);
         let here = Best { worth: candidate.worth, at, free };
-        let best = Some(search.refined(here)).filter(|b| !known(b.at)).unwrap_or(here);
+        let best = Some(search.centred(search.refined(here))).filter(|b| !known(b.at)).unwrap_or(here);
         let position = told(best.at, reach);
         if allowed(position) {
             let (margin, apart) = reach.margin(position, best.free);

@@ -121,6 +121,9 @@ fn margin_of_a_mill() {
     let most = free.into_iter().fold(f64::INFINITY, f64::min);
     assert!(found.margin <= most + 1e-6 && found.margin > most - 0.2, "{found:?} of {most}");
     assert_eq!(found.apart, 0.0);
+    // In the middle of the table, too.
+    let middle = |i: usize| (machine.joints[i].max.unwrap() + machine.joints[i].min.unwrap()) / 2.0;
+    assert!((found.position[0] + 60.0 - middle(0)).abs() < 0.01 && (found.position[1] + 40.0 - middle(1)).abs() < 0.01, "{found:?}");
 }
 
 /// A part as wide as the travel fits, without any margin; one that is wider does not.

@@ -475,6 +475,7 @@ fn senseless_options() {
         vec!["--width=60", "--depth=1"],
         vec!["--deviations=ls1x=1,ls1x=2"],
         vec!["--deviations=ls9x=1"],
+        vec!["--deviations=ls1x=1e300"],
         vec!["--deviations=ls1x=1", "--it=5"],
         vec!["--depth=-1"],
         vec!["--diameter=0"],
@@ -553,7 +554,15 @@ fn patterns_of_the_publication() {
 #[test]
 fn rectangles_elsewhere() {
     let folder = tempfile::tempdir().unwrap();
-    let all = ["unb/router", "generic/mill3"].map(|id| whole(&run(folder.path(), &["place", "--machine", id])));
+    let place = |more: &[&str]| whole(&run(folder.path(), &[&["place", "--message-format=short", "--machine"], more].concat()));
+    std::fs::write(folder.path().join("empty.ngc"), "M2\n").unwrap();
+    let all = [
+        place(&["unb/router"]),
+        place(&["generic/mill3"]),
+        place(&["generic/mill3", "--heights=900,950"]),
+        place(&["comau/tricept806"]),
+        place(&["generic/mill3", "empty.ngc"]),
+    ];
     insta::assert_snapshot!(all.join("\n"));
 }
 

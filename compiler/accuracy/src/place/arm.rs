@@ -138,6 +138,10 @@ impl Reach for Arm<'_> {
             .fold((f64::INFINITY, 0.0f64), |(m, a), (margin, apart)| (m.min(margin), a.max(apart)))
     }
 
+    fn exact(&self) -> bool {
+        false
+    }
+
     fn error(&self, budget: &Budget, at: V3, look: Look, most: f64) -> Option<f64> {
         if !budget.tells_any() {
             return None;

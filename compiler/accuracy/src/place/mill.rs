@@ -87,6 +87,14 @@ impl<'a> Mill<'a> {
                 out.stops.push(stop);
             }
         });
+        if posed.is_empty() {
+            // A program without any move: its origin.
+            out.tools.push(machine.tool_of_length(0.0));
+            let stop = Stop { tool: 0, rotary: [0.0; 3], point: [0.0; 3], source: Source::default(), cuts: false };
+            let mut at_origin = out.posed(&stop);
+            at_origin.take(stop.point);
+            posed.push(at_origin);
+        }
         out.few = telling(out.stops.len(), |i| out.stops[i].point);
         out.faces = out.bounded(&posed);
         out.room = out.box_of_faces();
@@ -285,6 +293,10 @@ impl Reach for Mill<'_> {
 
     fn margin(&self, at: V3, _: f64) -> (f64, f64) {
         (self.free(at, Look::All, f64::NEG_INFINITY).unwrap_or(0.0).max(0.0), 0.0)
+    }
+
+    fn exact(&self) -> bool {
+        true
     }
 
     fn error(&self, budget: &Budget, at: V3, look: Look, most: f64) -> Option<f64> {

@@ -310,6 +310,10 @@ fn estimate_on(cores: usize, places: usize, some: impl FnOnce(usize)) {
     }
 }
 
+/// Greater deviations are none that a model of small ones is about, mm and degrees.
+const MOST_OFF: f64 = 100.0;
+const MOST_LEAN: f64 = 10.0;
+
 /// Deviations by name, in the order of the machine's parameters, mm and rad.
 pub fn deviations(text: &str, machine: &Machine) -> Result<Vec<f64>, String> {
     let all = machine.parameters();
@@ -325,7 +329,11 @@ pub fn deviations(text: &str, machine: &Machine) -> Result<Vec<f64>, String> {
         if std::mem::replace(&mut given[i], true) {
             return Err(format!("`{}` is given twice", name.trim()));
         }
-        out[i] = if all[i].kind == ParameterKind::Angle { value.to_radians() } else { value };
+        let angle = all[i].kind == ParameterKind::Angle;
+        if value.abs() > if angle { MOST_LEAN } else { MOST_OFF } {
+            return Err(format!("`{}={value}` is no small deviation: at most {MOST_OFF} mm or {MOST_LEAN}°", name.trim()));
+        }
+        out[i] = if angle { value.to_radians() } else { value };
     }
     Ok(out)
 }

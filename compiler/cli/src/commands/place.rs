@@ -7,7 +7,7 @@ use gr_accuracy::place::{Aim, Arm, Found, Mill, Part, Reach, Rectangle, place, r
 use gr_accuracy::report::{Operations, report, report_of_words};
 use gr_accuracy::{Budget, BudgetOptions, closed_form, put_down};
 use gr_ir::{Sources as _, geometry};
-use gr_machine::Machine;
+use gr_machine::{Chain, Machine};
 use gr_machine::math::{Frame, V3, add, norm, rotate, scale, sub};
 use gr_text::{Diagnostic, FileId, Severity, Span, code};
 use serde_json::json;
@@ -42,6 +42,10 @@ pub fn run(global: &Global, args: &PlaceArgs) -> Exit {
         return super::refuse(global, &name, code::ACCURACY_BAD_OPTION, &[what, why]);
     }
     let machine = referenced(machine, args.reference);
+    if let Chain::Incomplete { missing, .. } = &machine.chain {
+        let why = format!("it is a template; its file must still say {}", missing.join(", "));
+        return super::refuse(global, &name, code::ACCURACY_BAD_OPTION, &[machine.id.clone(), why]);
+    }
     let budget = Budget::new(&machine, BudgetOptions { grade: None, usp2009: args.reference.is_some() });
     let Some(file) = &args.file else {
         return largest(global, args, &machine);
@@ -303,8 +307,11 @@ fn largest(global: &Global, args: &PlaceArgs, machine: &Machine) -> Exit {
     let (low, high) = (ends[0], *ends.last().unwrap_or(&ends[0]));
     let layers = ((high - low).abs() / 20.0).ceil() as usize;
     let heights: Vec<f64> = (0..=layers).map(|i| low + (high - low) * i as f64 / layers.max(1) as f64).collect();
-    let Some(Rectangle { x: (x0, x1), middle, half }) = rectangle(&Probe::downward(machine), &heights) else {
-        return super::refuse(global, Path::new(&machine.id), code::PLACE_DOES_NOT_FIT, &[machine.id.clone()]);
+    let probe = Probe::downward(machine);
+    let Some(Rectangle { x: (x0, x1), middle, half }) = rectangle(&probe, &heights) else {
+        let (least, most) = probe.extent()[2];
+        let why = format!("no rectangle is within reach from there to there; the tool gets to Z {least:.1} to {most:.1} mm at most");
+        return super::refuse(global, Path::new(&machine.id), code::ACCURACY_BAD_OPTION, &[format!("--heights {}", args.heights), why]);
     };
     let (y0, y1) = (middle - half, middle + half);
     super::print(&match args.format {
