@@ -331,7 +331,7 @@ pub fn deviations(text: &str, machine: &Machine) -> Result<Vec<f64>, String> {
         }
         let angle = all[i].kind == ParameterKind::Angle;
         if value.abs() > if angle { MOST_LEAN } else { MOST_OFF } {
-            return Err(format!("`{}={value}` is no small deviation: at most {MOST_OFF} mm or {MOST_LEAN}°", name.trim()));
+            return Err(format!("`{}` is no small deviation: at most {MOST_OFF} mm or {MOST_LEAN}°", name.trim()));
         }
         out[i] = if angle { value.to_radians() } else { value };
     }
