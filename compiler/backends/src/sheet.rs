@@ -117,7 +117,7 @@ fn span(e: &Extent, axis: usize) -> String {
 }
 
 /// Hours, minutes, seconds.
-fn clock(ns: u64) -> String {
+pub(crate) fn clock(ns: u64) -> String {
     let s = (ns + 500_000_000) / 1_000_000_000;
     format!("{}:{:02}:{:02}", s / 3600, s / 60 % 60, s % 60)
 }

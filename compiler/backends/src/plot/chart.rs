@@ -111,8 +111,7 @@ pub fn draw(path: &Path, options: &Options, canvas: &mut dyn Canvas) {
 fn heading(path: &Path, options: &Options, canvas: &mut dyn Canvas, width: f32) {
     canvas.text(&options.title, [14.0, 26.0], 17.0, Anchor::Start, TEXT);
     let size = path.extent.size();
-    let seconds = path.totals.ns() / 1_000_000_000;
-    let time = format!("{}:{:02}:{:02}", seconds / 3600, seconds / 60 % 60, seconds % 60);
+    let time = crate::sheet::clock(path.totals.ns());
     let text = if path.is_empty() {
         "no motion".to_owned()
     } else {
@@ -162,12 +161,8 @@ fn view(path: &Path, show: Show, rect: [f32; 4], canvas: &mut dyn Canvas) {
             triad(&projection, [left + 46.0, bottom - 64.0], canvas);
         }
     }
-    scale_bar(
-        &panel,
-        right - 14.0,
-        if projection.axes.is_some() { panel.bottom - 10.0 } else { bottom - 10.0 },
-        canvas,
-    );
+    // Beside the view's name, or below the path: never where the path is.
+    scale_bar(&panel, right - 14.0, if projection.axes.is_some() { top + 17.0 } else { bottom - 5.0 }, canvas);
     canvas.clip(panel.left - 20.0, panel.top - 12.0, panel.right + 20.0, panel.bottom + 20.0);
     for (class, points) in path.runs() {
         thinned(class, points, &projection, &panel, canvas);

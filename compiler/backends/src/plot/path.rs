@@ -99,6 +99,15 @@ impl Common {
             _ => [axes[0], axes[1], axes[2]],
         }
     }
+    /// Widens `extent` by a move: curves count as they are, not as they are drawn.
+    fn reach(&self, view: &View<'_, '_>, from: &Pose, extent: &mut Extent) {
+        extent.add(self.place(&from.axes));
+        if self.same {
+            extent.add_move(&view.op, from, view.end);
+        } else {
+            flatten(&view.op, from, view.end, 1e-3, |p| extent.add(self.place(p)));
+        }
+    }
 }
 
 impl Path {
@@ -138,12 +147,9 @@ impl Path {
             self.points.push(single(start));
             self.extent.add(start);
         }
+        common.reach(view, from, &mut self.extent);
         let op = if self.points.len() < MOST_POINTS { view.op } else { Op::Linear };
-        flatten(&op, from, view.end, tolerance, |p| {
-            let p = common.place(p);
-            self.extent.add(p);
-            self.points.push(single(p));
-        });
+        flatten(&op, from, view.end, tolerance, |p| self.points.push(single(common.place(p))));
     }
 
     /// The same with rapids as a machine makes them, where it makes them differently.
