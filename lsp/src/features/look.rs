@@ -269,7 +269,7 @@ pub fn tokens(mut view: View, range: Option<lsp::Range>) -> Answer<(View, Arc<Ve
 fn encode(view: &View, tokens: &[Token]) -> Vec<lsp::SemanticToken> {
     let mut out = Vec::with_capacity(tokens.len());
     let (mut line, mut column) = (0, 0);
-    let mut cursor = Cursor::new(&view.text, view.columns);
+    let mut cursor = Cursor::new(&view.text, view.columns, tokens.first().map_or(0, |t| t.span.start));
     for t in tokens {
         let start = cursor.position(t.span.start);
         let end = cursor.position(t.span.end);
@@ -304,9 +304,13 @@ struct Cursor<'t> {
 }
 
 impl<'t> Cursor<'t> {
-    fn new(text: &'t Text, columns: crate::text::Columns) -> Cursor<'t> {
-        let pieces = text.pieces().collect();
-        let mut cursor = Cursor { text, columns, pieces, piece: 0, line: 0, start: 0, next: 0, ascii: false };
+    /// Begins at the line of a byte.
+    fn new(text: &'t Text, columns: crate::text::Columns, first: u32) -> Cursor<'t> {
+        let pieces: Vec<(u32, &'t str)> = text.pieces().collect();
+        let line = text.position(first, columns).line;
+        let start = text.line_start(line);
+        let piece = pieces.partition_point(|p| p.0 <= start).saturating_sub(1);
+        let mut cursor = Cursor { text, columns, pieces, piece, line, start, next: 0, ascii: false };
         cursor.measure();
         cursor
     }
@@ -455,11 +459,12 @@ mod tests {
 
     proptest! {
         #[test]
-        fn the_cursor_finds_what_a_search_finds(parts in prop::collection::vec(prop::sample::select(vec!["G1 X1", "\n", "\r\n", "\r", "é", "𝄞", " "]), 0..60), utf8 in any::<bool>()) {
+        fn the_cursor_finds_what_a_search_finds(parts in prop::collection::vec(prop::sample::select(vec!["G1 X1", "\n", "\r\n", "\r", "é", "𝄞", " "]), 0..60), utf8 in any::<bool>(), first in 0usize..80) {
             let (plain, columns) = (parts.concat(), if utf8 { Columns::Utf8 } else { Columns::Utf16 });
             let text = Text::new(&plain);
-            let mut cursor = Cursor::new(&text, columns);
-            for (at, _) in plain.char_indices() {
+            let first = plain.char_indices().map(|c| c.0).nth(first).unwrap_or(0);
+            let mut cursor = Cursor::new(&text, columns, first as u32);
+            for (at, _) in plain.char_indices().filter(|c| c.0 >= first) {
                 // Between the two characters of a line end is no place of a token.
                 if plain.as_bytes().get(at) != Some(&b'\n') || at == 0 || plain.as_bytes()[at - 1] != b'\r' {
                     prop_assert_eq!(cursor.position(at as u32), text.position(at as u32, columns), "{} of {:?}", at, plain);

@@ -144,10 +144,35 @@ fn tool_row(view: &View, number: i64) -> Option<lsp::Location> {
     Some(lsp::Location { uri: lsp::Uri::from_file_path(path)?, range: Text::new(&text).range(item.span, view.columns) })
 }
 
+/// Where programs that are run with this tool table take the tool of the row at a byte.
+fn uses_of_tool(view: &View, offset: u32, declaration: bool) -> Vec<lsp::Location> {
+    let rows = gr_ide::config::tools::outline(&view.text.to_string());
+    let Some(row) = rows.iter().find(|r| r.range.start <= offset && offset <= r.range.end) else { return Vec::new() };
+    let Some(number) = row.name.strip_prefix('T').and_then(|n| n.parse().ok()) else { return Vec::new() };
+    let own = lsp::Location { uri: view.uri.clone(), range: view.range(row.span) };
+    let mut found: Vec<lsp::Location> = declaration.then_some(own).into_iter().collect();
+    let mut stations = BTreeMap::new();
+    for (path, uri, file) in view.other_programs() {
+        let folder = path.parent().map(PathBuf::from);
+        let station = stations.entry(folder).or_insert_with(|| view.host.station(&path, &view.settings));
+        if !station.files.contains(&view.path) {
+            continue;
+        }
+        let head: String = file.chunks.first().map_or(String::new(), |c| c.text.to_string());
+        let dialect = (station.dialect_of)(&path, &head);
+        let uses = names::occurrences(gcode::Doc { file: &file, dialect }, &Name::Tool(number), None);
+        found.extend(uses.into_iter().map(|o| location(&uri, &file, o.span, view)));
+    }
+    found
+}
+
 /// Everywhere that the name under the cursor stands.
 pub fn references(mut view: View, at: lsp::Position, declaration: bool) -> Answer<Vec<lsp::Location>> {
     let offset = view.offset(at);
     let wanted = |o: &gr_ide::Occurrence| declaration || o.role != Role::Definition;
+    if matches!(view.kind, Kind::Tools) {
+        return Ok(uses_of_tool(&view, offset, declaration));
+    }
     match everywhere(&mut view, offset)? {
         Target::None => Ok(Vec::new()),
         Target::Instance(_, spans) => {

@@ -134,3 +134,24 @@ fn ini_and_parameter_files() {
     assert_eq!(c.diagnostics(&other), Vec::<serde_json::Value>::new());
     c.shut_down();
 }
+
+#[test]
+fn uses_of_the_tools_of_a_table() {
+    let project = "schema = 1\n[project]\ntools = \"mill.tbl\"\n";
+    let other = "schema = 1\n[project]\ntools = \"../other.tbl\"\n";
+    let files = [
+        ("gcc-robot.toml", project),
+        ("mill.tbl", "T1 P1 D6\nT2 P2 D8\n"),
+        ("a.ngc", "G21\nT2 M6\nG43 H2\nT1\nM2\n"),
+        ("b.ngc", "T2 M6\nM2\n"),
+        ("elsewhere/gcc-robot.toml", other),
+        ("elsewhere/c.ngc", "T2 M6\nM2\n"),
+    ];
+    let mut c = Client::new(&files, json!({}));
+    let uri = c.open("mill.tbl", None);
+    let mut at = c.at(&uri, "T|2 P2");
+    at["context"] = json!({ "includeDeclaration": true });
+    let found = c.request("textDocument/references", at);
+    assert_eq!(c.places(&found), ["a.ngc:2 2", "b.ngc:1 2", "mill.tbl:2 T2 P2 D8"]);
+    c.shut_down();
+}
