@@ -47,6 +47,10 @@ pub fn assign(tools: &[Tool], table: &Table<'_>, file: FileId) -> (Vec<Loaded>, 
             let args = [(equal + 1).to_string(), title(tool), row.number.to_string()];
             found.push(Diagnostic::new(code::TOOL_TABLE_SEVERAL_TOOLS, file, tool.origin.span, &args));
         }
+        if best / 4 == RELATED {
+            let args = [title(tool), row.number.to_string(), row.comment.trim().to_string()];
+            found.push(Diagnostic::new(code::TOOL_TABLE_OTHER_TYPE, file, tool.origin.span, &args));
+        }
         let number = u32::try_from(row.number).unwrap_or_default();
         loaded.push(Loaded { tool: tool.number, number, length: Some(row.offset[2] * table.unit) });
     }
@@ -88,6 +92,10 @@ pub fn own_numbers(tools: &[Tool]) -> Vec<Loaded> {
     tools.iter().zip(numbers).map(|(t, number)| Loaded { tool: t.number, number, length: None }).collect()
 }
 
+/// How well a type fits: named as the file names it, and of a type that does the same work.
+const EXACT: u32 = 4;
+const RELATED: u32 = 2;
+
 /// How well a row fits a tool; none: not at all.
 fn fit(tool: &Tool, row: &gr_interp::Tool, unit: f64) -> Option<u32> {
     if (row.diameter * unit - tool.diameter).abs() > DIAMETER {
@@ -95,9 +103,12 @@ fn fit(tool: &Tool, row: &gr_interp::Tool, unit: f64) -> Option<u32> {
     }
     let kind = match kind_in(&row.comment) {
         None => 1,
-        Some(k) if k == dense(&tool.kind) => 3,
-        Some(k) if family(&k) == family(&dense(&tool.kind)) => 2,
-        Some(_) => return None,
+        Some(k) if k == dense(&tool.kind) => EXACT,
+        Some(k) => match (type_of(&k), type_of(&dense(&tool.kind))) {
+            (Some(a), Some(b)) if a.0 == b.0 => EXACT - 1,
+            (Some(a), Some(b)) if a.1 == b.1 => RELATED,
+            _ => return None,
+        },
     };
     let ball = dense(&tool.kind).starts_with("BALL");
     let radius = match radius_in(&row.comment) {
@@ -113,30 +124,41 @@ fn dense(text: &str) -> String {
     text.chars().filter(char::is_ascii_alphanumeric).map(|c| c.to_ascii_uppercase()).collect()
 }
 
-/// Types as the standard and as machinists call them; tools of one row do the same work.
-const FAMILIES: [&[&str]; 12] = [
-    &["ENDMILL", "FACEMILL", "SHELLMILL", "SLOTDRILL", "FLATENDMILL"],
-    &["BALLENDMILL", "BALLNOSEENDMILL", "BALLNOSE", "BALLMILL"],
-    &["BULLNOSEENDMILL", "BULLNOSE", "CORNERRADIUS", "TOROID"],
-    &["TWISTDRILL", "SPADEDRILL", "DRILL", "CARBIDEDRILL"],
-    &["CENTERDRILL", "CENTREDRILL", "SPOTDRILL", "SPOTTINGDRILL"],
-    &["COUNTERSINK", "COUNTERSINKINGTOOL", "CHAMFER", "CHAMFERMILL"],
-    &["COUNTERBORE", "COUNTERBORINGTOOL"],
-    &["REAMER", "REAMING", "TAPEREDREAMER"],
-    &["TAPPINGTOOL", "TAP", "TAPEREDTAP"],
-    &["BORINGTOOL", "BORINGBAR", "BORINGHEAD"],
-    &["TSLOTMILL", "SLOTMILL", "SIDEMILL", "WOODRUFFKEYSEATMILL", "DOVETAILMILL"],
-    &["TAPEREDENDMILL", "THREADMILL"],
+/// Types as the standard and as machinists call them. Names of one row are one type; types of one group do the same
+/// work, more or less, and that is told.
+const TYPES: [(u32, &[&str]); 21] = [
+    (0, &["ENDMILL", "SLOTDRILL", "FLATENDMILL"]),
+    (0, &["FACEMILL", "SHELLMILL"]),
+    (1, &["BALLENDMILL", "BALLNOSEENDMILL", "BALLNOSE", "BALLMILL"]),
+    (2, &["BULLNOSEENDMILL", "BULLNOSE", "CORNERRADIUS", "TOROID"]),
+    (3, &["TWISTDRILL", "DRILL", "CARBIDEDRILL"]),
+    (3, &["SPADEDRILL"]),
+    (4, &["CENTERDRILL", "CENTREDRILL"]),
+    (4, &["SPOTDRILL", "SPOTTINGDRILL"]),
+    (5, &["COUNTERSINK", "COUNTERSINKINGTOOL"]),
+    (5, &["CHAMFER", "CHAMFERMILL"]),
+    (6, &["COUNTERBORE", "COUNTERBORINGTOOL"]),
+    (7, &["REAMER", "REAMING"]),
+    (8, &["TAPEREDREAMER"]),
+    (9, &["TAPPINGTOOL", "TAP"]),
+    (10, &["TAPEREDTAP"]),
+    (11, &["BORINGTOOL", "BORINGBAR", "BORINGHEAD"]),
+    (12, &["TSLOTMILL", "WOODRUFFKEYSEATMILL"]),
+    (12, &["SLOTMILL", "SIDEMILL"]),
+    (13, &["DOVETAILMILL"]),
+    (14, &["TAPEREDENDMILL"]),
+    (15, &["THREADMILL"]),
 ];
 
-fn family(kind: &str) -> Option<usize> {
-    FAMILIES.iter().position(|f| f.contains(&kind))
+/// Row of the table and group of a type.
+fn type_of(kind: &str) -> Option<(usize, u32)> {
+    TYPES.iter().enumerate().find(|(_, (_, names))| names.contains(&kind)).map(|(row, (group, _))| (row, *group))
 }
 
 /// The type that a remark names: the longest name in it.
 fn kind_in(remark: &str) -> Option<String> {
     let text = dense(remark);
-    let names = FAMILIES.iter().flat_map(|f| f.iter()).filter(|n| text.contains(**n));
+    let names = TYPES.iter().flat_map(|(_, names)| names.iter()).filter(|n| text.contains(**n));
     names.max_by_key(|n| n.len()).map(|n| (*n).to_string())
 }
 
@@ -188,6 +210,20 @@ mod tests {
         assert_eq!(numbers, [(1, 1), (2, 2), (3, 3)]);
         let errors: Vec<_> = found.iter().filter(|d| d.code == code::TOOL_TABLE_NO_SUCH_TOOL).collect();
         assert!(errors.len() == 1 && errors[0].message.contains("reamer") && errors[0].notes[0].contains("already"), "{found:?}");
+    }
+
+    #[test]
+    fn another_type_is_told_or_refused() {
+        let told = |kind: &str, remark: &str| {
+            let (rows, _) = gr_interp::read_tools(&format!("T1 P1 D6 ;{remark}\n"), FileId(1));
+            let table = Table { name: "t.tbl".into(), rows: &rows, unit: 1.0 };
+            assign(&[tool(kind, 6.0, 0.0)], &table, FileId(0)).1.iter().map(|d| d.code).collect::<Vec<_>>()
+        };
+        assert_eq!(told("CENTER_DRILL", "spot drill"), [code::TOOL_TABLE_OTHER_TYPE]);
+        assert_eq!(told("ENDMILL", "face mill"), [code::TOOL_TABLE_OTHER_TYPE]);
+        assert_eq!(told("TWIST_DRILL", "drill"), []);
+        assert_eq!(told("TAPERED_ENDMILL", "thread mill"), [code::TOOL_TABLE_NO_SUCH_TOOL]);
+        assert_eq!(told("T_SLOT_MILL", "dovetail mill"), [code::TOOL_TABLE_NO_SUCH_TOOL]);
     }
 
     #[test]

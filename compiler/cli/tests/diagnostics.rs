@@ -98,7 +98,9 @@ fn tables_and_settings() {
     told("E0837", &[part, file("a.tbl", &many)], "check --tools a.tbl a.ngc");
     let ini = file("a.ini", "[EMCIO]\nTOOL_TABLE = a.tbl\n[TRAJ]\nLINEAR_UNITS = mm\n");
     let tools = file("a.tbl", "T1 P1 Z50 D6\nT2 P2 Z60 D6\nT3 P3 Z60 D5\n");
-    told("E0844", &[ini, tools, file("a.p21", &plan(&[]))], "filter -i a.ini a.p21");
+    told("E0844", &[ini.clone(), tools, file("a.p21", &plan(&[]))], "filter -i a.ini a.p21");
+    let tools = file("a.tbl", "T1 P1 Z50 D6 ;face mill\nT3 P3 Z60 D5 ;drill\n");
+    told("E0850", &[ini, tools, file("a.p21", &plan(&[]))], "filter -i a.ini a.p21");
 }
 
 #[test]

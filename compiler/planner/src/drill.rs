@@ -33,6 +33,9 @@ pub(crate) fn drill(e: &mut Emit<'_>, step: &Workingstep, d: &Drilling, feature:
     if keyword == "THREAD_DRILLING" {
         return crate::mill::thread::drill(e, step, d, feature, security);
     }
+    if !suits(e, step, feature) {
+        return;
+    }
     let Some(depth) = depth(e, step, d, feature) else { return };
     let Some(feed) = step.operation.technology.feed else { return };
     let aside = if keyword == "BACK_BORING" {
@@ -64,6 +67,26 @@ impl Job<'_> {
     fn at(&self, z: f64) -> [f64; 3] {
         self.frame.point([0.0, 0.0, z])
     }
+}
+
+/// Whether the tool does this kind of work at all.
+fn suits(e: &mut Emit<'_>, step: &Workingstep, feature: &Feature) -> bool {
+    let (o, tool) = (&step.operation, &step.operation.tool);
+    let is = |kinds: &[&str]| kinds.iter().any(|k| tool.kind.contains(k));
+    let taps = tool.kind.contains("TAP") && !tool.kind.contains("TAPERED_END") && !tool.kind.contains("TAPERED_REAMER");
+    let drills = matches!(o.keyword.as_str(), "DRILLING" | "MULTISTEP_DRILLING" | "CENTER_DRILLING");
+    let why = if o.keyword == "TAPPING" && !taps && !is(&["USER"]) {
+        format!("a {} cuts no thread", tool.kind)
+    } else if drills && (taps || tool.is_disc() || is(&["DOVETAIL", "THREAD_MILL", "BORING"])) {
+        format!("a {} does not drill", tool.kind)
+    } else {
+        if drills && is(&["FACEMILL"]) {
+            e.say(code::STEP_FACEMILL_PLUNGE, o.origin, &[&o.origin.id.to_string()]);
+        }
+        return true;
+    };
+    e.say(code::PLAN_CANNOT_CUT, step.origin, &[&format!("#{} {}", feature.origin.id, feature.keyword), &why]);
+    false
 }
 
 fn depth(e: &mut Emit<'_>, step: &Workingstep, d: &Drilling, feature: &Feature) -> Option<f64> {

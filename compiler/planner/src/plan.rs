@@ -233,9 +233,9 @@ impl Planner<'_> {
         }
         if new && (frame.origin != [0.0; 3] || frame.x[0] < 1.0 - 1e-9) {
             let turn = libm::atan2(frame.x[1], frame.x[0]).to_degrees();
-            let turned = if frame.x[0] < 1.0 - 1e-9 { format!(", turned by {turn:.4} degrees about Z, as its coordinates are written") } else { String::new() };
-            let at = format!("X{} Y{} Z{}{turned}", frame.origin[0], frame.origin[1], frame.origin[2]);
-            self.e.say(code::PLAN_SETUP_ORIGIN, setup.origin, &[&format!("'{}'", setup.name), &at]);
+            let turned = if frame.x[0] < 1.0 - 1e-9 { format!(", turned by {turn:.4} degrees about Z as its coordinates are,") } else { String::new() };
+            let at = format!("X{} Y{} Z{}", frame.origin[0], frame.origin[1], frame.origin[2]);
+            self.e.say(code::PLAN_SETUP_ORIGIN, setup.origin, &[&format!("'{}'{turned}", setup.name), &at]);
         }
         self.setup = Some(setup.clone());
     }
@@ -280,6 +280,10 @@ impl Planner<'_> {
             self.e.say(code::PLAN_AIR, s.origin, &[&what, &why]);
         }
         let (Some([low, high]), Some([least, most])) = (s.stock, self.e.fed) else { return };
+        // The block of a turned part is not where its tool goes.
+        if s.operation.tool.diameter == 0.0 {
+            return;
+        }
         let r = s.operation.tool.diameter / 2.0;
         let beside = (0..2).any(|i| most[i] + r <= low[i] || least[i] - r >= high[i]);
         if beside || least[2] >= high[2] {

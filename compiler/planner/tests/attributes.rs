@@ -30,6 +30,7 @@ const SILENT: &[(&str, &str, &str)] = &[
     ("CONTOUR_PARALLEL", "allow_multiple_passes", "several passes are made anyway"),
     ("MILLING_TECHNOLOGY", "synchronize_spindle_with_feed", "a tap always goes in step with its spindle"),
     ("CENTER_DRILL.?", "tool_tip_half_angle", "its depth of cut counts to the tip"),
+    ("TAP.dimension", "tool_tip_half_angle", "its depth of cut counts to the tip"),
     ("TAPERED_REAMER.dimension", "tool_tip_half_angle", "its depth of cut counts to the tip"),
     ("TAPERED_REAMER.dimension", "tool_circumference_angle", "it goes to its depth whatever its shape"),
     ("BLOCK", "x", "only what is open to the sides reaches as far as the block"),
@@ -207,7 +208,7 @@ fn drills() -> Vec<Part> {
         hole("MULTISTEP_DRILLING", "TWIST_DRILL", "9.", ",2.,3.,3.,0.25"),
         hole("BORING", "TWIST_DRILL", "9.", ",.F.,2.,$"),
         hole("REAMING", "TAPERED_REAMER", "9.", ",.F.,$,$"),
-        hole("TAPPING", "TWIST_DRILL", "9.", ",.T."),
+        hole("TAPPING", "TAP", "9.", ",.T."),
     ]
 }
 

@@ -12,6 +12,9 @@ const MOST_FEED_ON_RETRACT: f64 = 10.0;
 /// Largest cutting speed, m/s, and spindle speed, 1/s, that a mill may mean.
 const FASTEST: [f64; 2] = [50.0, 1000.0];
 
+/// Largest feed per tooth that any mill takes, mm: face mills for high feeds come near it.
+const THICKEST: f64 = 4.0;
+
 /// Fastest turn of a lathe, 1/s.
 const FASTEST_LATHE: f64 = 200.0;
 
@@ -418,7 +421,10 @@ impl<'m> Reader<'m> {
             _ => None,
         };
         let too_much = [(cut, FASTEST[0]), (spindle, FASTEST[1]), (feed, FASTEST_FEED)];
-        let open = too_much.into_iter().any(|(v, most)| v.is_some_and(|v| v.abs() > most));
+        // What no tooth can take: as a feed per revolution it may be meant.
+        let rev = feed_mm.zip(speed.filter(|s| *s > 0.0)).filter(|_| iso && feed.is_some() && tool.teeth.is_some() && !tool.kind.contains("TAP"));
+        let thick = rev.is_some_and(|(f, rpm)| f * 60.0 / rpm / teeth > THICKEST);
+        let open = thick || too_much.into_iter().any(|(v, most)| v.is_some_and(|v| v.abs() > most));
         if open || spindle.zip(cut).is_some_and(|(n, vc)| !agree(n, vc, round)) {
             let (n, vc) = (spindle.unwrap_or(0.0), cut.unwrap_or(0.0));
             let by_cut = |v: f64| if round > 0.0 { v * 1000.0 / round } else { 0.0 };
