@@ -90,7 +90,9 @@ fn speeds_in_two_readings() {
     let (none, out) = run(&file, None);
     assert!(none.is_none());
     assert_eq!(errors(&out), ["E0485 two readings of this technology: 30000.0 rpm as the standard says, 500.0 rpm as STEP Modeler writes"]);
-    assert!(run(&file, Some(Units::StepModeler)).0.is_some());
+    let (program, out) = run(&file, Some(Units::StepModeler));
+    assert!(program.is_some_and(|p| p.contains("spindle-turn 0 ccw")));
+    assert!(out.iter().any(|d| d.code.def().code == "E0426" && d.message.contains("M4")), "{out:#?}");
 }
 
 #[test]

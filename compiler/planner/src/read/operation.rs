@@ -245,6 +245,9 @@ impl<'m> Reader<'m> {
         let speed = node.node("spindle_speed");
         let turns = speed.and_then(|s| s.real("rot_speed"));
         let surface = speed.and_then(|s| s.real("speed"));
+        if let Some(v) = turns.filter(|v| *v > 0.0) {
+            self.say_at(code::STEP_SPINDLE_SIGN, node, "spindle_speed", &[&gr_step::short(v), &gr_step::short(-v)]);
+        }
         let most = speed.and_then(|s| s.real("max_speed"));
         let fast = |v: Option<f64>, most: f64| v.is_some_and(|v| v.abs() > most);
         if fast(turns.or(most), FASTEST_LATHE) || fast(surface, FASTEST[0]) || fast(feed, FASTEST_FEED) {
