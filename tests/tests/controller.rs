@@ -86,12 +86,12 @@ fn the_control_keeps_the_tool_beside_walls() {
     let run = |options: &[&str], worn: f64| {
         ours(folder.path(), &[&["build", "-q", source, "-o", "part.ngc"], options].concat());
         let program = std::fs::read(folder.path().join("part.ngc")).expect("written");
-        let table = std::fs::read_to_string(folder.path().join("part.tbl")).expect("written").replace(" D6 ", &format!(" D{worn} "));
+        let table = std::fs::read_to_string(folder.path().join("part.tbl")).expect("written").replace(" D+6.0000 ", &format!(" D+{worn} "));
         let job = Job { tools: Some(in_inches(&table)), ..Job::new(program.clone()) };
         assert_eq!(differ(&job, &rs274), Verdict::Same, "{options:?}");
         let ended = job.reference(&rs274);
         assert!(ended.ok(), "{options:?}: {}", ended.ended.errors());
-        (String::from_utf8(program).expect("UTF-8"), feeds(&ended.ended.output()))
+        (String::from_utf8(program).expect("UTF-8"), feeds(&ended.canon))
     };
     let (path, plain) = run(&[], 6.0);
     let (contours, compensated) = run(&["--cutter-compensation", "control"], 6.0);

@@ -1,6 +1,8 @@
 //! A program from a line on: what was in force there is set again, the tool goes to the place over a safe
 //! height, and the rest follows. The result is motion IR like any other, so every back end can write it.
 
+use std::collections::BTreeMap;
+
 use crate::sources::Words;
 use gr_ir::Sources;
 use gr_ir::{Builder, FrameId, Marker, Note, Op, Override, PathMode, Pose, Program, Source, State, Turn, Units};
@@ -59,7 +61,8 @@ pub fn from_line(
         notes.push(no_height(place, top));
         top
     });
-    let restart = build(program, found.index, &state, &pose, safe.max(pose.axes[2]), line);
+    let from = From { index: found.index, line, known: height_known(program, found.index, sources) };
+    let restart = build(program, &from, &state, &pose, safe.max(pose.axes[2]), sources);
     Ok(Restart { program: restart, notes })
 }
 
@@ -170,7 +173,28 @@ fn top(program: &Program, state: &State) -> f64 {
     if highest.is_finite() { highest - state.machine(&[0.0; 9])[2] } else { 0.0 }
 }
 
-fn build(program: &Program, index: usize, state: &State, pose: &Pose, safe: f64, line: u32) -> Program {
+/// Where a program begins.
+struct From {
+    index: usize,
+    line: u32,
+    /// A block before has said how high the tool is.
+    known: bool,
+}
+
+/// Whether a block before an operation has said how high the tool is; else its height is only what a simulation begins
+/// with.
+fn height_known(program: &Program, index: usize, sources: &dyn Sources) -> bool {
+    program.steps().take(index).any(|s| s.op.moves() && says_height(&s.start, &s.end, s.source, sources))
+}
+
+fn says_height(start: &Pose, end: &Pose, source: Source, sources: &dyn Sources) -> bool {
+    let home = [280, 300];
+    let words = || sources.line(source.file, source.line).map(Words::of);
+    start.axes[2] != end.axes[2] || words().is_some_and(|w| w.has(b'z') || home.into_iter().any(|g| w.g(g)))
+}
+
+fn build(program: &Program, from: &From, state: &State, pose: &Pose, safe: f64, sources: &dyn Sources) -> Program {
+    let index = from.index;
     // A place that no program names, so that every axis of the approach moves and has its word.
     let used = axes_used(program);
     let far = Pose::at(std::array::from_fn(|i| if i < 3 || used[i] { pose.axes[i] + 777.25 } else { pose.axes[i] }));
@@ -180,7 +204,7 @@ fn build(program: &Program, index: usize, state: &State, pose: &Pose, safe: f64,
     // The line that asked for the offset knows more than the offset: of a tool that was never measured it is 0.
     let offset = program.steps().take(index).filter(|s| matches!(s.op, Op::ToolOffset(_))).last().map_or(source, |s| s.source);
     let mut restore = Restore { out, source };
-    restore.push(Op::Note(Note::Comment, &format!("restart at line {line}")));
+    restore.push(Op::Note(Note::Comment, &format!("restart at line {}", from.line)));
     restore.frame(state);
     restore.tool(state, offset);
     if units_under_offset(program, index) {
@@ -191,11 +215,20 @@ fn build(program: &Program, index: usize, state: &State, pose: &Pose, safe: f64,
     }
     restore.modes(state);
     restore.spindles(state);
-    restore.approach(program, state, pose, safe);
+    restore.outputs(program, index);
+    let mut waiting = !from.known;
+    let goal = if waiting { safe } else { pose.axes[2] };
+    restore.approach(program, state, &Pose::at(std::array::from_fn(|i| if i == 2 { goal } else { pose.axes[i] })), safe);
     let mut out = restore.out;
     let mut rest = program.cursor_at(index);
     while let Some(view) = rest.next() {
-        out.push_to(view.op, view.end, view.source);
+        waiting &= !(view.op.moves() && says_height(view.start, view.end, view.source, sources));
+        let mut end = *view.end;
+        if waiting {
+            // Up there, until a block says how high.
+            end.axes[2] += safe - pose.axes[2];
+        }
+        out.push_to(view.op, &end, view.source);
     }
     out.finish()
 }
@@ -285,6 +318,20 @@ impl Restore {
         }
     }
 
+    /// Outputs as the program left them, in the order of their numbers.
+    fn outputs(&mut self, program: &Program, index: usize) {
+        let (mut digital, mut analog) = (BTreeMap::new(), BTreeMap::new());
+        for step in program.steps().take(index) {
+            match step.op {
+                Op::DigitalOut { index, on, .. } => drop(digital.insert(index, on)),
+                Op::AnalogOut { index, value, .. } => drop(analog.insert(index, value)),
+                _ => {}
+            }
+        }
+        digital.into_iter().for_each(|(index, on)| self.push(Op::DigitalOut { index, on, synced: false }));
+        analog.into_iter().for_each(|(index, value)| self.push(Op::AnalogOut { index, value, synced: false }));
+    }
+
     /// Up, over the place, down: rapid to just above it, then at feed.
     fn approach(&mut self, program: &Program, state: &State, goal: &Pose, safe: f64) {
         let used = axes_used(program);
@@ -298,7 +345,9 @@ impl Restore {
         }
         self.out.push_to(Op::Rapid, &at, self.source);
         let height = goal.axes[2];
-        if state.feed > 0.0 && state.feed_mode == gr_ir::FeedMode::PerTime {
+        let per_turn = state.feed_mode == gr_ir::FeedMode::PerRev;
+        let turns = state.spindles.iter().any(|s| s.turn != Turn::Stop && s.speed != 0.0);
+        if state.feed > 0.0 && (state.feed_mode == gr_ir::FeedMode::PerTime || per_turn && turns) {
             if height + CLEARANCE < safe {
                 at.axes[2] = height + CLEARANCE;
                 self.out.push_to(Op::Rapid, &at, self.source);

@@ -364,6 +364,28 @@ fn coarse_arcs_still_make_circles() {
     }
 }
 
+/// A steep helix of a radius below the last decimal keeps a radius.
+#[test]
+fn tiny_helices_keep_a_radius() {
+    let text = "G21 G90 G17 F100\nG0 X-9.788977180 Y40.482441757 Z0.99345\nG2 X-9.787694826 Y40.479298881 Z-0.93635 I0.019647319 J0.006183437\nM2\n";
+    for decimals in [1, 2, 3] {
+        let written = write(text, &Options { decimals: Some(decimals), ..options(Language::Linuxcnc) });
+        assert!(!written.lines().any(|l| l.starts_with("G2") && l.ends_with("I0 J0")), "{written}");
+        run(&written);
+    }
+}
+
+/// Outputs stay as they were, and in feed per revolution the last of the way down is at feed too.
+#[test]
+fn a_restart_restores_outputs_and_feeds_down() {
+    let text = "G21 G90\nM3 S100\nM64 P2\nM67 E0 Q3\nG0 X0 Y0 Z5\nG95 F0.1\nG1 Z-4 F2\nG1 X10 F2\nG1 X20 F2\nG0 Z5\nM5\nM2\n";
+    let texts = Texts::new([(FileId(0), text)]);
+    let restart = from_line::from_line(&run(text), FileId(0), 9, &from_line::Options { safe_z: Some(5.0) }, &texts).expect("a start");
+    let written = emit(&restart.program, &options(Language::Linuxcnc), &texts).expect("written").text;
+    assert!(written.contains("M64 P2\n") && written.contains("M68 E0 Q3\n"), "{written}");
+    assert!(written.contains("Z-2\n") && written.contains("G1 Z-4"), "{written}");
+}
+
 #[test]
 fn starts_from_a_line() {
     let from = |text: &str, line: u32| {
@@ -388,6 +410,25 @@ fn starts_from_a_line() {
     assert!(from(COMPENSATED, 3).is_ok());
     assert_eq!(slug(from(PLAIN, 99)), "from-line/nothing-left");
     assert_eq!(from(STRUCTURED, 4).unwrap().1, ["from-line/inside-loop"]);
+}
+
+/// Until a block has said how high the tool is, its height is only what a simulation begins with: nothing goes there.
+#[test]
+fn a_restart_goes_down_to_no_height_that_nobody_named() {
+    let text = "G21 G90 G17 G49\nT1 M6\nG43.1 Z50\nG54\nS3000 M3\nG0 X5 Y6\nX7\nG0 Z5\nG1 Z-1 F100\nX20\nM5\nM2\n";
+    let texts = Texts::new([(FileId(0), text)]);
+    for line in 4..=10 {
+        let o = from_line::Options { safe_z: Some(25.0) };
+        let restart = from_line::from_line(&run(text), FileId(0), line, &o, &texts).expect("a start");
+        let mut lowest = f64::INFINITY;
+        let mut cursor = restart.program.cursor();
+        while let Some(view) = cursor.next() {
+            if view.op.moves() {
+                lowest = lowest.min(view.end.axes[2]);
+            }
+        }
+        assert_eq!(lowest, -1.0, "from line {line}");
+    }
 }
 
 /// A cycle whose moves are of a line of their own: nothing of ours writes one, but a motion file may.

@@ -226,3 +226,21 @@ fn moves(count: usize) {
     // The moves, and the ways to and from the part.
     assert!(cuts >= count && cuts <= count + 10, "{cuts}");
 }
+
+/// What one word has switched on, another word that takes over switches off, whichever output it names itself.
+#[test]
+fn no_output_stays_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let part = folder.path().join("m.ngc");
+    std::fs::write(&part, "G21 G90 G17 G54\nT1 M6\nG43 H1\nS4000 M3\nM7\nM8\nG0 X20 Y20 Z20\nG1 Z10 F300\nM4\nG1 Z15\nM9\nM5\nM30\n").unwrap();
+    let out = format!("{}/out/", folder.path().display());
+    let made = run(&["build", part.to_str().unwrap(), "--machine", CELL, "--target", "rapid", "-o", &out]);
+    assert!(made.status.success(), "{}", text(&made.stderr));
+    let all: String = std::fs::read_dir(&out).unwrap().map(|f| std::fs::read_to_string(f.unwrap().path()).unwrap()).collect();
+    for output in ["doSpindleCw", "doSpindleCcw", "doMist", "doCoolant"] {
+        let last = all.lines().filter(|l| l.contains(&format!("SetDO {output},"))).next_back().unwrap_or_else(|| panic!("{output}: {all}"));
+        assert!(last.contains(&format!("SetDO {output},0")), "{last}\n{all}");
+    }
+    let at = |what: &str| all.find(what).unwrap_or_else(|| panic!("{what}: {all}"));
+    assert!(at("SetDO doSpindleCw,0") < at("SetDO doSpindleCcw,1"), "one way is off before the other is on: {all}");
+}

@@ -73,8 +73,10 @@ impl<S: Sink> Interp<'_, S> {
 
     /// G4 of a Fanuc control: P in milliseconds, X (or U on a lathe) in seconds.
     fn fanuc_dwell(&mut self) {
+        // X has been halved as a diameter; these are seconds.
+        let whole = if self.m.lathe_diameter != 0 { 2.0 } else { 1.0 };
         let b = &mut self.block;
-        let seconds = b.get(b'p').map(|p| p / 1000.0).or(b.get(b'x')).or(b.get(b'u'));
+        let seconds = b.get(b'p').map(|p| p / 1000.0).or(b.get(b'x').map(|x| x * whole)).or(b.get(b'u'));
         b.unset(b'x');
         b.unset(b'u');
         if let Some(seconds) = seconds {

@@ -1,4 +1,4 @@
-//! Which codes a dialect has: every dialect but LinuxCNC's own is a closed list, and a code that LinuxCNC has beside it
+//! Which codes and words a dialect has: every dialect but LinuxCNC's own is a closed list, and a code that LinuxCNC has beside it
 //! is refused rather than carried out with LinuxCNC's meaning.
 
 use std::sync::LazyLock;
@@ -6,12 +6,15 @@ use std::sync::LazyLock;
 use gr_canon::Sink;
 use gr_spec::{Dialect, Family, code, rs274};
 
+use crate::block::Group;
 use crate::{Fault, Interp, Res};
 
-/// The codes of one dialect as bits: G-codes times ten, M-codes.
+/// The codes and letters of one dialect as bits: G-codes times ten, M-codes.
 pub(crate) struct Closed {
     g: [u64; 16],
     m: [u64; 4],
+    /// Bit `letter - 'a'`.
+    letters: u32,
 }
 
 static LISTS: LazyLock<Vec<(&'static str, Closed)>> = LazyLock::new(|| {
@@ -30,13 +33,18 @@ fn put(bits: &mut [u64], n: usize) {
     }
 }
 
+fn bit(letter: u8) -> u32 {
+    if letter.is_ascii_lowercase() { 1 << (letter - b'a') } else { 0 }
+}
+
 fn has(bits: &[u64], n: i32) -> bool {
     usize::try_from(n).ok().and_then(|n| Some(bits.get(n / 64)? >> (n % 64) & 1 == 1)).unwrap_or(false)
 }
 
 impl Closed {
     fn of(dialect: &Dialect) -> Closed {
-        let mut list = Closed { g: [0; 16], m: [0; 4] };
+        let letter = |w: &gr_spec::WordDef| bit(w.letter.to_ascii_lowercase() as u8);
+        let mut list = Closed { g: [0; 16], m: [0; 4], letters: dialect.words.iter().map(letter).fold(0, |a, b| a | b) };
         for row in dialect.codes {
             let Some(number) = row.code.get(1..).and_then(|n| n.parse::<f64>().ok()) else { continue };
             match row.code.as_bytes()[0] {
@@ -66,6 +74,30 @@ impl<S: Sink> Interp<'_, S> {
             }
             _ => Ok(()),
         }
+    }
+
+    /// grbl's words are a closed list too; the rows of the others hold every letter.
+    #[inline]
+    pub(crate) fn check_listed_letter(&self, letter: u8) -> Res {
+        match self.closed {
+            Some(list) if self.setup.dialect.family == Family::Grbl && list.letters & bit(letter) == 0 => {
+                Err(self.not_in_dialect(&format!("the word {}", char::from(letter.to_ascii_uppercase())), OTHER_CODE).at(letter))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Words that grbl has, with codes that do not take them: it refuses what a block leaves unused.
+    pub(crate) fn grbl_words(&self) -> Res {
+        let b = &self.block;
+        let motion = if b.g(Group::Motion) == -1 { self.m.motion } else { i32::from(b.g(Group::Motion)) as _ };
+        let refused = match b.g(Group::NonModal) {
+            100 if b.has(b'r') => Some(("R with G10", b'r')),
+            100 if !matches!(b.get(b'l'), None | Some(2.0 | 20.0)) => Some(("G10 with an L other than 2 and 20", b'l')),
+            -1 if matches!(motion, 20 | 30) && b.has(b'p') => Some(("P with an arc", b'p')),
+            _ => None,
+        };
+        refused.map_or(Ok(()), |(what, letter)| Err(self.not_in_dialect(what, OTHER_CODE).at(letter)))
     }
 
     /// The same for an M-code.

@@ -82,7 +82,6 @@ impl<S: Sink> Interp<'_, S> {
         self.check_cycle_axes(plane)?;
         self.cycle_in_plane(g, plane, again, r, repeats)?;
         self.m.cycle_l = repeats;
-        self.m.cycle_r = r;
         self.m.motion = g;
         Ok(())
     }
@@ -101,8 +100,14 @@ impl<S: Sink> Interp<'_, S> {
         let mut hole = self.hole(g, plane, axes, r, given);
         self.cycle_words(&mut hole, again)?;
         self.keep_cycle_words(&hole);
-        (self.m.cycle_cc, self.m.cycle_r, self.m.motion) = (given, r, g);
+        self.keep_levels(&hole, r, given);
+        self.m.motion = g;
         Ok(())
+    }
+
+    /// R and the depth for the blocks that go on with the cycle: as programmed, or, on a Fanuc control, where they were.
+    fn keep_levels(&mut self, hole: &Hole, r: f64, given: f64) {
+        (self.m.cycle_r, self.m.cycle_cc) = if self.is_fanuc() { (hole.retract, hole.bottom) } else { (r, given) };
     }
 
     fn check_cycle_modes(&self) -> Res {
@@ -183,7 +188,7 @@ impl<S: Sink> Interp<'_, S> {
         self.m.current[axes[0]] = hole.at[0];
         self.m.current[axes[1]] = hole.at[1];
         self.m.current[axes[2]] = hole.clear;
-        self.m.cycle_cc = given;
+        self.keep_levels(&hole, r, given);
         if !exact {
             self.restore_path_mode(path, tolerances);
         }
@@ -227,8 +232,10 @@ impl<S: Sink> Interp<'_, S> {
             if polar {
                 hole.polar_step = [self.block.or_zero(b'@'), self.block.or_zero(b'^') * radians];
             }
-            hole.retract = r + self.m.cycle_il;
-            hole.bottom = hole.retract + given;
+            // A Fanuc control keeps the levels themselves, not the distances.
+            let kept = |letter| self.is_fanuc() && !self.block.has(letter);
+            hole.retract = if kept(b'r') { r } else { r + self.m.cycle_il };
+            hole.bottom = if kept(LETTERS[axes[2]]) { given } else { hole.retract + given };
         } else if polar {
             let radius = self.block.get(b'@').unwrap_or_else(|| libm::hypot(current[1], current[0]));
             let angle =

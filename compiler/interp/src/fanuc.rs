@@ -62,6 +62,9 @@ impl<S: Sink> Interp<'_, S> {
             500 => return self.clamp_spindle(),
             _ => return self.turn_coordinates(),
         }
+        if self.block.g(Group::NonModal) == 100 {
+            return self.data_input();
+        }
         let dwell = self.block.g(Group::NonModal) == 40;
         if is_lathe(self.setup.dialect) && self.block.has_any_of(INCREMENT_MASK) && !dwell {
             self.increments()?;
@@ -72,6 +75,41 @@ impl<S: Sink> Interp<'_, S> {
             self.m.cycle_il_set = 0;
             self.block.g[Group::Motion as usize] = -1;
             self.block.g_mask &= !(1 << Group::Motion as u32);
+        }
+        Ok(())
+    }
+
+    /// G10 of a machining center: L2 sets a work offset, L10 R the length of an offset number, L12 R its radius. The
+    /// other kinds of data (wear, the external offset, what G91 adds to) have no place here.
+    fn data_input(&mut self) -> Res {
+        let b = &mut self.block;
+        let Some(kind) = b.get(b'l') else { return Ok(()) };
+        let incremental = match b.g(Group::Distance) {
+            910 => true,
+            900 => false,
+            _ => self.m.incremental != 0,
+        };
+        let system = b.get(b'p').is_some_and(|p| (1.0..=6.0).contains(&p));
+        let refused = match kind {
+            2.0 if !system => Some("G10 L2 with a P other than 1 to 6"),
+            2.0 if b.has(b'r') => Some("G10 L2 with R"),
+            2.0 | 10.0 | 12.0 if incremental => Some("G10 under G91"),
+            2.0 => None,
+            10.0 | 12.0 if !b.has(b'r') || b.has_any_of(crate::block::AXES) => Some("G10 of a tool without R alone"),
+            10.0 | 12.0 => None,
+            _ => Some("G10 L"),
+        };
+        if let Some(what) = refused {
+            let what = if what == "G10 L" { format!("G10 L{kind}") } else { what.to_string() };
+            return Err(self.not_carried_out(rs274::RT_G10_L, what).at(b'g'));
+        }
+        if kind == 10.0 {
+            let length = self.block.or_zero(b'r');
+            self.block.unset(b'r');
+            self.block.set(b'z', length);
+        }
+        if kind != 2.0 {
+            self.block.set(b'l', 1.0);
         }
         Ok(())
     }

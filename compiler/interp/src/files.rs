@@ -64,6 +64,10 @@ pub fn read_tools(text: &str, file: FileId) -> (ToolTable, Vec<Diagnostic>) {
         if line.starts_with(';') || body.trim().is_empty() {
             continue;
         }
+        for lost in behind_tabs(body) {
+            let at = start + (lost.as_ptr() as usize - line.as_ptr() as usize) as u32;
+            found.push(Diagnostic::new(code::TOOL_TABLE_TAB, file, span_of(at, lost), &[lost.replace('\t', " ")]));
+        }
         match tool_line(line) {
             Err((word, why)) => {
                 let at = start + (word.as_ptr() as usize - line.as_ptr() as usize) as u32;
@@ -84,18 +88,26 @@ pub fn read_tools(text: &str, file: FileId) -> (ToolTable, Vec<Diagnostic>) {
     (table, found)
 }
 
+/// What the controller loses: what stands behind the tab that ends a number.
+fn behind_tabs(body: &str) -> impl Iterator<Item = &str> {
+    let lost = |w: &'_ str| -> Option<usize> {
+        let number = w.get(1..)?.trim_start_matches('\t');
+        let (_, rest) = number.split_once('\t')?;
+        Some(rest.trim_start_matches('\t').len())
+    };
+    body.split([' ', '\r']).filter_map(move |w| w.get(w.len() - lost(w)?..)).filter(|lost| !lost.is_empty())
+}
+
 /// One line; on failure the word to blame and what is wrong with it. A tool without P has pocket −1.
 fn tool_line(line: &str) -> Result<Tool, (&str, String)> {
     let mut tool = empty_row();
     let (words, comment) = line.split_once(';').unwrap_or((line, ""));
     tool.comment = comment.trim().into();
-    for word in words.split([' ', '\r']).map(|w| w.trim_end_matches('\t')).filter(|w| !w.is_empty()) {
-        if word.contains('\t') {
-            return Err((word, "words are set apart by blanks; a tab does not do that".into()));
-        }
+    for word in words.split([' ', '\r']).filter(|w| !w.is_empty()) {
         let mut rest = word.chars();
         let letter = rest.next().unwrap_or(' ').to_ascii_uppercase();
-        let rest = rest.as_str();
+        // A tab before a number is skipped, one behind it ends it.
+        let rest = rest.as_str().trim_start_matches('\t').split('\t').next().unwrap_or("");
         let bad = || (word, format!("`{word}` has no number"));
         let real = || scan_real(rest).map(|(v, _)| v).ok_or_else(bad);
         let whole = || scan_int(rest).map(|(v, _)| v).ok_or_else(bad);
@@ -108,7 +120,7 @@ fn tool_line(line: &str) -> Result<Tool, (&str, String)> {
             'Q' => tool.orientation = whole()?,
             _ => match "XYZABCUVW".find(letter) {
                 Some(axis) => tool.offset[axis] = real()?,
-                None => return Err((word, format!("no word of a tool table begins with `{letter}`"))),
+                None => return Err((word, format!("no word of a tool table begins with {}", if letter == '\t' { "a tab".into() } else { format!("`{letter}`") }))),
             },
         }
     }
@@ -397,6 +409,17 @@ mod tests {
                 (code::TOOL_TABLE_NO_POCKET, Span::new(21, 26)),
             ]
         );
+    }
+
+    /// As LinuxCNC 2.9 reads them: words end at blanks, numbers at tabs.
+    #[test]
+    fn tabs_end_numbers_and_no_words() {
+        let (table, found) = read_tools("T1 P1\tZ1 D.5\nT2\tP2 Z1 D.5\t\nT\t3 P3\n\tT4 P4\n", FILE);
+        let rows: Vec<_> = table.rows[1..].iter().map(|t| (t.number, t.pocket, t.offset[2], t.diameter)).collect();
+        assert_eq!(rows, [(1, 1, 0.0, 0.5), (3, 3, 0.0, 0.0)]);
+        assert_eq!((table.rows[0].number, table.rows[0].offset[2]), (2, 1.0), "no pocket: the spindle's row");
+        let seen: Vec<_> = found.iter().map(|d| d.code).collect();
+        assert_eq!(seen, [code::TOOL_TABLE_TAB, code::TOOL_TABLE_TAB, code::TOOL_TABLE_NO_POCKET, code::TOOL_TABLE_BAD_LINE]);
     }
 
     #[test]

@@ -51,6 +51,8 @@ impl<S: Sink> Interp<'_, S> {
         let fanuc = self.is_fanuc();
         if fanuc {
             self.fanuc_words()?;
+        } else if self.setup.dialect.family == gr_spec::Family::Grbl {
+            self.grbl_words()?;
         }
         self.enhance()?;
         if fanuc && self.m.turned != 0 {

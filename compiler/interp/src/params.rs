@@ -201,7 +201,12 @@ impl<S: Sink> Interp<'_, S> {
     /// `_ini[section]key`
     fn ini_value(&self, name: &str) -> Option<f64> {
         let (section, key) = name.strip_prefix("_ini[")?.split_once(']')?;
-        self.setup.ini.number(section, key)
+        let ini = &self.setup.ini;
+        let text = ini.get(section, key)?.trim();
+        // The whole text has to be the number, and the file may switch such parameters off.
+        let plain = text.bytes().all(|b| matches!(b, b'0'..=b'9' | b'.' | b'+' | b'-' | b'e' | b'E'));
+        let on = ini.number("RS274NGC", "INI_VARS") != Some(0.0);
+        text.parse().ok().filter(|_| plain && on)
     }
 
     /// Whether a program can't assign to this name.

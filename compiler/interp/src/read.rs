@@ -243,6 +243,7 @@ impl<S: Sink> Interp<'_, S> {
     }
 
     fn take_other(&mut self, letter: u8, value: f64) -> Res {
+        self.check_listed_letter(letter)?;
         let negative = |rs| Err(Fault::new(code::WORD_NEGATIVE, rs).arg(upper(letter)).at(letter));
         match letter {
             b'f' | b's' => {

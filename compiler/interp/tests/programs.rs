@@ -380,6 +380,16 @@ fn fanuc_cycles_store_and_cancel() {
     );
 }
 
+/// The same, a row of holes: R and Z keep their levels when the steps between the holes are increments.
+#[test]
+fn fanuc_cycles_keep_their_levels() {
+    let text = "G21 G90 S500 M3\nG0 Z5.\nG98 G81 X1. Y2. Z-5. R1. F100.\nG91 X5. K2\nG90 G80\nM30\n";
+    let (calls, outcome) = run_fanuc("fanuc-mill", text);
+    assert!(outcome.ok(), "{:?}", outcome.findings);
+    let drilled: Vec<_> = moves_of(&calls).into_iter().filter(|m| m.starts_with("feed")).collect();
+    assert_eq!(drilled, ["feed 1 2 -5", "feed 6 2 -5", "feed 11 2 -5"]);
+}
+
 #[test]
 fn fanuc_dwells_are_milliseconds_or_seconds() {
     let text = "G21 G90\nG4 P500\nG04 X1.5\nF100.\nG82 X1. Z-5. R2. P250\nG80\nM30\n";
@@ -387,6 +397,28 @@ fn fanuc_dwells_are_milliseconds_or_seconds() {
     assert!(outcome.ok(), "{:?}", outcome.findings);
     let dwells: Vec<_> = calls.iter().filter(|c| c.starts_with("DWELL")).collect();
     assert_eq!(dwells, ["DWELL(0.5000)", "DWELL(1.5000)", "DWELL(0.2500)"]);
+}
+
+/// The seconds of a lathe's dwell are no diameter.
+#[test]
+fn fanuc_dwells_of_a_lathe() {
+    let (calls, outcome) = run_fanuc("fanuc-turn", "G21\nG4 X1.\nG4 U1.\nG4 P1000\nM30\n");
+    assert!(outcome.ok(), "{:?}", outcome.findings);
+    let dwells: Vec<_> = calls.iter().filter(|c| c.starts_with("DWELL")).collect();
+    assert_eq!(dwells, ["DWELL(1.0000)"; 3]);
+}
+
+/// Machining center manual (B-63944), programmable data input: L2 origins, L10 lengths, L12 radii. The rest is refused.
+#[test]
+fn fanuc_data_input() {
+    let text = "G21 G90 G54\nG10 L2 P1 X1.\nG10 L10 P1 R5.\nT1 M6\nG43 H1 G0 Z1.\nX0.\nM30\n";
+    let (calls, outcome) = run_fanuc("fanuc-mill", text);
+    assert!(outcome.ok(), "{:?}", outcome.findings);
+    assert!(calls.iter().any(|c| c.starts_with("USE_TOOL_LENGTH_OFFSET(0.0000 0.0000 5.0000")), "{calls:?}");
+    for line in ["G10 L20 P1 X1.", "G10 L11 P1 R1.", "G10 L2 P0 X1.", "G10 L2 P7 X1.", "G10 L2 P1 X1. R30.", "G91 G10 L2 P1 X1.", "G10 L1 P1 Z5."] {
+        let (_, outcome) = run_fanuc("fanuc-mill", &format!("{line}\nM30\n"));
+        assert_eq!(outcome.findings[0].fault.code, code::CODE_NOT_CARRIED_OUT, "{line}");
+    }
 }
 
 /// What LinuxCNC has and the control has not is refused, not carried out with LinuxCNC's meaning.
@@ -401,6 +433,11 @@ fn dialects_are_closed_lists() {
         ("grbl", "G81 X1 Z-1 R1"),
         ("grbl", "G33 Z-1 K1"),
         ("grbl", "M6"),
+        ("grbl", "G0 A5"),
+        ("grbl", "G0 X1 W2"),
+        ("grbl", "G10 L10 P1 X1"),
+        ("grbl", "G10 L2 P1 R30 X1"),
+        ("grbl", "G2 X1 Y1 I.5 J.5 P2 F10"),
     ] {
         let (_, outcome) = run_fanuc(id, &format!("{line}\nM30\n"));
         let fault = &outcome.findings[0].fault;

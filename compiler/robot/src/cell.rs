@@ -24,6 +24,8 @@ pub(crate) struct Cells {
     own_words: bool,
     turning: Turn,
     coolant: bool,
+    mist: bool,
+    flood: bool,
     speed: f64,
     /// Speed that the operator was asked to set.
     told: f64,
@@ -39,6 +41,8 @@ impl Cells {
             own_words,
             turning: Turn::Stop,
             coolant: false,
+            mist: false,
+            flood: false,
             speed: 0.0,
             told: 0.0,
         }
@@ -121,21 +125,42 @@ impl Cells {
         if self.turning == turn && turn == Turn::Stop {
             return Made::NOTHING;
         }
+        let off = self.left_on(turn_word(self.turning), turn_word(turn));
         self.turning = turn;
-        self.turned(turn, speed)
+        let mut made = self.turned(turn, speed);
+        made.actions.splice(0..0, off);
+        made
+    }
+
+    /// Switches off the output of a word that another word takes over from, where that one has another output.
+    fn left_on(&self, old: &str, new: &str) -> Option<Action> {
+        let output = |word: &str| self.io.get(word).filter(|s| s.routine.is_none());
+        let on = output(old).filter(|s| old != new && s.signal.is_some() && !self.own_words)?;
+        if output(new).is_some_and(|s| s.signal == on.signal) {
+            return None;
+        }
+        let value = Some(if on.value == Some(0.0) { 1.0 } else { 0.0 });
+        let signal = Signal { value, wait: None, seconds: None, ..on.clone() };
+        Some(Action::Signal { word: Word::new(new), value, signal })
     }
 
     pub fn coolant(&mut self, word: &str, on: bool, any: bool) -> Made {
         if on {
             self.coolant = true;
+            self.mist |= word == "M7";
+            self.flood |= word == "M8";
             return self.word(word.into(), None);
         }
         // M9 comes as two switches; one word does both.
         if any || !self.coolant {
             return Made::NOTHING;
         }
-        self.coolant = false;
-        self.word("M9".into(), None)
+        let off = [("M7", self.mist), ("M8", self.flood)].into_iter().filter(|(_, on)| *on).filter_map(|(w, _)| self.left_on(w, "M9"));
+        let off: Vec<Action> = off.collect();
+        (self.coolant, self.mist, self.flood) = (false, false, false);
+        let mut made = self.word("M9".into(), None);
+        made.actions.extend(off);
+        made
     }
 
     /// Spindle and coolant at the end of a program.

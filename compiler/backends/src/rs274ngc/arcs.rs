@@ -134,6 +134,10 @@ impl Emitter<'_> {
                 Arcs::R => self.radius_word([self.at[f], self.at[s]], [said_end[f], said_end[s]], c, meant, places)?,
                 _ => self.center_words((f, s), c, places),
             };
+            // A radius that rounding has made nothing: no control takes it.
+            if said == [self.at[f], self.at[s]] {
+                return None;
+            }
             let mut center = [0.0; 3];
             (center[f], center[s], center[t]) = (said[0], said[1], self.at[t]);
             let candidate = Candidate { words, end: said_end, center, extra };
