@@ -217,8 +217,11 @@ fn build(program: &Program, from: &From, state: &State, pose: &Pose, safe: f64, 
     restore.spindles(state);
     restore.outputs(program, index);
     let mut waiting = !from.known;
-    let goal = if waiting { safe } else { pose.axes[2] };
-    restore.approach(program, state, &Pose::at(std::array::from_fn(|i| if i == 2 { goal } else { pose.axes[i] })), safe);
+    let mut goal = *pose;
+    if waiting {
+        goal.axes[2] = safe;
+    }
+    restore.approach(program, state, &goal, safe);
     let mut out = restore.out;
     let mut rest = program.cursor_at(index);
     while let Some(view) = rest.next() {

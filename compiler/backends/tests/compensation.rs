@@ -1,39 +1,22 @@
 //! Contours that LinuxCNC compensates make the motion of the plan: read again by our interpreter with the tool in its
 //! table, and where LinuxCNC is installed, by the real one.
 
+mod reader;
+
 use gr_backends::Texts;
 use gr_backends::rs274ngc::{Options, emit};
 use gr_canon::{Axes, FileId};
-use gr_gcode::{Chunk, File, scan};
-use gr_interp::{Files, Interp, Setup, Tool};
-use gr_ir::{Arc as Round, ArcPlane, Builder, Lowering, Marker, Op, Plane, Pose, Program, Source};
+use gr_interp::{Setup, Tool};
+use gr_ir::{Arc as Round, ArcPlane, Builder, Marker, Op, Plane, Pose, Program, Source};
 use gr_spec::Dialect;
 use proptest::prelude::*;
-use std::sync::Arc;
-
-struct One(File);
-
-impl Files for One {
-    fn file(&self, _: FileId) -> &File {
-        &self.0
-    }
-    fn find_sub(&mut self, _: &str) -> Option<FileId> {
-        None
-    }
-}
 
 fn run(text: &str, diameter: f64) -> Result<Program, String> {
     let dialect = Dialect::linuxcnc();
-    let mut files = One(File::new("a.ngc", vec![Chunk { text: text.into(), scan: Arc::new(scan(text, dialect)) }]));
     let mut setup = Setup { dialect, ..Setup::default() };
     let tool = |number: i32, diameter: f64| Tool { number, pocket: number, diameter, ..Tool::default() };
     setup.tools.rows = vec![tool(0, 0.0), tool(1, diameter)];
-    let mut interp = Interp::new(&mut files, &setup, Lowering::new());
-    let outcome = interp.run(FileId(0));
-    if !outcome.ok() {
-        return Err(format!("{:?}\n{text}", outcome.findings));
-    }
-    Ok(interp.into_sink().finish())
+    reader::read(text, &setup)
 }
 
 /// A stretch of a pass, from where the one before ends, in its direction.

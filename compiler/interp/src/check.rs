@@ -71,6 +71,15 @@ impl<S: Sink> Interp<'_, S> {
         Ok(())
     }
 
+    /// G91, in this block or before.
+    pub(crate) fn goes_by_increments(&self) -> bool {
+        match self.block.g(Group::Distance) {
+            910 => true,
+            900 => false,
+            _ => self.m.incremental != 0,
+        }
+    }
+
     /// G4 of a Fanuc control: P in milliseconds, X (or U on a lathe) in seconds.
     fn fanuc_dwell(&mut self) {
         // X has been halved as a diameter; these are seconds.
@@ -195,8 +204,7 @@ impl<S: Sink> Interp<'_, S> {
                 if b.motion != 0 && b.motion != 10 {
                     return Err(fault(code::MOTION_G53, rs274::RT_G53_MOTION, "needs G0 or G1").at(b'g'));
                 }
-                let distance = b.g(Group::Distance);
-                if distance == 910 || (distance != 900 && self.m.incremental != 0) {
+                if self.goes_by_increments() {
                     let f = fault(code::MOTION_G53, rs274::RT_G53_INCREMENTAL, "is not possible in incremental mode");
                     return Err(f.at(b'g'));
                 }

@@ -82,27 +82,22 @@ impl<S: Sink> Interp<'_, S> {
     /// G10 of a machining center: L2 sets a work offset, L10 R the length of an offset number, L12 R its radius. The
     /// other kinds of data (wear, the external offset, what G91 adds to) have no place here.
     fn data_input(&mut self) -> Res {
-        let b = &mut self.block;
-        let Some(kind) = b.get(b'l') else { return Ok(()) };
-        let incremental = match b.g(Group::Distance) {
-            910 => true,
-            900 => false,
-            _ => self.m.incremental != 0,
-        };
+        let Some(kind) = self.block.get(b'l') else { return Ok(()) };
+        let incremental = self.goes_by_increments();
+        let b = &self.block;
         let system = b.get(b'p').is_some_and(|p| (1.0..=6.0).contains(&p));
         let refused = match kind {
-            2.0 if !system => Some("G10 L2 with a P other than 1 to 6"),
-            2.0 if b.has(b'r') => Some("G10 L2 with R"),
-            2.0 | 10.0 | 12.0 if incremental => Some("G10 under G91"),
-            2.0 => None,
-            10.0 | 12.0 if !b.has(b'r') || b.has_any_of(crate::block::AXES) => Some("G10 of a tool without R alone"),
-            10.0 | 12.0 => None,
-            _ => Some("G10 L"),
+            2.0 if !system => Some("G10 L2 with a P other than 1 to 6".to_string()),
+            2.0 if b.has(b'r') => Some("G10 L2 with R".into()),
+            2.0 | 10.0 | 12.0 if incremental => Some("G10 under G91".into()),
+            10.0 | 12.0 if !b.has(b'r') || b.has_any_of(crate::block::AXES) => Some("G10 of a tool without R alone".into()),
+            2.0 | 10.0 | 12.0 => None,
+            _ => Some(format!("G10 L{kind}")),
         };
         if let Some(what) = refused {
-            let what = if what == "G10 L" { format!("G10 L{kind}") } else { what.to_string() };
             return Err(self.not_carried_out(rs274::RT_G10_L, what).at(b'g'));
         }
+        // LinuxCNC's L1 sets the length by Z and the radius by R.
         if kind == 10.0 {
             let length = self.block.or_zero(b'r');
             self.block.unset(b'r');
@@ -204,12 +199,7 @@ impl<S: Sink> Interp<'_, S> {
         if !self.block.has(a) && !self.block.has(b) || self.block.motion == -1 {
             return Ok(());
         }
-        let incremental = match self.block.g(Group::Distance) {
-            910 => true,
-            900 => false,
-            _ => self.m.incremental != 0,
-        };
-        if incremental {
+        if self.goes_by_increments() {
             let (mut x, mut y) = (self.block.or_zero(a), self.block.or_zero(b));
             rotate(&mut x, &mut y, angle);
             self.block.set(a, x);

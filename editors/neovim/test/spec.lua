@@ -50,17 +50,21 @@ local function clients(buffer)
   return found
 end
 
--- Opens a copy of a shipped file (so that tests may write) and waits for the server.
-local function open(path, name)
-  local copy = scratch .. "/" .. (name or vim.fn.fnamemodify(path, ":t"))
-  vim.fn.writefile(vim.fn.readfile(top .. "/" .. path, "b"), copy, "b")
-  vim.cmd("edit " .. vim.fn.fnameescape(copy))
-  local buffer = vim.api.nvim_get_current_buf()
+-- Waits until a server has taken the buffer.
+local function served(buffer)
   wait("the server", function()
     local c = clients(buffer)[1]
     return c and (c.initialized or c.server_capabilities)
   end)
   return buffer
+end
+
+-- Opens a copy of a shipped file (so that tests may write) and waits for the server.
+local function open(path, name)
+  local copy = scratch .. "/" .. (name or vim.fn.fnamemodify(path, ":t"))
+  vim.fn.writefile(vim.fn.readfile(top .. "/" .. path, "b"), copy, "b")
+  vim.cmd("edit " .. vim.fn.fnameescape(copy))
+  return served(vim.api.nvim_get_current_buf())
 end
 
 local function request(buffer, method, params)
@@ -375,19 +379,12 @@ test("files that programs are run with", function()
     local found = request(buffer, "textDocument/hover", at)
     return found and found.contents.value or ""
   end
-  local function ready(buffer)
-    wait("the server", function()
-      local c = clients(buffer)[1]
-      return c and (c.initialized or c.server_capabilities)
-    end)
-    return buffer
-  end
-  contains(told(ready(opened("mill.tbl", { "T1 P1 D6 ;end mill" })), 0), "tool number")
-  contains(told(ready(opened("mill.var", { "5221\t12.5" })), 0), "#5221")
-  contains(told(ready(opened("mill.ini", { "[TRAJ]", "LINEAR_UNITS = mm" })), 1), "unit of length")
-  contains(told(ready(opened("gcc-robot.toml", { "schema = 1", "[project]", "sources = []" })), 2), "Programs")
+  contains(told(served(opened("mill.tbl", { "T1 P1 D6 ;end mill" })), 0), "tool number")
+  contains(told(served(opened("mill.var", { "5221\t12.5" })), 0), "#5221")
+  contains(told(served(opened("mill.ini", { "[TRAJ]", "LINEAR_UNITS = mm" })), 1), "unit of length")
+  contains(told(served(opened("gcc-robot.toml", { "schema = 1", "[project]", "sources = []" })), 2), "Programs")
   local machine = vim.fn.readfile(top .. "/docs/examples/irb2400-cell.toml")
-  ready(opened("cell.toml", machine))
+  served(opened("cell.toml", machine))
   -- Files of others are left alone.
   equal(#clients(opened("other.toml", { "[package]", 'name = "x"' })), 0)
   equal(#clients(opened("other.ini", { "[core]", "x = 1" })), 0)

@@ -261,6 +261,19 @@ impl<'m> Reader<'m> {
             self.units_are_open(node, &a, &b);
         }
         let per_minute = if iso { 60.0 } else { 1.0 };
+        Technology {
+            feed: rev.or(feed.map(|f| if iso { f * 1000.0 } else { f * 1000.0 / 60.0 })).filter(|f| *f > 0.0),
+            per_rev: rev.is_some(),
+            surface: surface.filter(|v| *v > 0.0).map(|v| [v * 1000.0 * per_minute / 60.0, most.map_or(f64::MAX, |m| m.abs() * per_minute)]),
+            speed: turns.map(|s| s.abs() * per_minute),
+            clockwise: turns.is_none_or(|s| s <= 0.0),
+            written: [feed, surface, turns, rev],
+            ..self.switches(node, "sync_spindle_and_z_feed")
+        }
+    }
+
+    /// What technologies of milling and of turning say alike; the attribute that ties the feed to the spindle has two names.
+    fn switches(&mut self, node: Node<'m>, synchronised: &str) -> Technology {
         let flag = |a: &str| node.attr(a).and_then(|v| v.boolean()).unwrap_or(false);
         if node.attr("its_adaptive_control").is_some() {
             self.no_effect(node, "its_adaptive_control", "the control does it");
@@ -268,16 +281,11 @@ impl<'m> Reader<'m> {
         let reference = node.attr("feedrate_reference").and_then(|v| v.choice());
         Technology {
             origin: origin(node),
-            feed: rev.or(feed.map(|f| if iso { f * 1000.0 } else { f * 1000.0 / 60.0 })).filter(|f| *f > 0.0),
-            per_rev: rev.is_some(),
-            surface: surface.filter(|v| *v > 0.0).map(|v| [v * 1000.0 * per_minute / 60.0, most.map_or(f64::MAX, |m| m.abs() * per_minute)]),
             contact_feed: reference.as_deref() == Some("CCP"),
-            speed: turns.map(|s| s.abs() * per_minute),
-            clockwise: turns.is_none_or(|s| s <= 0.0),
-            synchronised: flag("sync_spindle_and_z_feed"),
+            synchronised: flag(synchronised),
             lock_feed: flag("inhibit_feedrate_override"),
             lock_spindle: flag("inhibit_spindle_override"),
-            written: [feed, surface, turns, rev],
+            ..Technology::default()
         }
     }
 
@@ -451,23 +459,12 @@ impl<'m> Reader<'m> {
             let hand = if right { "right" } else { "left" };
             self.say_at(code::PLAN_SPINDLE_SIGN, node, "spindle", &[&s.to_string(), name(by_sign), hand, name(clockwise)]);
         }
-        let flag = |a: &str| node.attr(a).and_then(|v| v.boolean()).unwrap_or(false);
-        if node.attr("its_adaptive_control").is_some() {
-            self.no_effect(node, "its_adaptive_control", "the control does it");
-        }
-        let reference = node.attr("feedrate_reference").and_then(|v| v.choice());
         Technology {
-            origin: origin(node),
-            per_rev: false,
-            surface: None,
             feed: feed_mm.filter(|f| *f > 0.0),
-            contact_feed: reference.as_deref() == Some("CCP"),
             speed: speed.filter(|s| *s > 0.0 || spindle == Some(0.0)),
             clockwise,
-            synchronised: flag("synchronize_spindle_with_feed"),
-            lock_feed: flag("inhibit_feedrate_override"),
-            lock_spindle: flag("inhibit_spindle_override"),
             written,
+            ..self.switches(node, "synchronize_spindle_with_feed")
         }
     }
 

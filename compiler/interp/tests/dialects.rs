@@ -1,0 +1,446 @@
+//! Programs of other controls than LinuxCNC: what a Fanuc machining center, a Fanuc lathe and grbl make of their words.
+//! There is no oracle; the moves are worked out from the manuals.
+
+mod harness;
+
+use gr_interp::{Outcome, Setup};
+use gr_spec::{Dialect, code};
+
+use harness::{run_with, setup};
+
+fn run_in(id: &str, text: &str) -> (Vec<String>, Outcome) {
+    let dialect = Dialect::find(id).expect("a dialect of the tables");
+    let setup = Setup { dialect, uvw: true, ..setup() };
+    let (out, outcome) = run_with(&setup, text, 100);
+    let calls = out.lines().skip(6).map(|l| l.split_once("N..... ").map_or(l, |(_, call)| call).to_string()).collect();
+    (calls, outcome)
+}
+
+#[test]
+fn every_code_of_the_fanuc_lists_is_known() {
+    for id in ["fanuc-mill", "fanuc-turn"] {
+        let mut refused = Vec::new();
+        for row in Dialect::find(id).expect("a dialect").codes {
+            for words in ["", " P1", " X1. Y2. R1. Z-1. P1 Q1. K2 F100."] {
+                let (_, outcome) = run_in(id, &format!("G21 F100. S100\nG1 X0.\n{}{words}\nM30\n", row.code));
+                for finding in &outcome.findings {
+                    assert_ne!(finding.fault.code, code::CODE_UNKNOWN, "{id}: {}{words}", row.code);
+                    if finding.fault.code == code::CODE_NOT_CARRIED_OUT && words.is_empty() {
+                        assert_eq!(finding.fault.args[0], row.code, "{id}");
+                        refused.push(row.code);
+                    }
+                }
+            }
+        }
+        for code in ["G27", "G34", "G51"] {
+            assert_eq!(refused.contains(&code), Dialect::find(id).unwrap().code(code).is_some(), "{id}: {code}");
+        }
+        for code in ["G0", "G1", "G2", "G4", "G28", "G54", "M3", "M30", "M98"] {
+            assert!(!refused.contains(&code), "{id}: {code}");
+        }
+    }
+    // What the control does not have either stays unknown.
+    for (id, text) in [("fanuc-turn", "G86.1 X1.\nM30\n"), ("fanuc-mill", "G21 M777\nM30\n"), ("fanuc-mill", "G77\nM30\n")] {
+        let (_, outcome) = run_in(id, text);
+        assert_eq!(outcome.findings[0].fault.code, code::CODE_UNKNOWN, "{text}");
+    }
+}
+
+#[test]
+fn the_examples_of_codes_not_carried_out_and_values_unknown() {
+    for code in [code::CODE_NOT_CARRIED_OUT, code::RUN_VALUE_UNKNOWN] {
+        let def = code.def();
+        for (text, expected) in [(def.bad, vec![code]), (def.good, vec![])] {
+            let (_, outcome) = run_in(def.dialect.unwrap_or("linuxcnc"), text.expect("an example"));
+            let found: Vec<_> = outcome.findings.iter().map(|f| f.fault.code).collect();
+            assert_eq!(found, expected, "{text:?}");
+        }
+    }
+}
+
+#[test]
+fn a_fanuc_mill_wakes_up_in_g0_and_repeats_with_k() {
+    let text = "G21 G90\nG43 H1 Z50.\nG91 F100.\nG81 X10. Z-5. R-2. K3\nG80\nM30\n";
+    let (calls, outcome) = run_in("fanuc-mill", text);
+    assert!(outcome.ok(), "{:?}", outcome.findings);
+    assert!(calls.iter().any(|c| c.starts_with("STRAIGHT_TRAVERSE(0.0000, 0.0000, 50.0000")), "{calls:?}");
+    assert_eq!(calls.iter().filter(|c| c.starts_with("STRAIGHT_FEED")).count(), 3);
+    let (_, outcome) = run_in("fanuc-mill", &text.replace("K3", "L3"));
+    assert_eq!(outcome.findings[0].fault.code, code::SYNTAX_NOT_IN_DIALECT);
+    assert_eq!(outcome.findings[0].fault.args[1..], ["fanuc-mill", "write K"]);
+}
+
+fn moves_of(calls: &[String]) -> Vec<String> {
+    let kinds = [("STRAIGHT_TRAVERSE(", "rapid "), ("STRAIGHT_FEED(", "feed "), ("ARC_FEED(", "arc ")];
+    let numbers = |rest: &str, n: usize| {
+        let all: Vec<f64> = rest.trim_end_matches(')').split(", ").filter_map(|v| v.parse().ok()).collect();
+        all[..n.min(all.len())].iter().map(|v| format!("{}", v + 0.0)).collect::<Vec<_>>().join(" ")
+    };
+    let one = |c: &String| {
+        let (rest, name) = kinds.iter().find_map(|(k, name)| Some((c.strip_prefix(k)?, *name)))?;
+        Some(format!("{name}{}", numbers(rest, if name == "arc " { 5 } else { 3 })))
+    };
+    calls.iter().filter_map(one).collect()
+}
+
+/// Fanuc Series 0i/30i, lathe, G-code system A (B-63944, B-64484): X and U are diameters, U W H are increments, the
+/// control wakes up in G18 and G99; I of an arc is a radius.
+#[test]
+fn a_fanuc_lathe_has_diameters_and_increments() {
+    let text = "O1\nG21\nG97 S500 M3\nG0 X100. Z5.\nG1 U-20. W-10. F0.2\nX60.\nU10.\nG2 U20. W-10. R10.\nG3 U20. W10. I0. K10.\nG98 F100.\nG1 W-1. H5.\nG28 U0. W0.\nM30\n";
+    let (calls, outcome) = run_in("fanuc-turn", text);
+    assert!(outcome.ok(), "{:?}", outcome.findings);
+    assert!(calls.iter().any(|c| c == "SET_FEED_MODE(0, 1)"), "{calls:?}");
+    assert_eq!(
+        moves_of(&calls)[..8],
+        ["rapid 50 0 5", "feed 40 0 -5", "feed 30 0 -5", "feed 35 0 -5", "arc -15 45 -5 45 -1", "arc -5 55 -5 45 1", "feed 55 0 -6", "rapid 55 0 -6"]
+    );
+    let feeds = calls.iter().position(|c| c == "SET_FEED_RATE(100.0000)").expect("F of G98");
+    assert!(calls[..feeds].iter().filter(|c| *c == "SET_FEED_MODE(0, 0)").count() == 1);
+    assert!(calls.iter().any(|c| c == "STRAIGHT_FEED(55.0000, 0.0000, -6.0000, 0.0000, 0.0000, 5.0000)"), "{calls:?}");
+    let (_, outcome) = run_in("fanuc-turn", "G0 X10. U5.\nM30\n");
+    assert_eq!(outcome.findings[0].fault.code, code::WORD_REPEATED);
+}
+
+/// The same manual, machining center: coordinate system rotation (G68, G69).
+#[test]
+fn a_fanuc_mill_turns_coordinates() {
+    let text = "G21 G90 F100.\nG68 X0. Y0. R90.\nG1 X20. Y5.\nX30.\nG91 X5.\nG90 G2 X45. I5. J0.\nG0 Z10.\nG81 X10. Y0. Z-5. R2.\nX12.\nG80\nG69\nG0 X1. Y1.\nG68 X10. Y10. R180.\nX0. Y0.\nG69\nG68 R90.\nG0 X30. Y20.\nG69\nM30\n";
+    let (calls, outcome) = run_in("fanuc-mill", text);
+    assert!(outcome.ok(), "{:?}", outcome.findings);
+    assert_eq!(
+        moves_of(&calls),
+        [
+            "feed -5 20 0", "feed -5 30 0", "feed -5 35 0", "arc -5 45 -5 40 -1", "rapid -5 45 10", // G90 and G91, arc
+            "rapid 0 10 10", "rapid 0 10 2", "feed 0 10 -5", "rapid 0 10 10", "rapid 0 12 10", "rapid 0 12 2", "feed 0 12 -5",
+            "rapid 0 12 10", "rapid 1 1 10", "rapid 20 20 10", "rapid 20 30 10", // about another centre, about here
+        ]
+    );
+    for text in ["G68 X0. Y0. R5.\nG28 X0.\nM30\n", "G68 R5.\nG18\nM30\n", "G91\nG68 R5.\nM30\n", "G68 R5.\nG55\nM30\n"] {
+        let (_, outcome) = run_in("fanuc-mill", text);
+        assert_eq!(outcome.findings[0].fault.code, code::CODE_NOT_CARRIED_OUT, "{text}");
+    }
+    let (_, outcome) = run_in("fanuc-mill", "G68 X1. Y1.\nM30\n");
+    assert_eq!(outcome.findings[0].fault.code, code::WORD_MISSING);
+}
+
+/// The same manual, canned cycles: K0 stores the data and drills nothing; G80 goes back to the motion of group 01.
+#[test]
+fn fanuc_cycles_store_and_cancel() {
+    let text = "G21 G90\nG1 X1. F100.\nG81 X5. Z-5. R2. K0\nX10.\nG80\nX9.\nG81 X6. Z-5. R2.\nG80 Z50.\nM30\n";
+    let (calls, outcome) = run_in("fanuc-mill", text);
+    assert!(outcome.ok(), "{:?}", outcome.findings);
+    assert_eq!(
+        moves_of(&calls),
+        [
+            "feed 1 0 0", "rapid 1 0 2", "rapid 10 0 2", "feed 10 0 -5", "rapid 10 0 2", "feed 9 0 2", "rapid 6 0 2", "feed 6 0 -5",
+            "rapid 6 0 2", "feed 6 0 50",
+        ]
+    );
+}
+
+/// The same, a row of holes: R and Z keep their levels when the steps between the holes are increments.
+#[test]
+fn fanuc_cycles_keep_their_levels() {
+    let text = "G21 G90 S500 M3\nG0 Z5.\nG98 G81 X1. Y2. Z-5. R1. F100.\nG91 X5. K2\nG90 G80\nM30\n";
+    let (calls, outcome) = run_in("fanuc-mill", text);
+    assert!(outcome.ok(), "{:?}", outcome.findings);
+    let drilled: Vec<_> = moves_of(&calls).into_iter().filter(|m| m.starts_with("feed")).collect();
+    assert_eq!(drilled, ["feed 1 2 -5", "feed 6 2 -5", "feed 11 2 -5"]);
+}
+
+#[test]
+fn fanuc_dwells_are_milliseconds_or_seconds() {
+    let text = "G21 G90\nG4 P500\nG04 X1.5\nF100.\nG82 X1. Z-5. R2. P250\nG80\nM30\n";
+    let (calls, outcome) = run_in("fanuc-mill", text);
+    assert!(outcome.ok(), "{:?}", outcome.findings);
+    let dwells: Vec<_> = calls.iter().filter(|c| c.starts_with("DWELL")).collect();
+    assert_eq!(dwells, ["DWELL(0.5000)", "DWELL(1.5000)", "DWELL(0.2500)"]);
+}
+
+/// The seconds of a lathe's dwell are no diameter.
+#[test]
+fn fanuc_dwells_of_a_lathe() {
+    let (calls, outcome) = run_in("fanuc-turn", "G21\nG4 X1.\nG4 U1.\nG4 P1000\nM30\n");
+    assert!(outcome.ok(), "{:?}", outcome.findings);
+    let dwells: Vec<_> = calls.iter().filter(|c| c.starts_with("DWELL")).collect();
+    assert_eq!(dwells, ["DWELL(1.0000)"; 3]);
+}
+
+/// Machining center manual (B-63944), programmable data input: L2 origins, L10 lengths, L12 radii. The rest is refused.
+#[test]
+fn fanuc_data_input() {
+    let text = "G21 G90 G54\nG10 L2 P1 X1.\nG10 L10 P1 R5.\nT1 M6\nG43 H1 G0 Z1.\nX0.\nM30\n";
+    let (calls, outcome) = run_in("fanuc-mill", text);
+    assert!(outcome.ok(), "{:?}", outcome.findings);
+    assert!(calls.iter().any(|c| c.starts_with("USE_TOOL_LENGTH_OFFSET(0.0000 0.0000 5.0000")), "{calls:?}");
+    for line in ["G10 L20 P1 X1.", "G10 L11 P1 R1.", "G10 L2 P0 X1.", "G10 L2 P7 X1.", "G10 L2 P1 X1. R30.", "G91 G10 L2 P1 X1.", "G10 L1 P1 Z5."] {
+        let (_, outcome) = run_in("fanuc-mill", &format!("{line}\nM30\n"));
+        assert_eq!(outcome.findings[0].fault.code, code::CODE_NOT_CARRIED_OUT, "{line}");
+    }
+}
+
+/// What LinuxCNC has and the control has not is refused, not carried out with LinuxCNC's meaning.
+#[test]
+fn dialects_are_closed_lists() {
+    for (id, line) in [
+        ("fanuc-mill", "G38.2 Z-5. F100."),
+        ("fanuc-mill", "G5.1 X1. I1. J1."),
+        ("fanuc-mill", "M66 P0"),
+        ("fanuc-turn", "G7"),
+        ("fanuc-turn", "G64"),
+        ("grbl", "G81 X1 Z-1 R1"),
+        ("grbl", "G33 Z-1 K1"),
+        ("grbl", "M6"),
+        ("grbl", "G0 A5"),
+        ("grbl", "G0 X1 W2"),
+        ("grbl", "G10 L10 P1 X1"),
+        ("grbl", "G10 L2 P1 R30 X1"),
+        ("grbl", "G2 X1 Y1 I.5 J.5 P2 F10"),
+    ] {
+        let (_, outcome) = run_in(id, &format!("{line}\nM30\n"));
+        let fault = &outcome.findings[0].fault;
+        assert_eq!((fault.code, fault.args[1].as_str()), (code::SYNTAX_NOT_IN_DIALECT, id), "{line}: {fault:?}");
+    }
+}
+
+/// Fanuc Series 16i/18i (B-63684) and 0i/30i (B-64484), custom macro: undefined variable, FIX, FUP.
+#[test]
+fn fanuc_variables_are_vacant_until_set() {
+    let text = "\
+G21 G90
+G0 X1. Y2.
+#1=#0
+G0 X5. Y#1
+#2=[#1*5.]
+#3=#1
+IF[#1 EQ #0] THEN #101=1.
+IF[#1 EQ 0] THEN #102=1.
+IF[#2 EQ #0] THEN #103=1.
+IF[#1 NE 0] THEN #104=1.
+IF[#3 EQ #0] THEN #105=1.
+IF[#1 GE 0] THEN #106=1.
+G0 X#101 Y#102 Z#103
+G0 X[#104+#105+#106+#1] Y-#1 Z[FIX[-1.2]+FUP[-1.2]+FUP[1.2]]
+G0 X#2
+M30
+";
+    let (calls, outcome) = run_in("fanuc-mill", text);
+    assert!(outcome.ok(), "{:?}", outcome.findings);
+    assert_eq!(moves_of(&calls), ["rapid 1 2 0", "rapid 5 2 0", "rapid 1 2 0", "rapid 3 2 -1", "rapid 0 2 -1"]);
+    for (text, wanted) in [
+        ("#0=1\n", code::PARAMETER_READ_ONLY),
+        ("#50=1\n", code::SYNTAX_NOT_IN_DIALECT),
+        ("#1=#4001\n", code::CODE_NOT_CARRIED_OUT),
+        ("#3000=1\n", code::CODE_NOT_CARRIED_OUT),
+    ] {
+        let (_, outcome) = run_in("fanuc-mill", text);
+        assert_eq!(outcome.findings[0].fault.code, wanted, "{text}");
+    }
+}
+
+/// The same manuals: simple call (G65), local variable levels, M99 P.
+#[test]
+fn fanuc_macros_have_variables_of_their_own() {
+    let text = "\
+O1
+G21 G90
+#1=7.
+#24=9.
+#100=0
+G65 P9010 L2 A1. X[#1+1.] I2. I3.
+G0 X#1 Y#24
+M98 P9020
+G0 X#1
+M98 P9030
+G0 X999.
+N50
+G0 Z3.
+M30
+O9010
+#100=#100+#1
+G0 X#24 Y#4 Z#7
+#1=100.
+IF[#26 EQ #0] THEN #24=50.
+G65 P9020 A4.
+G0 X#1 Y#24
+M99
+O9020
+G0 X#1
+#1=[#1+1.]
+M99
+O9030
+M99 P50
+";
+    let (calls, outcome) = run_in("fanuc-mill", text);
+    assert!(outcome.ok(), "{:?}", outcome.findings);
+    let macro_moves = ["rapid 8 2 3", "rapid 4 2 3", "rapid 100 50 3"];
+    let again = ["rapid 8 2 3", "rapid 4 2 3", "rapid 100 50 3"];
+    let after = ["rapid 7 9 3", "rapid 7 9 3", "rapid 8 9 3", "rapid 8 9 3"];
+    assert_eq!(moves_of(&calls), [&macro_moves[..], &again[..], &after[..]].concat());
+    for (text, wanted) in [
+        ("G65 A1.\nM30\n", code::WORD_MISSING),
+        ("G0 G65 P1\nM30\n", code::MACRO_MALFORMED),
+        ("G65 P1 G1\nM30\n", code::MACRO_MALFORMED),
+        ("G65 P1 L0\nM30\n", code::WORD_MISSING),
+        ("G65 P8\nM30\n", code::SUB_NOT_FOUND),
+        ("O1\nM98 P2\nM30\nO2\nG65 P2\nM99\n", code::SUB_LIMIT),
+    ] {
+        let (_, outcome) = run_in("fanuc-mill", text);
+        assert_eq!(outcome.findings[0].fault.code, wanted, "{text}: {:?}", outcome.findings);
+    }
+}
+
+/// The same manuals, modal call (G66): every movement calls, in a macro that is called the G66 before; the arguments are set
+/// once.
+#[test]
+fn fanuc_movements_call_macros() {
+    let text = "\
+O1
+G21 G90 G40 G67
+#1=5.
+G66 P9110 L1 Z-20. R5.
+G0 X20. Y20.
+G4 X1.
+F100.
+X50.
+M98 P7
+G67
+G0 X0 Y#1
+M30
+O7
+Y80.
+M99
+O9110
+G0 Z#18
+Z#26
+Z#18
+#18=[#18+1.]
+M99
+";
+    let (calls, outcome) = run_in("fanuc-mill", text);
+    assert!(outcome.ok(), "{:?}", outcome.findings);
+    let expected = [
+        "rapid 20 20 0", "rapid 20 20 5", "rapid 20 20 -20", "rapid 20 20 5", //
+        "rapid 50 20 5", "rapid 50 20 6", "rapid 50 20 -20", "rapid 50 20 6", //
+        "rapid 50 80 6", "rapid 50 80 7", "rapid 50 80 -20", "rapid 50 80 7", //
+        "rapid 0 5 7",
+    ];
+    assert_eq!(moves_of(&calls), expected);
+    // The manual's order of two macros, one inside of the other: (1-1) (2-1) (1-2) (3-1) (2-1) (3-2) (2-1) (1-3).
+    let text = "\
+O1
+G21 G91
+G66 P9100
+G0 Z1.
+G66 P9200 L2
+Z15.
+G67
+G67
+Z-25.
+M30
+O9100
+X50.
+M99
+O9200
+Z60.
+Z70.
+M99
+";
+    let (calls, outcome) = run_in("fanuc-mill", text);
+    assert!(outcome.ok(), "{:?}", outcome.findings);
+    let once = |x: f64, z: f64| [(x, z + 60.0), (x + 50.0, z + 60.0), (x + 50.0, z + 130.0), (x + 100.0, z + 130.0)];
+    let mut points = vec![(0.0, 1.0), (50.0, 1.0), (50.0, 16.0)];
+    points.extend(once(50.0, 16.0));
+    points.extend(once(150.0, 146.0));
+    points.push((250.0, 251.0));
+    let expected: Vec<String> = points.iter().map(|(x, z)| format!("rapid {x} 0 {z}")).collect();
+    assert_eq!(moves_of(&calls), expected);
+    for (text, wanted) in [
+        ("G66 A1.\nM30\n", code::WORD_MISSING),
+        ("G0 Z5.\nG66 P1\nG81 X1. Z-1. R1. F100.\nM30\n", code::CODE_NOT_CARRIED_OUT),
+        ("G66 P1\nG28 X1.\nM30\n", code::CODE_NOT_CARRIED_OUT),
+        ("G66 P1\nG67 X1.\nM30\n", code::CODE_NOT_CARRIED_OUT),
+        ("G66 P1\nG0 X1.\nM30\nO1\nG67\nM99\n", code::CODE_NOT_CARRIED_OUT),
+        ("G66 P1\nG66 P1\nG66 P1\nG66 P1\nG66 P1\nM30\n", code::SUB_LIMIT),
+        ("G66 P8\nG0 X1.\nM30\n", code::SUB_NOT_FOUND),
+        ("G66 G65 P8\nG0 X1.\nM30\n", code::MACRO_MALFORMED),
+    ] {
+        let (_, outcome) = run_in("fanuc-mill", text);
+        assert_eq!(outcome.findings[0].fault.code, wanted, "{text}: {:?}", outcome.findings);
+    }
+}
+
+/// Fanuc lathe manual, G-code system A: G90 cuts along Z, G94 along X; both come back to where they began.
+#[test]
+fn a_fanuc_lathe_turns_and_faces_in_cycles() {
+    let text = "\
+G21 G97 S500 M3
+G0 X60. Z2.
+G90 X50. Z-20. F0.2
+X40.
+U-30. W-12. R-1.
+G0 X60. Z2.
+G94 X20. Z-3. F0.1
+Z-6. R-1.
+G1 X61.
+M30
+";
+    let (calls, outcome) = run_in("fanuc-turn", text);
+    assert!(outcome.ok(), "{:?}", outcome.findings);
+    assert_eq!(
+        moves_of(&calls),
+        [
+            "rapid 30 0 2", "rapid 25 0 2", "feed 25 0 -20", "feed 30 0 -20", "rapid 30 0 2", // G90
+            "rapid 20 0 2", "feed 20 0 -20", "feed 30 0 -20", "rapid 30 0 2", // X alone
+            "rapid 14 0 2", "feed 15 0 -10", "feed 30 0 -10", "rapid 30 0 2", // increments and a taper
+            "rapid 30 0 2", "rapid 30 0 -3", "feed 10 0 -3", "feed 10 0 2", "rapid 30 0 2", // G94
+            "rapid 30 0 -7", "feed 10 0 -6", "feed 10 0 2", "rapid 30 0 2", "feed 30.5 0 2",
+        ]
+    );
+    let (_, outcome) = run_in("fanuc-turn", "G0 G90 X1. Z1.\nM30\n");
+    assert_eq!(outcome.findings[0].fault.code, code::CODE_SAME_GROUP);
+}
+
+/// Fanuc B-64484: digits in front of the last four of P are the number of calls, unless L gives it.
+#[test]
+fn fanuc_repeats_in_p() {
+    let subs = "O1000\nG91 G0 X1.\nM99\nO51000\nG91 G0 X100.\nM99\n";
+    for (call, x) in [
+        ("M98 P1000", "1"),
+        ("M98 P00051000", "5"),
+        ("M98 P0051000", "5"),
+        ("M98 P51000", "5"),
+        ("M98 P1000 L3", "3"),
+        ("M98 P51000 L2", "200"),
+        ("M98 P01000", "1"),
+    ] {
+        let (calls, outcome) = run_in("fanuc-mill", &format!("G21 G90\n{call}\nM30\n{subs}"));
+        assert!(outcome.ok(), "{call}: {:?}", outcome.findings);
+        assert_eq!(moves_of(&calls).last().map(String::as_str), Some(format!("rapid {x} 0 0").as_str()), "{call}");
+    }
+    let (_, outcome) = run_in("fanuc-turn", "M98 P20003\nM30\nO1\nM99\n");
+    assert_eq!((outcome.findings[0].fault.code, outcome.findings[0].fault.message_args()[0].as_str()), (code::SUB_NOT_FOUND, "3"));
+}
+
+/// Fanuc lathe manual: G50 S holds surface speed control below a speed, before and after G96.
+#[test]
+fn a_fanuc_lathe_clamps_the_spindle() {
+    for text in ["G50 S2000\nG96 S150 M3\nM30\n", "G96 S150 M3\nG50 S2000\nM30\n"] {
+        let (calls, outcome) = run_in("fanuc-turn", text);
+        assert!(outcome.ok(), "{text}: {:?}", outcome.findings);
+        let modes: Vec<&String> = calls.iter().filter(|c| c.starts_with("SET_SPINDLE_MODE")).collect();
+        assert!(modes.iter().any(|m| m.contains("2000.0000")), "{text}: {modes:?}");
+        assert_eq!(calls.iter().filter(|c| c.starts_with("SET_SPINDLE_SPEED")).count(), 1, "{text}");
+    }
+    let (_, outcome) = run_in("fanuc-turn", "G50 X100. Z50.\nM30\n");
+    assert_eq!(outcome.findings[0].fault.code, code::CODE_NOT_CARRIED_OUT);
+}
+
+/// A Fanuc control moves in the block of an M99, then returns.
+#[test]
+fn words_before_m99() {
+    let (calls, outcome) = run_in("fanuc-mill", "G21 G90\nM98 P100\nG0 Y3.\nM30\nO100\nG0 X1.\nX2. M99\n");
+    assert!(outcome.findings.is_empty(), "{:?}", outcome.findings);
+    assert_eq!(moves_of(&calls), ["rapid 1 0 0", "rapid 2 0 0", "rapid 2 3 0"]);
+}
