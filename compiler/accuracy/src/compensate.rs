@@ -143,11 +143,13 @@ pub fn program(
         let fail = |e| (step.clone(), e);
         match &step.action {
             Action::UseFrame(i) => {
-                at.frame = program.frames.get(usize::from(*i)).map_or(Frame::IDENTITY, |f| f.frame);
+                let old = std::mem::replace(&mut at.frame, program.frames.get(usize::from(*i)).map_or(Frame::IDENTITY, |f| f.frame));
+                from = from.reframed(&old, &at.frame);
                 out.program.steps.push(step.clone());
             }
             Action::UseTool(i) => {
-                at.tool = program.tools.get(usize::from(*i)).map_or(Frame::IDENTITY, |t| t.frame);
+                let old = std::mem::replace(&mut at.tool, program.tools.get(usize::from(*i)).map_or(Frame::IDENTITY, |t| t.frame));
+                from = from.retooled(&old, &at.tool);
                 out.program.steps.push(step.clone());
             }
             Action::Joint { to, speed, zone } => {

@@ -297,8 +297,14 @@ pub fn report(
         }
         let target = |i: u32| program.targets.get(i as usize).copied();
         match &step.action {
-            Action::UseFrame(i) => walk.frame = program.frames.get(usize::from(*i)).map_or(Frame::IDENTITY, |f| f.frame),
-            Action::UseTool(i) => walk.tool = program.tools.get(usize::from(*i)).map_or(Frame::IDENTITY, |t| t.frame),
+            Action::UseFrame(i) => {
+                let old = std::mem::replace(&mut walk.frame, program.frames.get(usize::from(*i)).map_or(Frame::IDENTITY, |f| f.frame));
+                from = from.reframed(&old, &walk.frame);
+            }
+            Action::UseTool(i) => {
+                let old = std::mem::replace(&mut walk.tool, program.tools.get(usize::from(*i)).map_or(Frame::IDENTITY, |t| t.frame));
+                from = from.retooled(&old, &walk.tool);
+            }
             Action::Joint { to, .. } => from = target(*to).unwrap_or(from),
             Action::Linear { to, rapid, speed, .. } => {
                 let Some(end) = target(*to) else { continue };

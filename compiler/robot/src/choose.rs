@@ -10,7 +10,7 @@ use gr_ir::Source;
 use gr_machine::KinematicsError;
 
 use crate::gather::{Gathered, Item, Move, Way};
-use crate::path::{Mount, Path};
+use crate::path::{Mount, Path, handed_on};
 use crate::solver::{Branches, Joints, Limits, Solver};
 use crate::MAX_JOINTS;
 
@@ -217,19 +217,13 @@ impl Chooser<'_> {
                 fault = furthest(fault, begin(why));
             }
         }
-        let (mut from, mut turn) = (first.position, first.turn);
-        let mut frame = first.frame;
+        let (mut from, mut before) = (start, first);
         for i in chain.first + 1..=chain.last {
             if !tracks.iter().any(|t| t.alive) {
                 break;
             }
             let Item::Move(m) = &self.g.items[i] else { continue };
-            if m.frame != frame {
-                let base = self.g.frames[usize::from(frame)].frame.apply(from);
-                from = self.g.frames[usize::from(m.frame)].frame.inverse().apply(base);
-                frame = m.frame;
-            }
-            let path = Path::new(self.g, from, turn, m);
+            let path = Path::new(self.g, &handed_on(self.g, from, before, m, spin), m);
             let mount = Mount::new(self.g, m, spin);
             let looks = path.looks();
             for k in 1..=looks {
@@ -246,7 +240,7 @@ impl Chooser<'_> {
                     }
                 }
             }
-            (from, turn) = (m.position, m.turn);
+            (from, before) = (gr_machine::math::Frame { turn: self.g.turns[m.turn as usize], position: m.position }, m);
         }
         let nodes: Vec<Node> = tracks.iter().filter(|t| t.alive).flat_map(|t| self.turned(t, spin)).collect();
         match fault {

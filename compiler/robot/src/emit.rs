@@ -2,13 +2,13 @@
 //! figures of the summary are gathered.
 
 use gr_ir::Source;
-use gr_machine::math::{Frame, M3, norm, product, quaternion_of, rotation_vector, transpose};
+use gr_machine::math::{Frame, M3, quaternion_of};
 use gr_machine::Machine;
 use gr_text::code;
 
 use crate::choose::{Chain, Node, unwrap};
 use crate::gather::{Findings, Gathered, Item, Move, Way};
-use crate::path::{Mount, Path};
+use crate::path::{Mount, Path, handed_on};
 use crate::plan::spun;
 use crate::solver::{Branches, Joints, Limits, Solver};
 use crate::{Action, MAX_JOINTS, RobotProgram, Step, Summary, Target, Zone};
@@ -35,9 +35,8 @@ const CLOSE: f64 = 3.0 * std::f64::consts::PI / 180.0;
 
 /// Where the tool is while the program is walked along.
 struct Here {
-    position: [f64; 3],
-    turn: u32,
-    frame: u16,
+    at: Frame,
+    by: Move,
     joints: Joints,
 }
 
@@ -146,24 +145,13 @@ impl<'a> Emit<'a> {
             self.summary.rapid_seconds += self.joint_time(last, &joints, m.speed);
             self.summary.rapids += 1;
             self.steps.push(Step { action: Action::Joint { to, speed: m.speed, zone: m.zone }, source: m.source });
-            *here = Some(Here { position: m.position, turn: m.turn, frame: m.frame, joints });
+            *here = Some(Here { at: Frame { turn: g.turns[m.turn as usize], position: m.position }, by: *m, joints });
             *last = joints;
             self.look(&joints, m.source);
             return;
         }
         let Some(h) = here else { return };
-        if h.frame != m.frame {
-            // The same place and turn in the new frame.
-            let [old, new] = [h.frame, m.frame].map(|f| g.frames[usize::from(f)].frame);
-            let relative = new.inverse().then(&old);
-            h.position = relative.apply(h.position);
-            let turn = product(&relative.turn, &g.turns[h.turn as usize]);
-            if norm(rotation_vector(&product(&turn, &transpose(&g.turns[h.turn as usize])))) > 1e-12 {
-                g.turns.push(turn);
-                h.turn = u32::try_from(g.turns.len() - 1).unwrap_or(u32::MAX);
-            }
-            h.frame = m.frame;
-        }
+        h.at = handed_on(g, h.at, &h.by, m, node.spin);
         let (joints, via) = self.follow(g, m, node, h, findings);
         let to = self.keep(self.target(m.position, &turn, &joints, node.branch));
         let action = match m.way {
@@ -176,13 +164,13 @@ impl<'a> Emit<'a> {
             _ => Action::Linear { to, speed: m.speed, zone: m.zone, rapid: m.rapid },
         };
         self.steps.push(Step { action, source: m.source });
-        *h = Here { position: m.position, turn: m.turn, frame: m.frame, joints };
+        *h = Here { at: Frame { turn: g.turns[m.turn as usize], position: m.position }, by: *m, joints };
         *last = joints;
     }
 
     /// Joint values along a move: the end, the middle, and whether any joint is too fast.
     fn follow(&mut self, g: &Gathered, m: &Move, node: &Node, h: &Here, findings: &mut Findings<'_>) -> (Joints, Joints) {
-        let path = Path::new(g, h.position, h.turn, m);
+        let path = Path::new(g, &h.at, m);
         let mount = Mount::new(g, m, node.spin);
         let looks = path.looks();
         // An even number of looks has one in the middle.

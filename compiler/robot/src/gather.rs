@@ -6,7 +6,7 @@ mod signals;
 
 use gr_ir::geometry::ArcShape;
 use gr_ir::{FeedMode, Note, Op, PathMode, Pose, Program, Source, Sources, State, Stop, Turn, View};
-use gr_machine::math::{Frame, M3, dot, euler, norm, product, rot_x, rot_z, rotation_vector, scale, sub, transpose};
+use gr_machine::math::{Frame, M3, add, dot, euler, norm, product, rot_x, rot_z, rotation_vector, scale, sub, transpose};
 use gr_machine::{Chain, Control, Kind, Machine, Orientation, Rapid};
 use gr_text::{Code, Diagnostic, code};
 use std::collections::{BTreeMap, BTreeSet};
@@ -120,6 +120,8 @@ impl<'a> Findings<'a> {
 
 /// Below this a radius counts as reached and a way as none, mm.
 const TINY: f64 = 1e-9;
+/// Places nearer than this are one, mm.
+const NEAR: f64 = 1e-6;
 /// Largest corner where a program has G64 without a tolerance and the machine file no zone, mm.
 const CORNER: f64 = 0.5;
 /// A change of tool direction is cut so that no piece turns further, rad.
@@ -140,8 +142,20 @@ pub(crate) struct Gather<'a> {
     waiting: bool,
     frame: Option<u16>,
     tool: Option<u16>,
-    /// Last place, in the base, and the turn there.
-    at: Option<([f64; 3], u32)>,
+    /// Where the tool stands, in the base.
+    at: Option<Frame>,
+    /// Where it would stand with the tool that came since, had the changer left the machine where it was.
+    at_change: Option<Frame>,
+    /// A tool was changed since the last move.
+    exchanged: bool,
+    /// The program had a rapid since the last move.
+    rapids: bool,
+    /// The tool offset moved the program's coordinates while the tool stood still.
+    offset: bool,
+    /// That was told.
+    offset_told: bool,
+    /// What the frame in force is placed by.
+    placed: Option<Frame>,
     path_said: bool,
     ended: bool,
     source: Source,
@@ -188,6 +202,12 @@ impl<'a> Gather<'a> {
             frame: None,
             tool: None,
             at: None,
+            at_change: None,
+            exchanged: false,
+            rapids: false,
+            offset: false,
+            offset_told: false,
+            placed: None,
             path_said: false,
             ended: false,
             source: Source::default(),
@@ -208,6 +228,8 @@ impl<'a> Gather<'a> {
                 break;
             }
             self.source = view.source;
+            // Errors of their own; where the tool is afterwards nobody knows.
+            self.rapids |= matches!(view.op, Op::Probe(_) | Op::RigidTap { .. });
             if !matches!(view.op, Op::Stop(_)) {
                 self.pallet = false;
             }
@@ -232,17 +254,27 @@ impl<'a> Gather<'a> {
             Op::SpindleOrient { spindle, angle, direction } => self.orient(spindle, angle, direction),
             Op::SpindleWait { timeout, .. } => self.oriented(timeout),
             Op::RunTime(what) => self.findings.say(code::ROBOT_RUN_TIME, Some(view.source), &[what.to_string()]),
-            Op::ToolOffset(_) => {
-                for i in 0..3 {
-                    self.seen[i] &= view.start.axes[i] == view.end.axes[i];
-                }
-            }
+            Op::ToolOffset(_) => self.tool_offset(view),
             Op::PathMode(_) => self.path_said = true,
             Op::End => {
                 self.end(view.start, view.state);
                 self.ended = true;
             }
             _ => self.action(view),
+        }
+    }
+
+    /// The machine stands still, the program's coordinates change. Where the tool stands is known, or it is said anew.
+    fn tool_offset(&mut self, view: &View<'_, '_>) {
+        let same = |i: usize| view.start.axes[i] == view.end.axes[i];
+        if self.at.is_some() && !self.exchanged {
+            if !(0..3).all(same) {
+                (self.offset, self.offset_told) = (true, false);
+            }
+            return;
+        }
+        for i in 0..3 {
+            self.seen[i] &= same(i);
         }
     }
 
@@ -253,7 +285,10 @@ impl<'a> Gather<'a> {
                 self.out.wait_seconds += t;
                 self.act(Action::Dwell(t));
             }
-            Op::ToolChange(_) => self.change(state.tool),
+            Op::ToolChange(_) => {
+                self.exchanged = true;
+                self.change(state.tool);
+            }
             // What is on is on the first spindle; the others are only told to stop.
             Op::SpindleSpeed { speed, spindle } if spindle > 0 && speed != 0.0 => self.cannot("a second spindle ($)"),
             Op::SpindleTurn { turn, spindle } if spindle > 0 && turn != Turn::Stop => self.cannot("a second spindle ($)"),
@@ -320,7 +355,7 @@ impl<'a> Gather<'a> {
             self.retract();
             self.act(Action::Message(format!("setup {name}")));
             self.act(Action::Pause { optional: false });
-            self.at = None;
+            (self.at, self.at_change) = (None, None);
         }
     }
 
@@ -343,6 +378,10 @@ impl<'a> Gather<'a> {
             }
             (None, None, None) => self.machine.cell.part_in_base(),
         };
+        if self.placed.replace(placed).is_some_and(|p| p != placed) {
+            // Coordinates of another place: nothing is known of the tool in them.
+            self.offset = false;
+        }
         let (o, l) = (&state.work_offset, &state.local_offset);
         let frame = placed
             .then(&Frame { turn: rot_z(state.rotation), position: [o[0], o[1], o[2]] })
@@ -415,13 +454,22 @@ impl<'a> Gather<'a> {
         };
         if self.tool != Some(index) {
             self.act(Action::UseTool(index));
-            if self.tool.is_some() {
-                // Another point: where it stands is not where the program goes on.
-                self.at = None;
+            if let Some(old) = self.tool {
+                self.other_point(old, index);
             }
             self.tool = Some(index);
         }
         Some(index)
+    }
+
+    /// Another tool point on a machine that stands still; a changer leaves it nobody knows where.
+    fn other_point(&mut self, old: u16, new: u16) {
+        let [old, new] = [old, new].map(|t| self.out.tools[usize::from(t)].frame);
+        let step = old.inverse().then(&new);
+        // Beside the tool's axis the point depends on the turn about it, which is chosen later.
+        let along = step.position[0].abs() < TINY && step.position[1].abs() < TINY && same_turn(&step.turn, &Frame::IDENTITY.turn);
+        let stands = self.at.filter(|_| along).map(|at| at.then(&step));
+        (self.at, self.at_change) = if self.exchanged { (None, stands) } else { (stands, None) };
     }
 
     /// Rotary words with their offsets.
@@ -429,8 +477,14 @@ impl<'a> Gather<'a> {
         [3, 4, 5].map(|i| pose.axes[i] + state.work_offset[i] + state.local_offset[i] + state.tool_offset[i])
     }
 
-    /// How the tool is turned in the work frame; none when the machine file doesn't say.
+    /// How the tool is turned in the work frame; none when the machine file doesn't say. G10 R and its like turn the
+    /// coordinates of X and Y, not the tool.
     fn turn(&mut self, pose: &Pose, state: &State) -> Option<M3> {
+        let turn = self.turn_unrotated(pose, state)?;
+        Some(if state.rotation == 0.0 || pose.tool_axis.is_some() { turn } else { product(&rot_z(-state.rotation), &turn) })
+    }
+
+    fn turn_unrotated(&mut self, pose: &Pose, state: &State) -> Option<M3> {
         let up = self.machine.kind == Kind::Robot;
         if let Some(axis) = pose.tool_axis {
             return Some(along(if up { scale(axis, -1.0) } else { axis }, pose.spin.unwrap_or(0.0)));
@@ -505,20 +559,89 @@ impl<'a> Gather<'a> {
         !on_axis
     }
 
-    fn base(&self, frame: u16, position: [f64; 3]) -> [f64; 3] {
-        self.out.frames[usize::from(frame)].frame.apply(position)
+    /// A tool frame of a work frame in the base.
+    fn base(&self, frame: u16, position: [f64; 3], turn: u32) -> Frame {
+        self.out.frames[usize::from(frame)].frame.then(&Frame { turn: self.out.turns[turn as usize], position })
     }
 
     fn push(&mut self, m: Move) {
-        self.at = Some((self.base(m.frame, m.position), m.turn));
+        self.at = Some(self.base(m.frame, m.position, m.turn));
+        self.at_change = None;
+        (self.exchanged, self.rapids) = (false, false);
         self.out.items.push(Item::Move(m));
+    }
+
+    /// How far the tool stands from where the program believes it, in the work frame, where the tool offset was changed
+    /// while it stood still.
+    fn lag(&mut self, frame: u16, believed: [f64; 3]) -> [f64; 3] {
+        let Some(at) = self.at.filter(|_| self.offset) else { return [0.0; 3] };
+        let here = self.out.frames[usize::from(frame)].frame.inverse().apply(at.position);
+        let lag = sub(here, believed).map(|v| if v.abs() < NEAR { 0.0 } else { v });
+        self.offset = lag != [0.0; 3];
+        if self.offset && !std::mem::replace(&mut self.offset_told, true) {
+            let axes = (0..3).filter(|i| lag[*i] != 0.0);
+            let show = |p: [f64; 3]| axes.clone().map(|i| format!("{} {}", ["X", "Y", "Z"][i], gr_text::figures::number(p[i], 3))).collect::<Vec<_>>().join(" ");
+            self.findings.say(code::ROBOT_OFFSET_MOVED, Some(self.source), &[show(believed), show(here)]);
+        }
+        lag
+    }
+
+    /// A move from where the tool stands instead of where the program believes it: what it doesn't name stays. None where
+    /// a curve would be bent.
+    fn held<'v>(&mut self, op: Op<'v>, start: &Pose, end: &Pose, lag: [f64; 3]) -> Option<(Op<'v>, Pose, Pose)> {
+        let mut named = [0, 1, 2].map(|i| start.axes[i] != end.axes[i]);
+        let mut op = op;
+        match &mut op {
+            Op::Arc(arc) => {
+                match arc.plane {
+                    gr_ir::ArcPlane::Work(plane) => {
+                        let (u, v, _) = gr_ir::plane_axes(plane);
+                        (named[u], named[v]) = (true, true);
+                    }
+                    gr_ir::ArcPlane::Free(_) => named = [true; 3],
+                }
+                arc.center = [0, 1, 2].map(|i| if named[i] { arc.center[i] } else { arc.center[i] + lag[i] });
+            }
+            Op::Nurbs { .. } => (named[0], named[1]) = (true, true),
+            _ => {}
+        }
+        let straight = matches!(op, Op::Linear | Op::Rapid);
+        if !straight && (0..3).any(|i| named[i] && lag[i] != 0.0) {
+            self.nowhere(add(start.xyz(), lag), start.xyz());
+            return None;
+        }
+        let (mut from, mut to) = (*start, *end);
+        for i in 0..3 {
+            from.axes[i] += lag[i];
+            to.axes[i] += if named[i] { 0.0 } else { lag[i] };
+        }
+        Some((op, from, to))
+    }
+
+    fn nowhere(&mut self, here: [f64; 3], believed: [f64; 3]) {
+        self.findings.say(code::ROBOT_NO_RAPID, Some(self.source), &[believed, here].map(crate::plan::show));
+    }
+
+    /// The tool comes to where a cut begins. Without a rapid of the program that may only be where it stands.
+    fn come_to_cut(&mut self, frame: u16, tool: u16, position: [f64; 3], turn: u32) {
+        let here = self.base(frame, position, turn);
+        if self.at.is_some_and(|at| norm(sub(at.position, here.position)) <= NEAR && same_turn(&at.turn, &here.turn)) {
+            return;
+        }
+        if let Some(at) = self.at.or(self.at_change).filter(|_| !self.rapids)
+            && norm(sub(at.position, here.position)) > 1e-3
+        {
+            let stands = self.out.frames[usize::from(frame)].frame.inverse().apply(at.position);
+            self.nowhere(stands, position);
+        }
+        self.come(frame, tool, position, turn);
     }
 
     /// Comes to a place by rapid; the first time from home, from above.
     fn come(&mut self, frame: u16, tool: u16, position: [f64; 3], turn: u32) {
         let first = !self.out.items.iter().any(|i| matches!(i, Item::Move(_)));
-        let here = self.base(frame, position);
-        let length = self.at.map_or(0.0, |(p, _)| norm(sub(here, p)));
+        let here = self.base(frame, position, turn);
+        let length = self.at.map_or(0.0, |at| norm(sub(here.position, at.position)));
         let joint = self.machine.cell.joint_share();
         let m = Move {
             way: Way::Joint,
@@ -539,7 +662,7 @@ impl<'a> Gather<'a> {
             self.push(Move { position: above, ours: true, source: None, zone: Zone::Stop, ..m });
             return self.push(Move { way: Way::Line, speed: self.rapid_speed(), length: self.options.approach, ..m });
         }
-        let linear = self.at.is_some_and(|(from, was)| was == turn && self.straight(from, here, frame, turn));
+        let linear = self.at.is_some_and(|at| same_turn(&at.turn, &here.turn) && self.straight(at.position, &here));
         if linear {
             self.push(Move { way: Way::Line, speed: self.rapid_speed(), ..m });
         } else {
@@ -548,12 +671,12 @@ impl<'a> Gather<'a> {
     }
 
     /// A rapid in a line: the machine does all so, or it goes along the tool's own axis, as in a hole.
-    fn straight(&self, from: [f64; 3], to: [f64; 3], frame: u16, turn: u32) -> bool {
+    fn straight(&self, from: [f64; 3], to: &Frame) -> bool {
         if self.machine.cell.rapid == Some(Rapid::Linear) || self.machine.kind == Kind::Mill {
             return true;
         }
-        let z = self.out.frames[usize::from(frame)].frame.then(&Frame::turned(self.out.turns[turn as usize])).axis(2);
-        let way = sub(to, from);
+        let z = to.axis(2);
+        let way = sub(to.position, from);
         let length = norm(way);
         length > TINY && norm(sub(way, scale(z, dot(way, z)))) < 1e-6
     }
@@ -578,17 +701,25 @@ impl<'a> Gather<'a> {
             self.seen[i] |= view.start.axes[i] != view.end.axes[i];
         }
         self.waiting = self.seen != [true; 3];
+        self.rapids = true;
         if !self.waiting {
-            self.go_to(view.end, view.state);
+            self.go_to(view.start, view.end, view.state);
         }
     }
 
-    fn go_to(&mut self, pose: &Pose, state: &State) {
+    fn go_to(&mut self, start: &Pose, end: &Pose, state: &State) {
         let (Some(frame), Some(tool)) = (self.work(state), self.tool(state)) else { return };
-        let Some(turn) = self.turn(pose, state) else { return };
+        let Some(turn) = self.turn(end, state) else { return };
         let turn = self.turn_index(turn);
-        if self.at.is_none_or(|(p, t)| t != turn || norm(sub(p, self.base(frame, pose.xyz()))) > TINY) {
-            self.come(frame, tool, pose.xyz(), turn);
+        let mut to = end.xyz();
+        let lag = self.lag(frame, start.xyz());
+        if lag != [0.0; 3] {
+            let Some((.., held)) = self.held(Op::Rapid, start, end, lag) else { return };
+            to = held.xyz();
+        }
+        let here = self.base(frame, to, turn);
+        if self.at.is_none_or(|at| norm(sub(at.position, here.position)) > TINY || !same_turn(&at.turn, &here.turn)) {
+            self.come(frame, tool, to, turn);
         }
     }
 
@@ -645,6 +776,15 @@ impl<'a> Gather<'a> {
         self.waiting = false;
         let (Some(frame), Some(tool)) = (self.work(state), self.tool(state)) else { return };
         let (Some(from), Some(to)) = (self.turn(view.start, state), self.turn(view.end, state)) else { return };
+        let lag = self.lag(frame, view.start.xyz());
+        let (op, first, last);
+        let view = if lag == [0.0; 3] {
+            view
+        } else {
+            let Some(held) = self.held(view.op, view.start, view.end, lag) else { return };
+            (op, first, last) = held;
+            &View { op, start: &first, end: &last, ..*view }
+        };
         let length = match gr_ir::geometry::length(&view.op, view.start, view.end) {
             gr_ir::geometry::Length::Linear(mm) => mm,
             gr_ir::geometry::Length::Angular(_) => 0.0,
@@ -656,10 +796,7 @@ impl<'a> Gather<'a> {
         }
         let Some(speed) = self.speed(state, length) else { return };
         let start = self.turn_index(from);
-        let here = self.base(frame, view.start.xyz());
-        if self.at.is_none_or(|(p, t)| norm(sub(p, here)) > 1e-6 || t != start && self.out.turns[t as usize] != from) {
-            self.come(frame, tool, view.start.xyz(), start);
-        }
+        self.come_to_cut(frame, tool, view.start.xyz(), start);
         if length <= TINY {
             self.findings.once(code::ROBOT_TURN_SPEED, Some(self.source), &[]);
         }
@@ -755,7 +892,7 @@ impl<'a> Gather<'a> {
     fn end(&mut self, pose: &Pose, state: &State) {
         if self.waiting && !self.out.items.iter().any(|i| matches!(i, Item::Move(_))) {
             // Rapids alone that left a coordinate where it was.
-            self.go_to(pose, state);
+            self.go_to(pose, pose, state);
         }
         self.retract();
         let made = self.cells.off();
@@ -790,6 +927,11 @@ impl<'a> Gather<'a> {
             }
         }
     }
+}
+
+/// Whether two turns are one but for rounding.
+fn same_turn(a: &M3, b: &M3) -> bool {
+    a.iter().flatten().zip(b.iter().flatten()).all(|(x, y)| (x - y).abs() < 1e-9)
 }
 
 /// A frame to be looked up by; both zeros are one.

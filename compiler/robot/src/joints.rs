@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 
 use gr_ir::{Source, Sources};
 use gr_machine::JointKind;
-use gr_machine::math::{Frame, norm, product, quaternion_of, sub, transpose, turn_of};
+use gr_machine::math::{Frame, norm, sub, turn_of};
 use gr_text::{Diagnostic, code};
 
 use crate::choose::unwrap;
@@ -134,7 +134,7 @@ pub fn joint_path(program: &RobotProgram, options: &JointOptions) -> Result<Join
 impl Run<'_> {
     fn step(&mut self, i: usize, action: &Action, source: Option<Source>) -> Result<(), TooMany> {
         match action {
-            Action::UseTool(t) => self.tool = *t,
+            Action::UseTool(t) => self.change_tool(*t),
             Action::UseFrame(f) => self.change_frame(*f),
             Action::Joint { to, speed, zone } => {
                 let to = self.program.targets[*to as usize];
@@ -156,8 +156,16 @@ impl Run<'_> {
     /// The same place in another frame.
     fn change_frame(&mut self, frame: u16) {
         let (old, new) = (self.g.frames[usize::from(self.frame)].frame, self.g.frames[usize::from(frame)].frame);
-        reframe(&mut self.here, &old, &new);
+        self.here = self.here.reframed(&old, &new);
         self.frame = frame;
+    }
+
+    /// The same machine at another tool point.
+    fn change_tool(&mut self, tool: u16) {
+        if let [Some(old), Some(new)] = [self.tool, tool].map(|t| self.g.tools.get(usize::from(t))) {
+            self.here = self.here.retooled(&old.frame, &new.frame);
+        }
+        self.tool = tool;
     }
 
     fn push(&mut self, joints: Joints, seconds: f64, rapid: bool, stop: bool, source: Option<Source>) -> Result<(), TooMany> {
@@ -214,7 +222,7 @@ impl Run<'_> {
             ours: false,
             source,
         };
-        let path = Path::new(&self.g, self.here.position, 0, &m);
+        let path = Path::new(&self.g, &Frame { turn: turns.0, position: self.here.position }, &m);
         let mount = Mount::new(&self.g, &m, 0.0);
         let mut seconds = if path.length > 0.0 { path.length / speed } else { self.joint_time(&self.here.joints, &to.joints) };
         if rapid {
@@ -249,15 +257,6 @@ impl Run<'_> {
         }
         self.here = to;
         Ok(())
-    }
-}
-
-/// The same place and turn, seen from another frame.
-pub(crate) fn reframe(here: &mut Target, old: &Frame, new: &Frame) {
-    here.position = new.inverse().apply(old.apply(here.position));
-    if old.turn != new.turn {
-        let turn = product(&transpose(&new.turn), &product(&old.turn, &turn_of(here.quaternion)));
-        here.quaternion = quaternion_of(&turn);
     }
 }
 

@@ -21,9 +21,10 @@ const STEP: f64 = 10.0;
 const ANGLE: f64 = 0.1;
 
 impl Path {
-    pub fn new(g: &Gathered, from: [f64; 3], from_turn: u32, m: &Move) -> Path {
-        let (a, b) = (&g.turns[from_turn as usize], &g.turns[m.turn as usize]);
-        let vector = if from_turn == m.turn { [0.0; 3] } else { rotation_vector(&product(b, &transpose(a))) };
+    /// From a tool frame in the move's own work frame.
+    pub fn new(g: &Gathered, start: &Frame, m: &Move) -> Path {
+        let (a, b, from) = (&start.turn, &g.turns[m.turn as usize], start.position);
+        let vector = if a == b { [0.0; 3] } else { rotation_vector(&product(b, &transpose(a))) };
         let arc = if let Way::Arc(i) = m.way { Some(g.arcs[i as usize]) } else { None };
         let length = arc.map_or_else(|| norm(sub(m.position, from)), |a| norm(sub(from, a.center)) * a.angle);
         Path { from, to: m.position, turn: *a, vector, angle: norm(vector), arc, length }
@@ -59,6 +60,21 @@ impl Path {
     pub fn at(&self, share: f64) -> Frame {
         Frame { turn: self.turn(share), position: self.position(share) }
     }
+}
+
+/// The frame of a tool after a move, seen by the next one: in its work frame, at its tool point.
+pub(crate) fn handed_on(g: &Gathered, at: Frame, before: &Move, next: &Move, spin: f64) -> Frame {
+    let mut at = at;
+    if before.frame != next.frame {
+        let [old, new] = [before.frame, next.frame].map(|f| g.frames[usize::from(f)].frame);
+        at = new.inverse().then(&old).then(&at);
+    }
+    if before.tool != next.tool {
+        let [old, new] = [before.tool, next.tool].map(|t| g.tools[usize::from(t)].frame);
+        let turned = Frame::turned(rot_z(if next.free { spin } else { 0.0 }));
+        at = at.then(&turned).then(&old.inverse()).then(&new).then(&turned.inverse());
+    }
+    at
 }
 
 /// From a tool frame in a work frame to the flange in the base.

@@ -1,7 +1,7 @@
 //! The motion of one machine, ready to be written in some language. Lengths in mm, angles in rad, time in s.
 
 use gr_ir::Source;
-use gr_machine::math::Frame;
+use gr_machine::math::{Frame, product, quaternion_of, transpose, turn_of};
 use gr_machine::{Machine, Signal};
 
 /// No machine here has more joints, external axes included.
@@ -19,6 +19,30 @@ pub struct Target {
     pub joints: [f64; MAX_JOINTS],
     /// The configuration, as the kinematics number it.
     pub branch: u8,
+}
+
+impl Target {
+    /// The same place and turn, seen from another work frame.
+    #[must_use]
+    pub fn reframed(&self, old: &Frame, new: &Frame) -> Target {
+        let mut out = Target { position: new.inverse().apply(old.apply(self.position)), ..*self };
+        if old.turn != new.turn {
+            let turn = product(&transpose(&new.turn), &product(&old.turn, &turn_of(self.quaternion)));
+            out.quaternion = quaternion_of(&turn);
+        }
+        out
+    }
+
+    /// The same joints at the point of another tool.
+    #[must_use]
+    pub fn retooled(&self, old: &Frame, new: &Frame) -> Target {
+        if old == new {
+            return *self;
+        }
+        let at = Frame { turn: turn_of(self.quaternion), position: self.position }.then(&old.inverse()).then(new);
+        let quaternion = if old.turn == new.turn { self.quaternion } else { quaternion_of(&at.turn) };
+        Target { position: at.position, quaternion, ..*self }
+    }
 }
 
 /// A tool the program uses.

@@ -12,12 +12,12 @@ use std::fmt::Write as _;
 
 use gr_ir::{Source, Sources};
 use gr_machine::JointKind;
-use gr_machine::math::turn_of;
+use gr_machine::math::{Frame, turn_of};
 use gr_text::{Diagnostic, code};
 
 use crate::choose::unwrap;
 use crate::gather::{ArcPiece, Gathered, Move, Way};
-use crate::joints::{TooMany, reframe};
+use crate::joints::TooMany;
 use crate::path::{Mount, Path};
 use crate::solver::{Branches, Joints, Limits, Solver};
 use crate::{Action, MAX_JOINTS, RobotProgram, Target, Zone};
@@ -214,10 +214,15 @@ impl<'a> Maker<'a> {
         for (i, step) in self.program.steps.iter().enumerate() {
             self.source = step.source;
             match &step.action {
-                Action::UseTool(t) => tool = *t,
+                Action::UseTool(t) => {
+                    if let [Some(old), Some(new)] = [tool, *t].map(|t| g.tools.get(usize::from(t))) {
+                        here = here.retooled(&old.frame, &new.frame);
+                    }
+                    tool = *t;
+                }
                 Action::UseFrame(f) => {
                     let (old, new) = (g.frames[usize::from(frame)].frame, g.frames[usize::from(*f)].frame);
-                    reframe(&mut here, &old, &new);
+                    here = here.reframed(&old, &new);
                     frame = *f;
                 }
                 Action::Joint { to, speed, zone } => {
@@ -285,7 +290,7 @@ impl<'a> Maker<'a> {
             ours: false,
             source: None,
         };
-        let path = Path::new(g, here.position, 0, &m);
+        let path = Path::new(g, &Frame { turn: g.turns[0], position: here.position }, &m);
         let times = (0..self.solver.count).map(|i| (to.joints[i] - here.joints[i]).abs() / self.speed[i]);
         let least = times.fold(0.0, f64::max);
         let seconds = if path.length > 0.0 { (path.length / speed).max(least) } else { least };

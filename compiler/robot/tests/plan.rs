@@ -342,3 +342,101 @@ fn close_to_singular_is_told() {
     let told = faults(&program(good), &machine);
     assert!(told.contains("E0527") && told.contains("comes close to a singular position: the arm is stretched but for "), "{told}");
 }
+
+/// The tool's way from line to line: no motion but the program's own.
+fn own_moves(text: &str, machine: &Machine) -> Vec<(u32, bool, [f64; 3])> {
+    let p = planned(text, machine).unwrap_or_else(|e| panic!("{}", messages(&e, text))).program;
+    let mut out = Vec::new();
+    for s in &p.steps {
+        let (to, rapid) = match s.action {
+            Action::Joint { to, .. } => (to, true),
+            Action::Linear { to, rapid, .. } => (to, rapid),
+            Action::Arc { to, .. } => (to, false),
+            _ => continue,
+        };
+        if let Some(source) = s.source {
+            out.push((source.line + 1, rapid, p.targets[to as usize].position.map(|v| (v * 1e6).round() / 1e6 + 0.0)));
+        }
+    }
+    out
+}
+
+/// LinuxCNC moves nothing at G43 and G49: neither does the robot, whatever the offset does to the coordinates.
+#[test]
+fn a_tool_offset_moves_nothing() {
+    let cell = cell();
+    let off = "T1 M6 G43.1 Z85\nG0 X10 Y10 Z25\nG1 Z0 F600\nG1 X20\nG49\nG1 X30\nG2 X40 I5\nG0 X50\nG0 Z20\nM2\n";
+    assert_eq!(own_moves(off, &cell), [
+        (2, true, [10.0, 10.0, 25.0]),
+        (3, false, [10.0, 10.0, 0.0]),
+        (4, false, [20.0, 10.0, 0.0]),
+        (6, false, [30.0, 10.0, 0.0]),
+        (7, false, [40.0, 10.0, 0.0]),
+        (8, true, [50.0, 10.0, 0.0]),
+        (9, true, [50.0, 10.0, 20.0]),
+    ]);
+    let on = "T1 M6\nG0 X10 Y10 Z25\nG43.1 Z85\nG1 X20 F600\nG1 Z5\nG1 X30\nM2\n";
+    assert_eq!(own_moves(on, &cell), [
+        (2, true, [10.0, 10.0, 25.0]),
+        (4, false, [20.0, 10.0, 25.0]),
+        (5, false, [20.0, 10.0, 5.0]),
+        (6, false, [30.0, 10.0, 5.0]),
+    ]);
+    // A rapid to a place while the offset is new, then G92 and another work offset on top of it.
+    let more = "T1 M6 G43.1 Z85\nG0 X10 Y10 Z25\nG49\nG0 X20\nG92 X0\nG10 L2 P2 X5 Y5 Z1 R30\nG55\nG1 X50 Y0 F600\nM2\n";
+    let z = own_moves(more, &cell).iter().map(|m| m.2[2]).collect::<Vec<_>>();
+    assert_eq!(z, [25.0, 25.0, 24.0], "the same height, seen from G55");
+    // A tool that the machine file doesn't have is as long as the offset: it goes on where it stands, in one go.
+    let wear = "T9 M6 G43.1 Z85\nG0 X10 Y10 Z25\nG1 Z0 F600\nG43.1 Z84\nG1 X20\nG1 Z0\nM2\n";
+    assert_eq!(own_moves(wear, &cell)[2..], [(5, false, [20.0, 10.0, 1.0]), (6, false, [20.0, 10.0, 0.0])]);
+    let mut out = String::new();
+    for (name, text) in [
+        ("off", off),
+        ("on", on),
+        ("an arc that would be bent", "T1 M6 G43.1 Z85\nG0 X10 Y10 Z25\nG49\nG18 G2 X20 Z110 I5 F600\nM2\n"),
+        ("another tool, no rapid", "T1 M6\nG0 X10 Y10 Z25\nG1 X20 F600\nT2 M6\nG1 X30\nM2\n"),
+    ] {
+        out += &format!("{name}:\n{}", faults(text, &cell));
+    }
+    insta::assert_snapshot!("tool_offsets", out);
+}
+
+/// Frames of the cell are elsewhere: a cut that begins there without a rapid is an error.
+#[test]
+fn a_cut_does_not_begin_elsewhere() {
+    let file = include_str!("../../../docs/examples/irb2400-cell.toml");
+    let more = "\n[[frame]]\nname = \"G54\"\nposition = [900, -100, 450]\n[[frame]]\nname = \"G55\"\nposition = [900, 200, 450]\n";
+    let text = file.to_string() + more;
+    let cell = gr_machine::parse(FileId(0), &text).unwrap_or_else(|e| panic!("{}", messages(&e, &text)));
+    let bad = "T1 M6\nG0 X10 Y10 Z25\nG1 Z20 F600\nG55\nG1 X50\nM2\n";
+    let told = faults(bad, &cell);
+    assert!(told.starts_with("E0556 line 5"), "{told}");
+    let good = "T1 M6\nG0 X10 Y10 Z25\nG1 Z20 F600\nG55\nG0 X10 Y10\nG1 X50\nM2\n";
+    assert_eq!(own_moves(good, &cell)[2..], [(5, true, [10.0, 10.0, 20.0]), (6, false, [50.0, 10.0, 20.0])]);
+}
+
+/// A work frame turned about Z turns no tool: LinuxCNC has no axis for it.
+#[test]
+fn a_turned_work_frame_turns_no_tool() {
+    for spindle in ["rotation = [0, 45, 0]", "rotation = [0, 0, 0]"] {
+        let file = include_str!("../../../docs/examples/irb2400-cell.toml").replace("rotation = [0, 45, 0]", spindle);
+        let cell = gr_machine::parse(FileId(0), &file).unwrap();
+        let text = "T1 M6\nG0 X10 Y10 Z25\nG1 Z2 F1000\nG1 X100 Y10\nG10 L2 P2 X5 Y5 Z0 R30\nG55\nG0 Z30\nG0 X50 Y0\nG1 Z2\nG1 X60\nM2\n";
+        let p = planned(text, &cell).unwrap_or_else(|e| panic!("{}", messages(&e, text))).program;
+        let frames: Vec<_> = p.frames.iter().map(|f| f.frame).collect();
+        let mut frame = 0;
+        let mut before = None;
+        for s in &p.steps {
+            match s.action {
+                Action::UseFrame(f) => frame = usize::from(f),
+                Action::Linear { to, .. } => {
+                    let turn = gr_machine::math::product(&frames[frame].turn, &gr_machine::math::turn_of(p.targets[to as usize].quaternion));
+                    let last = before.replace(turn).unwrap_or(turn);
+                    let turned = (0..3).flat_map(|i| (0..3).map(move |j| (i, j))).map(|(i, j)| (last[i][j] - turn[i][j]).abs()).fold(0.0, f64::max);
+                    assert!(turned < 1e-9 || s.source.is_some_and(|l| l.line + 1 == 9), "{turned} {s:?}");
+                }
+                _ => {}
+            }
+        }
+    }
+}

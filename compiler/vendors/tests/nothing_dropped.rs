@@ -91,7 +91,7 @@ const OPERATIONS: &[(&str, &str)] = &[
     ("mist", "M7"),
     ("flood", "M8"),
     ("coolant off", "M8\nM9"),
-    ("tool change", "T2 M6"),
+    ("tool change", "T2 M6\nG0 Z15"),
     ("tool length", "G43.1 Z10"),
     ("work offset", "G10 L2 P2 X5\nG55"),
     ("changed work offset", "G10 L2 P1 X5"),
