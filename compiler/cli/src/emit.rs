@@ -368,6 +368,9 @@ fn of_motion(mut motion: Motion, unit: &Unit, goal: &Goal<'_>) -> Result<Built, 
     if motion.found.iter().any(|d| d.severity == gr_text::Severity::Error) {
         return Ok(built(motion, Vec::new(), Vec::new()));
     }
+    if let Err(found) = crate::robot::take_job(&mut motion, goal) {
+        return Ok(built(motion, Vec::new(), found));
+    }
     let name = stem(&unit.path);
     let mut corrected = None;
     if goal.options.robot.compensate && !crate::robot::is_planned(goal) {

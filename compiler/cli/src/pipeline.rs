@@ -128,6 +128,8 @@ pub struct Motion {
     pub found: Vec<Diagnostic>,
     /// The process plan that it comes from; none for G-code.
     pub plan: Option<Plan>,
+    /// Setups of the job file.
+    pub setups: Vec<gr_robot::Setup>,
 }
 
 /// Runs, lowers and checks a program.
@@ -154,7 +156,7 @@ fn plain(motion: gr_driver::Motion) -> Motion {
     for (name, text) in motion.texts {
         sources.add(name, text);
     }
-    Motion { program: motion.program, sources, subs: motion.subs, found: Vec::new(), plan: None }
+    Motion { program: motion.program, sources, subs: motion.subs, found: Vec::new(), plan: None, setups: Vec::new() }
 }
 
 /// The UFMG 2008 language has commands of its own and no interpreter state.
@@ -167,5 +169,5 @@ fn ufmg(unit: &Unit, machine: Option<&gr_machine::Machine>) -> Motion {
     found.extend(more);
     let mut sources = Sources::default();
     sources.add(name, unit.text.clone());
-    Motion { program, sources, subs: Vec::new(), found, plan: None }
+    Motion { program, sources, subs: Vec::new(), found, plan: None, setups: Vec::new() }
 }

@@ -49,7 +49,7 @@ pub fn is_language(target: &str) -> bool {
 }
 
 /// The options of a plan.
-pub fn options(goal: &Goal<'_>, name: &str) -> Result<Options, String> {
+pub fn options(motion: &Motion, goal: &Goal<'_>, name: &str) -> Result<Options, String> {
     let (o, default) = (&goal.options.robot, Options::default());
     let good = |v: f64| v.is_finite() && v >= 0.0;
     if !o.approach.is_none_or(good) || !o.reconfigure.is_none_or(good) {
@@ -59,52 +59,71 @@ pub fn options(goal: &Goal<'_>, name: &str) -> Result<Options, String> {
     if !(tolerance > 0.0) {
         return Err("--arc-tolerance must be above zero".into());
     }
-    let setups = match (&o.job, goal.machine) {
-        (Some(path), Some(machine)) => job(path, machine)?,
-        _ => Vec::new(),
-    };
+    let setups = motion.setups.clone();
     let approach = o.approach.unwrap_or(default.approach);
     Ok(Options { name: name.to_string(), tolerance, approach, reconfigure: o.reconfigure, setups, ..default })
 }
 
-/// A job file.
-#[derive(serde::Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Job {
-    setup: Vec<Clamping>,
-}
-
-#[derive(serde::Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Clamping {
-    name: String,
-    from_line: Option<u32>,
-    #[serde(default)]
-    workingsteps: Vec<String>,
-    #[serde(default)]
-    position: [f64; 3],
-    #[serde(default)]
-    rotation: [f64; 3],
-}
-
-/// The setups of a job file: each places the part on the table.
-fn job(path: &std::path::Path, machine: &Machine) -> Result<Vec<gr_robot::Setup>, String> {
-    let at = |what: String| format!("{}: {what}", path.display());
-    let said = |(c, args): (gr_text::Code, Vec<String>)| crate::sources::about_file(c, gr_text::FileId(0), &args).message;
-    let text = crate::sources::read(path).map_err(said)?.text;
-    let job: Job = toml::from_str(&text).map_err(|e| at(e.to_string()))?;
-    let setup = |c: Clamping| {
-        if c.from_line.is_none() && c.workingsteps.is_empty() {
-            return Err(at(format!("setup `{}` needs `from_line` or `workingsteps`", c.name)));
+/// Reads the job file that the options name into the motion it is for. What is wrong comes back; it points into the
+/// motion's files.
+pub fn take_job(motion: &mut Motion, goal: &Goal<'_>) -> Result<(), Vec<Diagnostic>> {
+    let (Some(path), Some(machine)) = (&goal.options.robot.job, goal.machine) else { return Ok(()) };
+    let name = path.display().to_string();
+    let text = match crate::sources::read(path) {
+        Ok(decoded) => decoded.text,
+        Err((code, args)) => {
+            let file = motion.sources.add(name, "");
+            return Err(vec![crate::sources::about_file(code, file, &args)]);
         }
-        if c.position.iter().chain(&c.rotation).any(|v| !v.is_finite()) {
-            return Err(at(format!("setup `{}`: position and rotation must be finite", c.name)));
-        }
-        let placed = gr_machine::math::Frame::new(c.position, c.rotation.map(f64::to_radians));
-        let from_line = c.from_line.map(|l| l.saturating_sub(1));
-        Ok(gr_robot::Setup { name: c.name, from_line, workingsteps: c.workingsteps, part: machine.cell.carried(machine.cell.table.then(&placed)) })
     };
-    job.setup.into_iter().map(setup).collect()
+    motion.subs.push(path.clone());
+    let file = motion.sources.add(name, text.clone());
+    let clampings = gr_machine::parse_job(file, &text)?;
+    let found: Vec<Diagnostic> =
+        misfits(&clampings, motion).into_iter().map(|(span, what)| Diagnostic::new(gr_text::code::JOB_BAD_VALUE, file, span, &[what])).collect();
+    if !found.is_empty() {
+        return Err(found);
+    }
+    let line = |at: u32| text.get(..at as usize).map_or(0, |t| t.matches('\n').count()) as u32;
+    let setup = |c: gr_machine::Clamping| gr_robot::Setup {
+        place: gr_ir::Source { file, line: line(c.from_line.map_or(c.place.start, |(_, span)| span.start)), ..gr_ir::Source::default() },
+        name: c.name,
+        from_line: c.from_line.map(|(l, _)| l - 1),
+        workingsteps: c.workingsteps.into_iter().map(|(w, _)| w).collect(),
+        part: machine.cell.carried(machine.cell.table.then(&c.part)),
+    };
+    motion.setups = clampings.into_iter().map(setup).collect();
+    Ok(())
+}
+
+/// Lines and workingsteps that the program doesn't have.
+fn misfits(clampings: &[gr_machine::Clamping], motion: &Motion) -> Vec<(gr_text::Span, String)> {
+    let lines = motion.sources.get(gr_text::FileId(0)).map_or(0, |f| f.text.lines().count());
+    let mut steps: Vec<&str> = Vec::new();
+    for step in motion.program.steps() {
+        if let gr_ir::Op::Begin { marker: gr_ir::Marker::Workingstep, text, .. } = step.op
+            && !steps.contains(&text)
+        {
+            steps.push(text);
+        }
+    }
+    let mut out = Vec::new();
+    for c in clampings {
+        match c.from_line {
+            Some((_, span)) if !steps.is_empty() => {
+                out.push((span, format!("a STEP-NC program has no order of lines: name the `workingsteps` of setup `{}`", c.name)));
+            }
+            Some((line, span)) if line as usize > lines => out.push((span, format!("line {line} is beyond the end of the program, which has {lines} lines"))),
+            _ => {}
+        }
+        for (step, span) in c.workingsteps.iter().filter(|(s, _)| !steps.contains(&s.as_str())) {
+            let known = steps.iter().take(20).copied().collect::<Vec<_>>().join(", ");
+            let more = if steps.len() > 20 { " …" } else { "" };
+            let hint = if steps.is_empty() { "G-code has none: use `from_line`".to_string() } else { format!("it has {known}{more}") };
+            out.push((*span, format!("the program has no workingstep `{step}`; {hint}")));
+        }
+    }
+    out
 }
 
 /// Makes a robot program.
@@ -115,7 +134,7 @@ pub fn build(motion: &Motion, goal: &Goal<'_>, texts: &dyn Sources, name: &str) 
     let machine = robot(goal)?;
     // The files take their name from where they go.
     let name = goal.file.filter(|f| f.extension().is_some()).map_or_else(|| name.to_string(), crate::emit::stem);
-    let options = options(goal, &name)?;
+    let options = options(motion, goal, &name)?;
     let planned = plan(&motion.program, &machine, texts, &options).and_then(|p| compensated(p, goal, texts, options.tolerance));
     let (planned, corrected) = match planned {
         Ok(planned) => planned,
@@ -316,7 +335,7 @@ type Files = Result<Result<Made, Vec<Diagnostic>>, String>;
 /// Plans for a controller that knows the words of the program itself.
 fn own_plan(motion: &Motion, goal: &Goal<'_>, texts: &dyn Sources, name: &str) -> Result<Result<(Planned, Option<Corrected>), Vec<Diagnostic>>, String> {
     let machine = machine(goal)?;
-    let options = Options { own_words: true, ..options(goal, name)? };
+    let options = Options { own_words: true, ..options(motion, goal, name)? };
     let tolerance = options.tolerance;
     Ok(plan(&motion.program, &machine, texts, &options).and_then(|p| compensated(p, goal, texts, tolerance)))
 }
@@ -421,8 +440,11 @@ pub fn verify(unit: &crate::pipeline::Unit, machine: &Machine, args: &crate::opt
         let motion = if unit.exchange { crate::exchange::ufsc2016(unit)?.0 } else { crate::pipeline::motion(unit, None)?.0 };
         return Ok(published(&motion, machine));
     }
-    let (motion, _) = crate::pipeline::motion(unit, None)?;
+    let (mut motion, _) = crate::pipeline::motion(unit, None)?;
     let goal = Goal { target: "verify", options: &args.options, machine: Some(machine), from_line: None, file: None };
+    if let Err(found) = take_job(&mut motion, &goal) {
+        return Err(Checked { sources: motion.sources, found, ..Checked::nothing() });
+    }
     let texts = crate::emit::texts(&motion);
     match own_plan(&motion, &goal, &texts, &name) {
         Err(text) => Ok(Err(text)),

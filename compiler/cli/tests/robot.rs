@@ -107,17 +107,69 @@ fn verify_reports() {
 fn setups_of_a_job() {
     let folder = tempfile::tempdir().unwrap();
     let source = folder.path().join("two.ngc");
-    std::fs::write(&source, "T1 M6\nG0 X0 Y0 Z20\nG1 X50 F500\nG0 Z30\nG0 X0 Y0 Z20\nG1 X50 F500\nM30\n").unwrap();
+    std::fs::write(&source, "T1 M6\nG0 X0 Y0 Z20\nG1 Z0 F500\nX50\nG0 Z30\nG0 X0 Y0 Z20\nG1 Z0\nX50\nM30\n").unwrap();
     let job = folder.path().join("job.toml");
-    std::fs::write(&job, "[[setup]]\nname = \"top\"\nfrom_line = 1\n[[setup]]\nname = \"turned\"\nfrom_line = 5\nposition = [0, 100, 0]\nrotation = [0, 0, 90]\n").unwrap();
+    std::fs::write(&job, "[[setup]]\nname = \"top\"\nfrom_line = 1\n[[setup]]\nname = \"turned\"\nfrom_line = 6\nposition = [0, 100, 0]\nrotation = [0, 0, 90]\n").unwrap();
     let args = |job: &str| run(&["build", source.to_str().unwrap(), "--machine", CELL, "--target", "rapid", "--job", job]);
     let made = args(job.to_str().unwrap());
     assert!(made.status.success(), "{}", text(&made.stderr));
     assert!(text(&made.stdout).contains("setup turned"), "{}", text(&made.stdout));
     std::fs::write(&job, "[[setup]]\nname = \"top\"\n").unwrap();
     let bad = args(job.to_str().unwrap());
-    assert_eq!(bad.status.code(), Some(2));
+    assert_eq!(bad.status.code(), Some(1));
     assert!(text(&bad.stderr).contains("needs `from_line` or `workingsteps`"), "{}", text(&bad.stderr));
+}
+
+/// What a job file can't mean is told where it stands; a setup never begins in the work, and nothing is written then.
+#[test]
+fn setups_that_do_not_fit() {
+    let folder = tempfile::tempdir().unwrap();
+    let told = |program: &str, job: &str, more: &[&str]| {
+        let (source, jobs, out) = (folder.path().join("part.ngc"), folder.path().join("job.toml"), folder.path().join("part.mod"));
+        std::fs::write(&source, program).unwrap();
+        std::fs::write(&jobs, job).unwrap();
+        let mut args = vec!["build", source.to_str().unwrap(), "--machine", CELL, "--target", "rapid", "--message-format", "short"];
+        args.extend(["--job", jobs.to_str().unwrap(), "-o", out.to_str().unwrap()]);
+        args.extend(more);
+        let made = run(&args);
+        let all = text(&made.stderr) + &text(&made.stdout);
+        assert_eq!(out.exists(), made.status.success(), "{all}");
+        let _ = std::fs::remove_file(out);
+        let own = |l: &&str| l.contains("E055") || l.contains("E0535");
+        all.lines().filter(own).map(|l| l.replace(&format!("{}/", folder.path().display()), "") + "\n").collect::<String>()
+    };
+    let part = std::fs::read_to_string(root().join(PART)).unwrap();
+    let two = |line: u32| format!("[[setup]]\nname = \"top\"\nfrom_line = 1\n[[setup]]\nname = \"turned\"\nfrom_line = {line}\nposition = [0, 50, 0]\n");
+    let mut all = String::new();
+    let mut row = |name: &str, found: String| all += &format!("{name}:\n{found}");
+    // Inside the pocket, at its retract, at the rapid over the next place, at the one down to it, at the end.
+    for line in [14, 31, 33, 34, 52, 53, 54, 900] {
+        row(&format!("bracket from {line}"), told(&part, &two(line), &[]));
+    }
+    row("no such workingstep", told(&part, "[[setup]]\nname = \"a\"\nworkingsteps = [\"nosuch\"]\n", &[]));
+    row("no approach", told(&part, &two(31), &["--approach", "0"]));
+    // A rapid at depth, though above the cut that follows it.
+    row("rapid in a pocket", told("T1 M6\nG0 X0 Y0 Z20\nG1 Z-3 F500\nX20\nG0 X30\nG1 Z-6\nX40\nG0 Z20\nM30\n", &two(5), &[]));
+    row("after a retract at feed", told("T1 M6\nG0 X0 Y0 Z20\nG1 Z-3 F500\nX20\nZ20\nG0 X30\nG1 Z-6\nX40\nG0 Z20\nM30\n", &two(6), &[]));
+    let called = "o1 sub\nG0 Z20\nG0 X0\nG1 Z-3 F500\nX20\nG0 Z20\no1 endsub\nT1 M6\nG0 X0 Y0 Z20\no1 call\nG0 Y10\no1 call\nM2\n";
+    row("called again", told(called, &two(12), &[]));
+    let looped = "T1 M6\nG0 X0 Y0 Z20\no1 repeat [2]\nG0 X0\nG1 Z-3 F500\nG0 Z20\nG0 X30\nG1 Z-3\nG0 Z20\no1 endrepeat\nM2\n";
+    row("in a loop", told(looped, &two(7), &[]));
+    insta::assert_snapshot!("setups_that_do_not_fit", all);
+}
+
+/// The tool comes to a new clamping from above.
+#[test]
+fn setups_begin_from_above() {
+    let folder = tempfile::tempdir().unwrap();
+    let job = folder.path().join("job.toml");
+    std::fs::write(&job, "[[setup]]\nname = \"top\"\nfrom_line = 1\n[[setup]]\nname = \"turned\"\nfrom_line = 33\nposition = [0, 50, 0]\n").unwrap();
+    let made = run(&["build", PART, "--machine", CELL, "--target", "rapid", "--job", job.to_str().unwrap()]);
+    assert!(made.status.success(), "{}", text(&made.stderr));
+    let program = text(&made.stdout);
+    let lines: Vec<&str> = program.lines().collect();
+    let stop = lines.iter().position(|l| l.contains("setup turned")).unwrap_or_else(|| panic!("{program}"));
+    insta::assert_snapshot!("setups_begin_from_above", lines[stop - 3..stop + 6].join("\n"));
 }
 
 /// What set-points can't say stands beside them; an option that has no effect is refused.

@@ -9,8 +9,12 @@ use std::ops::Range;
 #[derive(Clone, Copy)]
 pub(crate) enum Type {
     Text,
-    Number,
-    Whole,
+    /// A list of texts.
+    Texts,
+    /// A number within these bounds.
+    Number(Bounds),
+    /// A whole number, from the first to the last.
+    Whole(u64, u64),
     Flag,
     /// One of these words.
     Choice(&'static [&'static str]),
@@ -28,6 +32,55 @@ pub(crate) enum Type {
     Map(&'static [Key]),
 }
 
+/// What a number may be. NaN and infinity are never allowed.
+#[derive(Clone, Copy, PartialEq)]
+pub(crate) enum Bounds {
+    /// Up to what a length or an angle can be meant to be.
+    Any,
+    /// Anything but 0.
+    NotZero,
+    /// Above 0.
+    Above,
+    /// 0 or more.
+    NotBelow,
+    /// Above 0, up to this.
+    UpTo(f64),
+}
+
+/// No length, angle, speed or stiffness is greater; above it numbers have no more room for thousandths.
+const GREATEST: f64 = 1e12;
+
+impl Bounds {
+    fn admits(self, v: f64) -> bool {
+        v.abs() <= GREATEST
+            && match self {
+                Bounds::Any => true,
+                Bounds::NotZero => v != 0.0,
+                Bounds::Above => v > 0.0,
+                Bounds::NotBelow => v >= 0.0,
+                Bounds::UpTo(most) => v > 0.0 && v <= most,
+            }
+    }
+    fn words(self) -> String {
+        match self {
+            Bounds::Any => "between -1e12 and 1e12".into(),
+            Bounds::NotZero => "other than 0".into(),
+            Bounds::Above => "above 0".into(),
+            Bounds::NotBelow => "0 or more".into(),
+            Bounds::UpTo(most) => format!("above 0, at most {most}"),
+        }
+    }
+    /// In words of JSON Schema.
+    fn schema(self, pad: &str) -> String {
+        match self {
+            Bounds::Any | Bounds::NotZero => String::new(),
+            Bounds::Above => format!(",\n{pad}\"exclusiveMinimum\": 0"),
+            Bounds::NotBelow => format!(",\n{pad}\"minimum\": 0"),
+            Bounds::UpTo(most) => format!(",\n{pad}\"exclusiveMinimum\": 0,\n{pad}\"maximum\": {most}"),
+        }
+    }
+}
+
 pub(crate) struct Key {
     pub name: &'static str,
     pub kind: Type,
@@ -42,14 +95,23 @@ const fn must(name: &'static str, kind: Type, doc: &'static str) -> Key {
     Key { name, kind, required: true, doc }
 }
 
-use Type::{Choice, Flag, Map, Number, Numbers, Open, Part, Points, Table, Tables, Text, Whole};
+use Type::{Choice, Flag, Map, Numbers, Open, Part, Points, Table, Tables, Text, Texts, Whole};
+
+const ANY: Type = Type::Number(Bounds::Any);
+const NOT_ZERO: Type = Type::Number(Bounds::NotZero);
+const ABOVE: Type = Type::Number(Bounds::Above);
+const NOT_BELOW: Type = Type::Number(Bounds::NotBelow);
+const PER_CENT: Type = Type::Number(Bounds::UpTo(100.0));
+const HALF_TURN: Type = Type::Number(Bounds::UpTo(180.0));
+/// Numbers of tools, lines and the like: no controller counts further.
+const MOST_COUNTED: u64 = i32::MAX as u64;
 
 pub(crate) const KINDS: &[&str] = &[
     "cartesian", "planar-3r", "scara", "opw", "ur", "five-axis", "parallel-2ups-prp", "tricept", "dh", "mdh", "origins",
 ];
 
 pub(crate) static ROOT: &[Key] = &[
-    must("format", Whole, "Version of the format: 1."),
+    must("format", Whole(0, MOST_COUNTED), "Version of the format: 1."),
     must("id", Text, "`maker/model`, lower case."),
     key("extends", Text, "Id of a built-in machine; what this file says is laid over it."),
     key("template", Flag, "This file is to be extended; keys may be missing."),
@@ -83,25 +145,25 @@ pub(crate) static ROOT: &[Key] = &[
 static KINEMATICS: &[Key] = &[
     must("kind", Choice(KINDS), "Kind of kinematics."),
     key("links", Numbers(0), "`planar-3r`: upper arm, forearm, tool; `scara`: two links, mm."),
-    key("height", Number, "`scara`: height of the tool at stroke 0, mm."),
+    key("height", ANY, "`scara`: height of the tool at stroke 0, mm."),
     key("lengths", Numbers(0), "`opw`: a1 a2 b c1 c2 c3 c4; `ur`: d1 a2 a3 d4 d5 d6, mm."),
     key("offsets", Numbers(6), "`opw`: joint value at which the model angle is 0, degrees."),
     key("signs", Numbers(6), "`opw`: direction of each joint, 1 or -1."),
     key("rotary", Tables(ROTARY), "`five-axis`: two rotary axes, the one nearer to the bed first."),
-    key("pivot", Number, "`five-axis`: from the crossing of the head's axes to the spindle nose, mm."),
+    key("pivot", NOT_BELOW, "`five-axis`: from the crossing of the head's axes to the spindle nose, mm."),
     key("base_joints", Points(2), "`parallel-2ups-prp`: centres of the universal joints on the base, mm."),
     key("platform_joints", Points(2), "`parallel-2ups-prp`: centres of the spherical joints on the platform, mm."),
     key("arm", Numbers(2), "`parallel-2ups-prp`: least and greatest length of the arm, mm."),
     key("yaw", Numbers(2), "`parallel-2ups-prp`: least and greatest yaw, degrees."),
-    key("universal", Number, "`parallel-2ups-prp`: greatest angle of the universal joints, degrees."),
-    key("spherical", Number, "`parallel-2ups-prp`: greatest angle of the spherical joints, degrees."),
+    key("universal", HALF_TURN, "`parallel-2ups-prp`: greatest angle of the universal joints, degrees."),
+    key("spherical", HALF_TURN, "`parallel-2ups-prp`: greatest angle of the spherical joints, degrees."),
     key("spherical_axis", Choice(&["platform", "base"]), "`parallel-2ups-prp`: what the middle direction of the spherical joints belongs to."),
     key("reference_pose", Numbers(3), "`parallel-2ups-prp`: arm length, yaw, height of the middle direction; mm, degrees."),
-    key("base_radius", Number, "`tricept`: radius of the base joints' circle, mm."),
-    key("platform_radius", Number, "`tricept`: radius of the platform joints' circle, mm."),
-    key("wrist_offset", Number, "`tricept`: from the platform to the centre of the wrist, mm."),
-    key("flange_offset", Number, "`tricept`: from the centre of the wrist to the flange, mm."),
-    key("first_leg", Number, "`tricept`: direction of the first leg from X, degrees."),
+    key("base_radius", ABOVE, "`tricept`: radius of the base joints' circle, mm."),
+    key("platform_radius", ABOVE, "`tricept`: radius of the platform joints' circle, mm."),
+    key("wrist_offset", NOT_BELOW, "`tricept`: from the platform to the centre of the wrist, mm."),
+    key("flange_offset", NOT_BELOW, "`tricept`: from the centre of the wrist to the flange, mm."),
+    key("first_leg", ANY, "`tricept`: direction of the first leg from X, degrees."),
     key("model", Choice(&["rigid", "reference"]), "`tricept`: rigid platform, or leg points by the source's equations."),
     key("tip", Numbers(6), "`dh`, `mdh`, `origins`: flange in the last joint: x y z mm, turns about X Y Z degrees."),
 ];
@@ -125,11 +187,11 @@ static JOINT: &[Key] = &[
     must("name", Text, "Name, for people and for `extends`."),
     must("type", Choice(&["revolute", "prismatic"]), "Turns or slides."),
     key("word", Text, "Its word in joint-space G-code: one upper-case letter."),
-    key("min", Number, "Lower limit, mm or degrees."),
-    key("max", Number, "Upper limit, mm or degrees."),
-    key("speed", Number, "Greatest speed, mm/s or degrees/s."),
-    key("rapid", Number, "Speed of a rapid move; else `speed`."),
-    key("acceleration", Number, "Greatest acceleration, mm/s² or degrees/s²."),
+    key("min", ANY, "Lower limit, mm or degrees."),
+    key("max", ANY, "Upper limit, mm or degrees."),
+    key("speed", ABOVE, "Greatest speed, mm/s or degrees/s."),
+    key("rapid", ABOVE, "Speed of a rapid move; else `speed`."),
+    key("acceleration", ABOVE, "Greatest acceleration, mm/s² or degrees/s²."),
     key("dh", Numbers(4), "`dh`, `mdh`: a, d (mm), alpha, theta (degrees); the joint value adds to theta or d."),
     key("origin", Numbers(6), "`origins`: frame in the joint before: x y z mm, turns about X Y Z degrees."),
     key("axis", Numbers(3), "`origins`: vector it turns about or slides along."),
@@ -141,20 +203,20 @@ static EXTERNAL: &[Key] = &[
     must("carries", Choice(&["machine", "part"]), "Rail or positioner."),
     key("axis", Numbers(3), "Vector; else Z."),
     key("point", Numbers(3), "A point on it, mm."),
-    key("min", Number, "Lower limit, mm or degrees."),
-    key("max", Number, "Upper limit, mm or degrees."),
-    key("position", Number, "Where it stands while a program runs, mm or degrees; else 0 or the limit nearest to it."),
-    key("speed", Number, "Greatest speed."),
-    key("rapid", Number, "Speed of a rapid move."),
-    key("acceleration", Number, "Greatest acceleration."),
+    key("min", ANY, "Lower limit, mm or degrees."),
+    key("max", ANY, "Upper limit, mm or degrees."),
+    key("position", ANY, "Where it stands while a program runs, mm or degrees; else 0 or the limit nearest to it."),
+    key("speed", ABOVE, "Greatest speed."),
+    key("rapid", ABOVE, "Speed of a rapid move."),
+    key("acceleration", ABOVE, "Greatest acceleration."),
 ];
 
 static COUPLING: &[Key] = &[
     must("joint", Text, "Joint whose value differs on the controller."),
     must("with", Text, "The joint it is counted with."),
-    must("factor", Number, "controller = joint + factor · with: -1 on FANUC arms, 1 with a parallelogram."),
-    key("min", Number, "Least value on the controller, degrees; else the joint's."),
-    key("max", Number, "Greatest value on the controller, degrees; else the joint's."),
+    must("factor", NOT_ZERO, "controller = joint + factor · with: -1 on FANUC arms, 1 with a parallelogram."),
+    key("min", ANY, "Least value on the controller, degrees; else the joint's."),
+    key("max", ANY, "Greatest value on the controller, degrees; else the joint's."),
 ];
 
 static PLACE: &[Key] = &[
@@ -177,73 +239,78 @@ static FRAME: &[Key] = &[
 static SPINDLE: &[Key] = &[
     key("position", Numbers(3), "Nose on the flange, mm."),
     key("rotation", Numbers(3), "Turns of the nose, degrees."),
-    key("min_speed", Number, "Turns per minute."),
-    key("max_speed", Number, "Turns per minute."),
+    key("min_speed", NOT_BELOW, "Turns per minute."),
+    key("max_speed", ABOVE, "Turns per minute."),
     key("controlled", Flag, "Whether the program can switch it; else true."),
 ];
 
-static CUTTING: &[Key] = &[key("axial_depth", Number, "Greatest axial depth of a milling cut, mm.")];
+static CUTTING: &[Key] = &[key("axial_depth", ABOVE, "Greatest axial depth of a milling cut, mm.")];
 
 static TOOL: &[Key] = &[
-    must("number", Whole, "T number."),
+    must("number", Whole(0, MOST_COUNTED), "T number."),
     must("name", Text, "Name on the controller."),
     key("position", Numbers(3), "Tool point on the spindle nose or flange, mm."),
     key("rotation", Numbers(3), "Turns of the tool, degrees."),
-    key("diameter", Number, "mm."),
-    key("mass", Number, "kg."),
+    key("diameter", ABOVE, "mm."),
+    key("mass", ABOVE, "kg."),
 ];
 
 static SPEED: &[Key] = &[
-    key("rapid", Number, "Tool point speed of a rapid, mm/s."),
-    key("joint", Number, "Joint speed of a rapid, per cent of the greatest."),
+    key("rapid", ABOVE, "Tool point speed of a rapid, mm/s."),
+    key("joint", PER_CENT, "Joint speed of a rapid, per cent of the greatest."),
 ];
 
 static ZONE: &[Key] = &[
-    key("default", Number, "Where the program doesn't say, mm."),
-    key("max", Number, "Never more, mm."),
+    key("default", NOT_BELOW, "Where the program doesn't say, mm."),
+    key("max", NOT_BELOW, "Never more, mm."),
 ];
+
+/// What a part of a program needs for its own head and end, with room for a few moves.
+pub(crate) const LEAST_LINES: u64 = 60;
+pub(crate) const LEAST_POINTS: u64 = 10;
+pub(crate) const LEAST_BYTES: u64 = 4000;
 
 static CONTROLLER: &[Key] = &[
     key("name", Text, "`IRC5`, `KRC4` …"),
-    key("lines", Whole, "Most lines per file."),
-    key("points", Whole, "Most points per file."),
-    key("bytes", Whole, "Most bytes per file."),
+    key("lines", Whole(LEAST_LINES, MOST_COUNTED), "Most lines per file."),
+    key("points", Whole(LEAST_POINTS, MOST_COUNTED), "Most points per file."),
+    key("bytes", Whole(LEAST_BYTES, 1 << 53), "Most bytes per file."),
 ];
 
 static SIGNAL: &[Key] = &[
     key("signal", Text, "Output that is set."),
-    key("value", Number, "To this value; else 1."),
+    key("value", ANY, "To this value; else 1."),
     key("routine", Text, "Routine that is called."),
     key("wait", Text, "Input that is waited for."),
-    key("seconds", Number, "Time of the wait, s."),
+    key("seconds", ABOVE, "Time of the wait, s."),
 ];
 
 static ACCURACY: &[Key] = &[
     must("source", Text, "Where the numbers come from."),
     key("joints", Numbers(0), "Error of each joint, plus or minus, mm or degrees."),
-    key("grade", Whole, "Grade of ISO 286-1 of every length of the geometry: 1 to 18."),
+    key("grade", Whole(1, 18), "Grade of ISO 286-1 of every length of the geometry: 1 to 18."),
     key("parameter", Tables(TOLERANCE), "Tolerances of single parameters; they go before the grade."),
 ];
 
 static TOLERANCE: &[Key] = &[
     must("name", Text, "Name of the parameter: `gcc-robot machine show` lists them."),
-    must("tolerance", Number, "Plus or minus, mm or degrees."),
+    must("tolerance", NOT_BELOW, "Plus or minus, mm or degrees."),
 ];
 
 static STIFFNESS: &[Key] = &[
     must("source", Text, "Where the numbers come from."),
-    key("modulus", Number, "Modulus of elasticity of bars and screws, N/mm²."),
+    key("modulus", ABOVE, "Modulus of elasticity of bars and screws, N/mm²."),
     must("member", Tables(MEMBER), "Springs between base and tool; those of one joint are in series."),
 ];
 
 static MEMBER: &[Key] = &[
     must("joint", Text, "Joint along or about which it yields."),
     must("name", Text, "For people: `rod`, `nut`, `gear`."),
-    key("stiffness", Number, "N/mm for a sliding joint, N·mm/rad for a turning one."),
-    key("outer", Number, "Diameter of a bar or screw, mm."),
-    key("inner", Number, "Its bore, mm; else solid."),
-    key("length", Number, "Length of a bar, mm."),
-    key("shorter_by", Number, "A screw whose free length is the joint value less this, mm."),
+    key("stiffness", ABOVE, "N/mm for a sliding joint, N·mm/rad for a turning one."),
+    key("outer", ABOVE, "Diameter of a bar or screw, mm."),
+    key("inner", NOT_BELOW, "Its bore, mm; else solid."),
+    key("length", ABOVE, "Length of a bar, mm."),
+    key("shorter_by", ANY, "A screw whose free length is the joint value less this, mm."),
     key("between", Numbers(2), "A screw held at both ends, its nut at the joint value: the ends, mm."),
 ];
 
@@ -254,7 +321,7 @@ static AS_BUILT: &[Key] = &[
 
 static DEVIATION: &[Key] = &[
     must("name", Text, "Name of the parameter: `gcc-robot machine show` lists them."),
-    must("deviation", Number, "Actual less nominal, mm or degrees."),
+    must("deviation", ANY, "Actual less nominal, mm or degrees."),
 ];
 
 static REFERENCE: &[Key] = &[
@@ -267,14 +334,25 @@ static JOINT_OVER: &[Key] = &[
     must("name", Text, "Name of a joint above."),
     key("type", Choice(&["revolute", "prismatic"]), "Turns or slides."),
     key("word", Text, "Its word."),
-    key("min", Number, "Lower limit."),
-    key("max", Number, "Upper limit."),
-    key("speed", Number, "Greatest speed."),
-    key("rapid", Number, "Speed of a rapid move."),
-    key("acceleration", Number, "Greatest acceleration."),
+    key("min", ANY, "Lower limit."),
+    key("max", ANY, "Upper limit."),
+    key("speed", ABOVE, "Greatest speed."),
+    key("rapid", ABOVE, "Speed of a rapid move."),
+    key("acceleration", ABOVE, "Greatest acceleration."),
     key("dh", Numbers(4), "Denavit–Hartenberg row."),
     key("origin", Numbers(6), "Frame in the joint before."),
     key("axis", Numbers(3), "Vector."),
+];
+
+/// Keys of a job file.
+pub(crate) static JOB: &[Key] = &[must("setup", Tables(SETUP), "Clampings of the part, in the order in which they are made.")];
+
+static SETUP: &[Key] = &[
+    must("name", Text, "Shown to the operator when the part is to be clamped so."),
+    key("from_line", Whole(1, MOST_COUNTED), "Line of the program, from 1, at which the setup begins: a rapid to a height above the work."),
+    key("workingsteps", Texts, "Workingsteps of a STEP-NC program that are made in this setup."),
+    key("position", Numbers(3), "Zero point of the part on the table: X Y Z, mm."),
+    key("rotation", Numbers(3), "Turns of the part about the table's fixed X, Y, Z, degrees."),
 ];
 
 /// Words that may stand in `[io]`: `S`, `M3`, and `M62P3` for one output alone.
@@ -317,8 +395,9 @@ fn value(node: &Node, key: &Key, place: &str, out: &mut Vec<(Range<usize>, Strin
     let name = key.name;
     let mut wants = |what: &str| out.push((node.span.clone(), format!("`{name}` of {place} must be {what}")));
     match (key.kind, &node.value) {
-        (Text, Value::Text(_)) | (Number, Value::Number(_)) | (Flag, Value::Flag(_)) => {}
-        (Whole, Value::Number(n)) if n.fract() == 0.0 && *n >= 0.0 && *n <= 9e15 => {}
+        (Text, Value::Text(_)) | (Type::Number(_), Value::Number(_)) | (Flag, Value::Flag(_)) => {}
+        (Texts, Value::List(l)) if l.iter().all(|t| t.text().is_some()) => {}
+        (Whole(..), Value::Number(n)) if n.fract() == 0.0 || !n.is_finite() => {}
         (Choice(words), Value::Text(t)) | (Open(words), Value::Text(t)) if words.contains(&t.as_str()) => {}
         (Open(words), Value::Text(t)) if words.last().is_some_and(|w| t.len() > w.len() && t.starts_with(w)) => {}
         (Choice(words) | Open(words), Value::Text(t)) => {
@@ -354,11 +433,60 @@ fn value(node: &Node, key: &Key, place: &str, out: &mut Vec<(Range<usize>, Strin
     }
 }
 
+/// Numbers that are not within the bounds of their key: place and message.
+pub(crate) fn out_of_bounds(node: &Node, keys: &'static [Key]) -> Vec<(Range<usize>, String)> {
+    let mut out = Vec::new();
+    bounds_of_table(node, keys, &mut out);
+    out
+}
+
+fn bounds_of_table(node: &Node, keys: &'static [Key], out: &mut Vec<(Range<usize>, String)>) {
+    for e in node.entries() {
+        if let Some(k) = keys.iter().find(|k| k.name == e.key) {
+            bounds(&e.node, k, out);
+        }
+    }
+}
+
+fn bounds(node: &Node, key: &Key, out: &mut Vec<(Range<usize>, String)>) {
+    let name = key.name;
+    let mut number = |n: &Node, good: bool, words: String| {
+        let finite = n.number().is_none_or(f64::is_finite);
+        if !finite {
+            out.push((n.span.clone(), "a value must be a finite number; leave a limit out when there is none".into()));
+        } else if !good {
+            let v = n.number().unwrap_or_default();
+            let given = if v.abs() >= 1e9 { format!("{v:e}") } else { format!("{v}") };
+            out.push((n.span.clone(), format!("`{name}` must be {words}, not {given}")));
+        }
+    };
+    match key.kind {
+        Type::Number(b) => number(node, node.number().is_none_or(|v| b.admits(v)), b.words()),
+        Whole(least, most) => {
+            let good = node.number().is_none_or(|v| v >= least as f64 && v <= most as f64);
+            let open = most >= MOST_COUNTED && node.number().is_some_and(|v| v < least as f64);
+            let words = if open { format!("a whole number from {least}") } else { format!("a whole number from {least} to {most}") };
+            number(node, good, words);
+        }
+        Numbers(_) => node.list().iter().for_each(|n| number(n, n.number().is_none_or(|v| Bounds::Any.admits(v)), Bounds::Any.words())),
+        Points(_) => {
+            for n in node.list().iter().flat_map(Node::list) {
+                number(n, n.number().is_none_or(|v| Bounds::Any.admits(v)), Bounds::Any.words());
+            }
+        }
+        Table(keys) | Part(keys) => bounds_of_table(node, keys, out),
+        Tables(keys) => node.list().iter().for_each(|n| bounds_of_table(n, keys, out)),
+        Map(keys) => node.entries().iter().for_each(|e| bounds_of_table(&e.node, keys, out)),
+        Text | Texts | Flag | Choice(_) | Open(_) => {}
+    }
+}
+
 fn what(kind: Type) -> String {
     match kind {
         Text => "text in quotes".into(),
-        Number => "a number".into(),
-        Whole => "a whole number".into(),
+        Texts => "a list of texts in quotes".into(),
+        Type::Number(_) => "a number".into(),
+        Whole(..) => "a whole number".into(),
         Flag => "true or false".into(),
         Choice(words) | Open(words) => format!("one of \"{}\"", words.join("\", \"")),
         Numbers(0) => "a list of numbers".into(),
@@ -396,9 +524,18 @@ fn distance(a: &str, b: &str) -> usize {
 
 /// The JSON Schema of machine files (draft 2020-12), for editors. `spec/machines/machine.schema.json` holds this text.
 pub fn json_schema() -> String {
-    let mut out = String::from("{\n  \"$schema\": \"https://json-schema.org/draft/2020-12/schema\",\n  \"title\": \"gcc-robot machine file\",\n");
+    document("machine file", ROOT, Level::Root)
+}
+
+/// The same of job files; `spec/machines/job.schema.json` holds this text.
+pub fn job_schema() -> String {
+    document("job file", JOB, Level::Inner)
+}
+
+fn document(title: &str, keys: &[Key], level: Level) -> String {
+    let mut out = format!("{{\n  \"$schema\": \"https://json-schema.org/draft/2020-12/schema\",\n  \"title\": \"gcc-robot {title}\",\n");
     out += "  \"description\": \"Lengths in mm, angles in degrees, time in seconds.\",\n";
-    object(&mut out, ROOT, 1, Level::Root);
+    object(&mut out, keys, 1, level);
     out += "\n}\n";
     out
 }
@@ -443,9 +580,13 @@ fn property(out: &mut String, k: &Key, depth: usize) {
     let list = |words: &[&str]| words.iter().map(|w| quoted(w)).collect::<Vec<_>>().join(", ");
     let _ = match k.kind {
         Text => write!(out, "{pad}\"type\": \"string\""),
-        Number => write!(out, "{pad}\"type\": \"number\""),
-        Whole if k.name == "format" => write!(out, "{pad}\"const\": 1"),
-        Whole => write!(out, "{pad}\"type\": \"integer\",\n{pad}\"minimum\": 0"),
+        Texts => write!(out, "{pad}\"type\": \"array\",\n{pad}\"items\": {{ \"type\": \"string\" }}"),
+        Type::Number(b) => write!(out, "{pad}\"type\": \"number\"{}", b.schema(&pad)),
+        Whole(..) if k.name == "format" => write!(out, "{pad}\"const\": 1"),
+        Whole(least, most) => {
+            let most = if most >= MOST_COUNTED { String::new() } else { format!(",\n{pad}\"maximum\": {most}") };
+            write!(out, "{pad}\"type\": \"integer\",\n{pad}\"minimum\": {least}{most}")
+        }
         Flag => write!(out, "{pad}\"type\": \"boolean\""),
         Choice(words) => write!(out, "{pad}\"enum\": [{}]", list(words)),
         Open(words) => {
@@ -487,21 +628,23 @@ mod tests {
     use super::*;
 
     #[test]
-    fn schema_file_is_up_to_date() {
-        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../spec/machines/machine.schema.json");
-        let text = json_schema();
-        if std::env::var_os("UPDATE_SCHEMA").is_some() {
-            std::fs::write(path, &text).unwrap();
+    fn schema_files_are_up_to_date() {
+        for (name, text) in [("machine", json_schema()), ("job", job_schema())] {
+            let path = format!("{}/../../spec/machines/{name}.schema.json", env!("CARGO_MANIFEST_DIR"));
+            if std::env::var_os("UPDATE_SCHEMA").is_some() {
+                std::fs::write(&path, &text).unwrap();
+            }
+            assert_eq!(std::fs::read_to_string(&path).unwrap(), text, "run the test with UPDATE_SCHEMA=1");
         }
-        assert_eq!(std::fs::read_to_string(path).unwrap(), text, "run the test with UPDATE_SCHEMA=1");
     }
 
     #[test]
     fn braces_of_the_schema_match() {
-        let text = json_schema();
-        let count = |c: char| text.chars().filter(|x| *x == c).count();
-        assert_eq!(count('{'), count('}'));
-        assert_eq!(count('['), count(']'));
+        for text in [json_schema(), job_schema()] {
+            let count = |c: char| text.chars().filter(|x| *x == c).count();
+            assert_eq!(count('{'), count('}'));
+            assert_eq!(count('['), count(']'));
+        }
     }
 
     #[test]

@@ -6,6 +6,7 @@
 //!
 //! | module | job |
 //! |---|---|
+//! | `job` | job files: the clampings of a part |
 //! | `keys` | which keys a machine file may hold; the JSON Schema made from them |
 //! | `tree` | TOML with the place of every value; `extends` |
 //! | `schema` | from keys to a machine: checks and their diagnostics |
@@ -33,6 +34,7 @@ mod doubts;
 mod figure;
 mod five_axis;
 mod identify;
+mod job;
 mod keys;
 mod kinematics;
 mod library;
@@ -56,7 +58,8 @@ pub use cell::{Cell, Controller, Coupling, External, Rapid, Signal, Spindle, Too
 pub use doubts::doubts;
 pub use five_axis::{Carrier, FiveAxis, Rotary};
 pub use identify::{Fit, identify};
-pub use keys::json_schema;
+pub use job::{Clamping, parse_job};
+pub use keys::{job_schema, json_schema};
 pub use kinematics::{Control, Kinematics, KinematicsError, Pose, Solution, Violation};
 pub use library::{as_published, builtin, is_path, list, reference, source, suggestion};
 pub use mobility::{Mobility, mobility};

@@ -34,6 +34,36 @@ pub fn mobility(structure: &str) -> Result<Mobility, String> {
     Ok(all)
 }
 
+/// The joints of a chain as letters.
+pub(crate) fn letters(joints: &[crate::Joint]) -> String {
+    joints.iter().map(|j| if j.kind == crate::JointKind::Revolute { 'R' } else { 'P' }).collect()
+}
+
+/// Whether a structure, good in itself, is that of another machine: a chain has its joints, in their order; a parallel
+/// machine has as many driven joints in parallel legs as its kinematics drive. A mobility that differs is told apart.
+pub(crate) fn of_another(structure: &str, machine: &crate::Machine) -> bool {
+    let (parallel, wrist) = structure.split_once(',').unwrap_or((structure, ""));
+    let legs = parallel.split('+').count();
+    let several = legs > 1 || parallel.starts_with(|c: char| c.is_ascii_digit() && c != '1');
+    match machine.chain {
+        crate::Chain::Incomplete { .. } => false,
+        crate::Chain::TwoLegs(_) => !several || !wrist.is_empty(),
+        crate::Chain::Tricept(_) => !several || wrist.len() != 3,
+        _ => several || single(parallel.trim_start_matches('1')) + &single(wrist) != letters(&machine.joints),
+    }
+}
+
+/// A chain in joints of one freedom.
+fn single(chain: &str) -> String {
+    chain.chars().map(|c| match c {
+        'U' => "RR",
+        'S' => "RRR",
+        'C' => "RP",
+        'P' => "P",
+        _ => "R",
+    }).collect()
+}
+
 fn freedoms(chain: &str) -> Result<usize, String> {
     let one = |c: char| match c {
         'R' | 'P' | 'H' => Ok(1),

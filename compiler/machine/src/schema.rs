@@ -5,7 +5,7 @@ use crate::five_axis::{Carrier, FiveAxis, Rotary};
 use crate::keys::{self, ROOT, suggestion};
 use crate::math::{Frame, norm, scale};
 use crate::prp::{SphericalAxis, TwoLegs, TwoLegsShape};
-use crate::tree::{self, Node, Value};
+use crate::tree::{self, Node};
 use crate::{
     Chain, DhRow, Joint, JointKind, Kind, Link, Machine, Opw, Orientation, ParallelWrist, Pose, Scara, Serial, Tricept,
     TriceptShape,
@@ -167,7 +167,9 @@ impl Check {
             self.value(&id.span, "an id is `maker/model` in lower-case letters, digits and `-`");
         }
         let list = raw.get("joint").map_or(&[][..], Node::list);
-        self.finite(raw);
+        for (place, message) in keys::out_of_bounds(raw, ROOT) {
+            self.value(&place, message);
+        }
         let joints: Vec<Joint> = list.iter().map(|j| self.joint(j)).collect();
         self.names(list);
         let chain = self.chain(raw, list, &joints);
@@ -177,18 +179,6 @@ impl Check {
             self.start_agrees(raw, &machine);
         }
         machine
-    }
-
-    /// Every number of the file.
-    fn finite(&mut self, node: &Node) {
-        match &node.value {
-            Value::Number(n) if !n.is_finite() => {
-                self.value(&node.span, "a value must be a finite number; leave a limit out when there is none");
-            }
-            Value::List(l) => l.iter().for_each(|n| self.finite(n)),
-            Value::Table(t) => t.iter().for_each(|e| self.finite(&e.node)),
-            _ => {}
-        }
     }
 
     fn built(&mut self, raw: &Node, joints: Vec<Joint>, chain: Chain) -> Machine {
@@ -252,16 +242,15 @@ impl Check {
                 let args = [given.text().unwrap_or_default().to_string(), m.freedom.to_string(), machine.joints.len().to_string()];
                 self.fault(code::MACHINE_MOBILITY, &given.span, &args);
             }
+            Ok(_) if crate::mobility::of_another(given.text().unwrap_or_default(), machine) => {
+                let what = format!("`{}` is another mechanism than that of the kinematics and joints: {}", given.text().unwrap_or_default(), own_structure(machine));
+                self.value(&given.span, what);
+            }
             Ok(_) => {}
         }
     }
 
     fn joint(&mut self, j: &Node) -> Joint {
-        for v in ["speed", "rapid", "acceleration"].into_iter().filter_map(|k| j.get(k)) {
-            if v.number().is_some_and(|n| n <= 0.0) {
-                self.value(&v.span, "a speed must be above zero");
-            }
-        }
         if let (Some(min), Some(max)) = (j.value_of("min"), j.get("max"))
             && let Some(top) = max.number()
             && min >= top
@@ -356,11 +345,6 @@ impl Check {
             "five-axis" => self.five_axis(table)?,
             "parallel-2ups-prp" => self.two_legs(table, joints)?,
             "tricept" => {
-                for key in ["base_radius", "platform_radius", "flange_offset", "wrist_offset"] {
-                    if let Some(n) = table.get(key).filter(|n| n.number().is_some_and(|v| v < 0.0 || (v == 0.0 && key.ends_with("radius")))) {
-                        self.value(&n.span, format!("`{key}` must be above zero"));
-                    }
-                }
                 let shape = TriceptShape {
                     base_radius: number("base_radius"),
                     platform_radius: number("platform_radius"),
@@ -489,7 +473,7 @@ impl Check {
                 links.push(Link { origin: six(origin), axis: scale(axis, 1.0 / norm(axis)), kind: joint.kind, limits: limits(joint) });
             }
         }
-        Some(match kind {
+        let chain = match kind {
             "dh" => {
                 let chain = Serial::dh(&rows);
                 let end = chain.tip().then(&tip);
@@ -497,7 +481,22 @@ impl Check {
             }
             "mdh" => Serial::mdh(&rows, tip),
             _ => Serial::new(links, tip),
-        })
+        };
+        self.axes_differ(&chain, list);
+        Some(chain)
+    }
+
+    /// Two joints after each other that do the same move the tool like one: the geometry is singular everywhere.
+    fn axes_differ(&mut self, chain: &Serial, list: &[Node]) {
+        for (pair, nodes) in chain.links().windows(2).zip(list.windows(2)) {
+            if !pair[1].repeats(&pair[0]) {
+                continue;
+            }
+            let name = |n: &Node| n.string("name").unwrap_or_default();
+            let what = if pair[0].kind == JointKind::Revolute { "turn about one and the same axis" } else { "slide along one and the same direction" };
+            let place = ["dh", "origin"].into_iter().find_map(|k| nodes[1].get(k)).unwrap_or(&nodes[1]);
+            self.value(&place.span, format!("`{}` and `{}` {what}: one of them has no effect of its own", name(&nodes[0]), name(&nodes[1])));
+        }
     }
 
     fn joint_values(&mut self, given: &Node, joints: &[Joint], what: &str) -> Option<Vec<f64>> {
@@ -538,7 +537,7 @@ impl Check {
             frames: list("frame").iter().map(|f| (f.string("name").unwrap_or_default(), place(f))).collect(),
             tools: self.tools(list("tool")),
             spindle: raw.get("spindle").and_then(|s| self.spindle(s)),
-            axial_depth: self.axial_depth(raw),
+            axial_depth: number("cutting", "axial_depth"),
             external: list("external").iter().filter_map(|e| self.external(e)).collect(),
             home,
             coupling: raw.get("coupling").and_then(|c| self.coupling(c, joints)),
@@ -547,9 +546,21 @@ impl Check {
             rapid: raw.get("rapid").and_then(Node::text).map(|r| if r == "joint" { Rapid::Joint } else { Rapid::Linear }),
             rapid_speed: number("speed", "rapid"),
             joint_speed: number("speed", "joint"),
-            zones: Zones { default: number("zone", "default"), max: number("zone", "max") },
+            zones: self.zones(raw),
             ..Cell::default()
         }
+    }
+
+    fn zones(&mut self, raw: &Node) -> Zones {
+        let number = |key: &str| raw.get("zone").and_then(|t| t.value_of(key));
+        let zones = Zones { default: number("default"), max: number("max") };
+        if let (Some(default), Some(max)) = (zones.default, zones.max)
+            && default > max
+            && let Some(node) = raw.get("zone").and_then(|z| z.get("default"))
+        {
+            self.value(&node.span, format!("default {default} is above max {max}"));
+        }
+        zones
     }
 
     fn tools(&mut self, list: &[Node]) -> std::collections::BTreeMap<u32, ToolData> {
@@ -567,15 +578,6 @@ impl Check {
             }
         }
         out
-    }
-
-    fn axial_depth(&mut self, raw: &Node) -> Option<f64> {
-        let node = raw.get("cutting")?.get("axial_depth")?;
-        let depth = node.number()?;
-        if !(depth > 0.0) {
-            self.value(&node.span, format!("axial_depth {depth} must be above zero"));
-        }
-        Some(depth)
     }
 
     fn spindle(&mut self, s: &Node) -> Option<Spindle> {
@@ -632,6 +634,12 @@ impl Check {
         if joint == with {
             self.value(&c.span, "a joint can't be coupled with itself");
         }
+        if let (Some(min), Some(max)) = (c.value_of("min"), c.get("max"))
+            && let Some(top) = max.number()
+            && min >= top
+        {
+            self.value(&max.span, format!("max {top} is not above min {min}"));
+        }
         let angle = |key: &str| c.value_of(key).map(f64::to_radians);
         Some(Coupling { joint, with, factor: c.value_of("factor")?, min: angle("min"), max: angle("max") })
     }
@@ -646,6 +654,15 @@ fn default_start(machine: &mut Machine) {
     let joints = machine.cell.home.clone().unwrap_or_else(|| machine.joints.iter().map(nearest).collect());
     if let Ok(pose) = machine.kinematics().forward(&joints) {
         (machine.start, machine.start_joints) = (pose, Some(joints));
+    }
+}
+
+/// The mechanism that joints and kinematics make up, for messages.
+fn own_structure(machine: &Machine) -> String {
+    match machine.chain {
+        Chain::TwoLegs(_) => "two legs with driven `P` joints and a column, such as `2UPS+PRP`".into(),
+        Chain::Tricept(_) => "three driven legs, a passive one and a wrist, such as `3UPS+UP,RRR`".into(),
+        _ => format!("a chain `{}`", crate::mobility::letters(&machine.joints)),
     }
 }
 
@@ -664,7 +681,7 @@ fn signal(t: &Node) -> Signal {
     }
 }
 
-fn place(t: &Node) -> Frame {
+pub(crate) fn place(t: &Node) -> Frame {
     let [x, y, z] = t.array::<3>("position").unwrap_or_default();
     let [a, b, c] = t.array::<3>("rotation").unwrap_or_default();
     six([x, y, z, a, b, c])
@@ -749,6 +766,104 @@ mod tests {
         assert!(faults(&format!("{cell}[[joint]]\nname = \"J1\"\nmin = 200\n"))[0].0 == "machine/bad-value");
         let two = crate::source("usp/2ups-prp").unwrap();
         assert_eq!(faults(&two.replace("2UPS+PRP\"\n\n", "3UPS+PRP\"\n\n").replace("structure = \"3UPS+PRP\"", "structure = \"2UPS+PR\""))[0].0, "machine/mobility");
+    }
+
+    /// Numbers that no machine can mean, one by one: each is told at its own place.
+    #[test]
+    fn values_out_of_bounds() {
+        let cell = "format = 1\nid = \"shop/cell\"\nextends = \"abb/irb2400\"\n";
+        let tool = "[[tool]]\nnumber = 1\nname = \"t\"\n";
+        let rail = "[[external]]\nname = \"E1\"\ntype = \"prismatic\"\ncarries = \"machine\"\n";
+        let tricept = "[kinematics]\nbase_radius = 300\nplatform_radius = 150\nwrist_offset = 100\nflange_offset = 50\n";
+        let member = "[stiffness]\nsource = \"x\"\nmodulus = 210000\n[[stiffness.member]]\njoint = \"J1\"\nname = \"m\"\n";
+        let rows = [
+            ("[speed]\n", "joint = ", &["-30", "0", "101"][..]),
+            ("[speed]\n", "rapid = ", &["-200", "0", "nan"]),
+            ("[zone]\n", "default = ", &["-3", "inf"]),
+            ("[zone]\nmax = 2\n", "default = ", &["3"]),
+            ("[zone]\n", "max = ", &["-1"]),
+            ("[io.M3]\nwait = \"di\"\n", "seconds = ", &["-10", "0"]),
+            ("[io.M3]\nsignal = \"do\"\n", "value = ", &["nan", "1e300"]),
+            (tool, "mass = ", &["-1", "0"]),
+            (tool, "diameter = ", &["-10", "0"]),
+            (tool, "position = ", &["[0, 0, 1e300]", "[0, -inf, 0]"]),
+            ("[[tool]]\nname = \"t\"\n", "number = ", &["-1", "5_000_000_000", "inf"]),
+            ("[controller]\n", "lines = ", &["0", "3", "59"]),
+            ("[controller]\n", "points = ", &["0", "9"]),
+            ("[controller]\n", "bytes = ", &["0", "3999"]),
+            ("[spindle]\n", "min_speed = ", &["-1"]),
+            ("[spindle]\n", "max_speed = ", &["0"]),
+            ("[cutting]\n", "axial_depth = ", &["0"]),
+            ("[coupling]\njoint = \"J3\"\nwith = \"J2\"\n", "factor = ", &["0"]),
+            ("[coupling]\njoint = \"J3\"\nwith = \"J2\"\nfactor = 1\nmin = 10\n", "max = ", &["-10"]),
+            ("[[joint]]\nname = \"J1\"\ntype = \"revolute\"\n", "speed = ", &["0", "-1"]),
+            ("[[joint]]\nname = \"J1\"\ntype = \"revolute\"\n", "rapid = ", &["0"]),
+            ("[[joint]]\nname = \"J1\"\ntype = \"revolute\"\n", "acceleration = ", &["-5"]),
+            ("[[joint]]\nname = \"J1\"\ntype = \"revolute\"\n", "min = ", &["nan"]),
+            (rail, "speed = ", &["0"]),
+            (rail, "position = ", &["nan"]),
+            ("[accuracy]\nsource = \"x\"\n", "grade = ", &["0", "19"]),
+            ("[accuracy]\nsource = \"x\"\n[[accuracy.parameter]]\nname = \"a1\"\n", "tolerance = ", &["-0.1"]),
+            (member, "stiffness = ", &["0", "-5"]),
+            ("[stiffness]\nsource = \"x\"\nmember = []\n", "modulus = ", &["0"]),
+        ];
+        let mut all = String::new();
+        let mut row = |text: &str, line: &str| {
+            let found = parse(FileId(0), text).err().unwrap_or_default();
+            all += &format!("{line}\n");
+            for d in found {
+                all += &format!("    {} `{}`: {}\n", d.code.def().code, text[d.primary().1.range()].trim(), d.message);
+            }
+        };
+        for (head, key, values) in rows {
+            values.iter().for_each(|v| row(&format!("{cell}{head}{key}{v}\n"), &format!("{}{key}{v}", head.lines().next().unwrap_or_default())));
+        }
+        let hybrid = "format = 1\nid = \"shop/cell\"\nextends = \"comau/tricept806\"\n";
+        for (good, bad) in [("300", "-300"), ("150", "0"), ("100", "-1"), ("50", "nan")] {
+            row(&format!("{hybrid}{}", tricept.replace(&format!(" {good}\n"), &format!(" {bad}\n"))), &format!("tricept {good} as {bad}"));
+        }
+        let two = source("usp/2ups-prp").unwrap();
+        row(&two.replace("universal = 45", "universal = 200"), "universal = 200");
+        let mill = source("generic/mill5-b-head-c-table").unwrap();
+        row(&mill.replace("pivot = 200", "pivot = -200"), "pivot = -200");
+        insta::assert_snapshot!(all);
+    }
+
+    /// Every key that holds a number is tried with NaN, both infinities and a huge one.
+    #[test]
+    fn no_key_takes_what_is_no_number() {
+        let good = include_str!("../../../docs/examples/irb2400-cell.toml");
+        for bad in ["nan", "inf", "-inf", "1e300"] {
+            for (i, line) in good.lines().enumerate() {
+                let Some((key, value)) = line.split_once(" = ").filter(|(_, v)| v.parse::<f64>().is_ok() || v.starts_with('[')) else { continue };
+                let value = if value.starts_with('[') { format!("[{bad}, {}", value.split_once(',').unwrap().1) } else { bad.to_string() };
+                let text: String = good.lines().enumerate().map(|(k, l)| if k == i { format!("{key} = {value}\n") } else { format!("{l}\n") }).collect();
+                assert!(parse(FileId(0), &text).is_err(), "{key} = {value}");
+            }
+        }
+    }
+
+    #[test]
+    fn chains_that_are_none() {
+        let head = |structure: &str| format!("format = 1\nid = \"shop/arm\"\ntitle = \"Arm\"\nkind = \"robot\"\n{structure}\n[kinematics]\nkind = \"dh\"\n");
+        let row = |n: usize, kind: &str, dh: &str| format!("[[joint]]\nname = \"J{n}\"\ntype = \"{kind}\"\ndh = {dh}\n");
+        let told = |text: &str| {
+            let found = parse(FileId(0), text).err().unwrap_or_default();
+            found.iter().map(|d| format!("{} `{}`: {}\n", d.code.def().code, &text[d.primary().1.range()], d.message)).collect::<String>()
+        };
+        let zero: String = (1..=3).map(|n| row(n, "revolute", "[0, 0, 0, 0]")).collect();
+        let arm: String = (1..=3).map(|n| row(n, "revolute", "[100, 0, 90, 0]")).collect();
+        let lift = row(1, "prismatic", "[0, 0, 0, 0]") + &row(2, "prismatic", "[50, 0, 0, 0]");
+        let mut all = told(&(head("") + &zero)) + &told(&(head("") + &lift));
+        for structure in ["2UPS+PRP", "RRP", "3R", "RR", "S", "UR"] {
+            all += &format!("{structure}:\n{}", told(&(head(&format!("structure = \"{structure}\"")) + &arm)));
+        }
+        let two = source("usp/2ups-prp").unwrap();
+        all += &told(&two.replace("structure = \"2UPS+PRP\"", "structure = \"PPP\""));
+        insta::assert_snapshot!(all);
+        // A column that turns about the line it slides along, and parallel axes beside each other, are good.
+        let column = row(1, "prismatic", "[0, 0, 0, 0]") + &row(2, "revolute", "[300, 0, 0, 0]") + &row(3, "revolute", "[200, 0, 0, 0]");
+        assert_eq!(told(&(head("") + &column)), "");
     }
 
     #[test]

@@ -1,6 +1,6 @@
 use crate::JointKind;
 use crate::kinematics::{Control, Kinematics, KinematicsError, Solution, checked};
-use crate::math::{Frame, V3, about, cross, norm, rot_x, rot_z, rotate, scale, solve, sub};
+use crate::math::{Frame, V3, about, cross, dot, norm, rot_x, rot_z, rotate, scale, solve, sub};
 
 /// Chain of joints one after the other, given by the frame of each joint in the one before (as URDF has it) or by
 /// Denavit–Hartenberg rows. Forward exact; inverse by damped least squares with respect for the joint limits: it
@@ -22,6 +22,18 @@ pub struct Link {
     pub kind: JointKind,
     /// Least and greatest value.
     pub limits: (f64, f64),
+}
+
+impl Link {
+    /// Whether it turns about the axis of the joint before it, or slides along its direction, wherever that one stands.
+    pub(crate) fn repeats(&self, before: &Link) -> bool {
+        let axis = rotate(&self.origin.turn, self.axis);
+        if self.kind != before.kind || norm(cross(axis, before.axis)) > 1e-9 {
+            return false;
+        }
+        let off = sub(self.origin.position, scale(before.axis, dot(self.origin.position, before.axis)));
+        self.kind == JointKind::Prismatic || norm(off) <= 1e-9
+    }
 }
 
 /// A Denavit–Hartenberg row: a and d in mm, alpha and theta in rad; the joint value adds to theta or d.

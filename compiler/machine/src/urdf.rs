@@ -19,9 +19,9 @@ pub struct Import {
 pub fn import_urdf(id: &str, text: &str) -> Result<Import, String> {
     let robot = urdf_rs::read_from_string(text).map_err(|e| format!("the file is no URDF: {e}"))?;
     let path = longest(&robot)?;
-    let (links, names, speeds, tip) = chain(&path)?;
-    let chain = Serial::new(links, tip);
     let mut notes = Vec::new();
+    let (links, names, speeds, tip) = chain(&path, &mut notes)?;
+    let chain = Serial::new(links, tip);
     if path.iter().any(|j| j.mimic.is_some()) {
         notes.push("joints that imitate others are taken as joints of their own".to_string());
     }
@@ -110,7 +110,7 @@ fn moves(joint: &urdf_rs::Joint) -> bool {
 
 type Parts = (Vec<Link>, Vec<String>, Vec<f64>, Frame);
 
-fn chain(path: &[&urdf_rs::Joint]) -> Result<Parts, String> {
+fn chain(path: &[&urdf_rs::Joint], notes: &mut Vec<String>) -> Result<Parts, String> {
     let (mut links, mut names, mut speeds) = (Vec::new(), Vec::new(), Vec::new());
     let mut here = Frame::IDENTITY;
     for joint in path {
@@ -128,7 +128,19 @@ fn chain(path: &[&urdf_rs::Joint]) -> Result<Parts, String> {
         if norm(axis) < 1e-9 || !here.is_finite() {
             return Err(format!("joint `{}` has no axis or no place", joint.name));
         }
-        let free = joint.joint_type == JointType::Continuous || joint.limit.lower >= joint.limit.upper;
+        let (lower, upper) = (joint.limit.lower, joint.limit.upper);
+        let continuous = joint.joint_type == JointType::Continuous;
+        if !continuous && !(lower <= upper && lower.is_finite() && upper.is_finite()) {
+            return Err(format!("joint `{}` has the lower limit {lower} and the upper limit {upper}: correct its <limit>", joint.name));
+        }
+        // Without a <limit>, both are 0.
+        let free = continuous || lower == upper;
+        if free && !continuous {
+            notes.push(format!("joint `{}` has no limits; add `min` and `max` to the machine file", joint.name));
+        }
+        if !joint.limit.velocity.is_finite() || joint.limit.velocity < 0.0 {
+            return Err(format!("joint `{}` has the speed limit {}: correct its <limit>", joint.name, joint.limit.velocity));
+        }
         let limits = if free { (f64::NEG_INFINITY, f64::INFINITY) } else { (joint.limit.lower * size, joint.limit.upper * size) };
         let kind = if turns { JointKind::Revolute } else { JointKind::Prismatic };
         links.push(Link { origin: here, axis: scale(axis, 1.0 / norm(axis)), kind, limits });

@@ -114,3 +114,18 @@ fn bad_files_are_said_to_be_so() {
         assert!(import_urdf("test/x", text).is_err(), "{text}");
     }
 }
+
+/// Limits that are crossed or no numbers are no reason to make a joint without limits; a joint that has none is told.
+#[test]
+fn limits_of_joints() {
+    let (_, chain, _) = rows().into_iter().next().unwrap();
+    let good = urdf(&chain, [0.0; 3]);
+    let at = good.find("<limit").unwrap();
+    let with = |limit: &str| format!("{}{limit}{}", &good[..at], &good[at + good[at..].find("/>").unwrap() + 2..]);
+    for limit in ["lower=\"1\" upper=\"-1\" velocity=\"1\"", "lower=\"nan\" upper=\"1\" velocity=\"1\"", "lower=\"-inf\" upper=\"1\" velocity=\"1\"", "lower=\"-1\" upper=\"1\" velocity=\"-1\""] {
+        let why = import_urdf("test/x", &with(&format!("<limit {limit} effort=\"1\"/>"))).expect_err(limit);
+        assert!(why.contains("correct its <limit>"), "{why}");
+    }
+    let none = import_urdf("test/x", &with("<limit velocity=\"1\" effort=\"1\"/>")).unwrap();
+    assert!(none.notes.iter().any(|n| n.contains("has no limits")), "{:?}", none.notes);
+}

@@ -2,6 +2,7 @@
 //! values yet. Frames, tools, tool directions, speeds, signals and the words a robot has no meaning for are settled
 //! here.
 
+mod setups;
 mod signals;
 
 use gr_ir::geometry::ArcShape;
@@ -160,6 +161,16 @@ pub(crate) struct Gather<'a> {
     ended: bool,
     source: Source,
     clamped: Option<usize>,
+    /// The line of the main program that led here.
+    main_line: u32,
+    /// Clampings after the first, and setups that were begun.
+    first_setup: Option<usize>,
+    clampings: Vec<Clamped>,
+    begun: BTreeSet<usize>,
+    /// The part was clamped anew: the tool comes from above again.
+    anew: bool,
+    /// What is gathered now is a cut.
+    cutting: bool,
     workingstep: Option<String>,
     /// The pallet was exchanged just now: the stop that follows is that of M60.
     pallet: bool,
@@ -212,6 +223,12 @@ impl<'a> Gather<'a> {
             ended: false,
             source: Source::default(),
             clamped: None,
+            main_line: 0,
+            first_setup: None,
+            clampings: Vec::new(),
+            begun: BTreeSet::new(),
+            anew: false,
+            cutting: false,
             workingstep: None,
             pallet: false,
             switches: BTreeMap::new(),
@@ -230,6 +247,9 @@ impl<'a> Gather<'a> {
             self.source = view.source;
             // Errors of their own; where the tool is afterwards nobody knows.
             self.rapids |= matches!(view.op, Op::Probe(_) | Op::RigidTap { .. });
+            if !self.options.setups.is_empty() {
+                self.main_line = main_line(program, view.source);
+            }
             if !matches!(view.op, Op::Stop(_)) {
                 self.pallet = false;
             }
@@ -239,6 +259,7 @@ impl<'a> Gather<'a> {
             let (pose, state) = (*cursor.pose(), *cursor.state());
             self.end(&pose, &state);
         }
+        self.setups_begin_safely();
         self.zones();
     }
 
@@ -338,25 +359,6 @@ impl<'a> Gather<'a> {
             self.findings.once_each(code::ROBOT_BY_HAND, Some(self.source), &[word]);
         }
         made.actions.into_iter().for_each(|a| self.act(a));
-    }
-
-    /// Which setup of the job holds here.
-    fn setup(&self) -> Option<usize> {
-        let setups = &self.options.setups;
-        let named = self.workingstep.as_ref().and_then(|w| setups.iter().position(|s| s.workingsteps.contains(w)));
-        named.or_else(|| setups.iter().rposition(|s| s.from_line.is_some_and(|l| l <= self.source.line)))
-    }
-    /// The operator turns the part over.
-    fn clamp(&mut self, setup: Option<usize>) {
-        let first = self.clamped.is_none() && !self.out.items.iter().any(|i| matches!(i, Item::Move(_)));
-        self.clamped = setup;
-        if let Some(s) = setup.map(|i| &self.options.setups[i]).filter(|_| !first) {
-            let name = s.name.clone();
-            self.retract();
-            self.act(Action::Message(format!("setup {name}")));
-            self.act(Action::Pause { optional: false });
-            (self.at, self.at_change) = (None, None);
-        }
     }
 
     /// The work frame in force; none when it isn't known.
@@ -639,7 +641,7 @@ impl<'a> Gather<'a> {
 
     /// Comes to a place by rapid; the first time from home, from above.
     fn come(&mut self, frame: u16, tool: u16, position: [f64; 3], turn: u32) {
-        let first = !self.out.items.iter().any(|i| matches!(i, Item::Move(_)));
+        let first = std::mem::take(&mut self.anew) || !self.out.items.iter().any(|i| matches!(i, Item::Move(_)));
         let here = self.base(frame, position, turn);
         let length = self.at.map_or(0.0, |at| norm(sub(here.position, at.position)));
         let joint = self.machine.cell.joint_share();
@@ -774,7 +776,10 @@ impl<'a> Gather<'a> {
         let state = view.state;
         self.seen = [true; 3];
         self.waiting = false;
-        let (Some(frame), Some(tool)) = (self.work(state), self.tool(state)) else { return };
+        self.cutting = true;
+        let places = (self.work(state), self.tool(state));
+        self.cutting = false;
+        let (Some(frame), Some(tool)) = places else { return };
         let (Some(from), Some(to)) = (self.turn(view.start, state), self.turn(view.end, state)) else { return };
         let lag = self.lag(frame, view.start.xyz());
         let (op, first, last);
@@ -932,6 +937,22 @@ impl<'a> Gather<'a> {
 /// Whether two turns are one but for rounding.
 fn same_turn(a: &M3, b: &M3) -> bool {
     a.iter().flatten().zip(b.iter().flatten()).all(|(x, y)| (x - y).abs() < 1e-9)
+}
+
+/// The part was clamped anew.
+struct Clamped {
+    /// Items before it.
+    item: usize,
+    setup: Option<usize>,
+    source: Source,
+    /// The program cuts at once.
+    cutting: bool,
+}
+
+/// The line of the main program that asked for an operation, itself or through calls.
+fn main_line(program: &Program, source: Source) -> u32 {
+    let outermost = program.call_stack(source).filter(|f| f.pass == 0).last();
+    outermost.map_or(source.line, |f| f.line)
 }
 
 /// A frame to be looked up by; both zeros are one.

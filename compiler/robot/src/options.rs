@@ -34,6 +34,8 @@ pub struct Setup {
     pub workingsteps: Vec<String>,
     /// The part's frame in the base.
     pub part: Frame,
+    /// Where the job file says so.
+    pub place: Source,
 }
 
 impl Default for Options {

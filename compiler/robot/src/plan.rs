@@ -109,12 +109,11 @@ impl Planner<'_> {
 
     /// Approach and retract that can't be had are left out.
     fn drop_unreachable(&mut self) {
-        let last = self.g.items.iter().rposition(|i| matches!(i, Item::Move(_)));
         let ours: Vec<usize> = (0..self.g.items.len()).filter(|i| matches!(&self.g.items[*i], Item::Move(m) if m.ours)).collect();
         for i in ours.into_iter().rev() {
             let Item::Move(m) = &self.g.items[i] else { continue };
             if !self.stands(m) {
-                self.leave_out(i, Some(i) == last);
+                self.leave_out(i);
             }
         }
     }
@@ -136,10 +135,24 @@ impl Planner<'_> {
         })
     }
 
-    fn leave_out(&mut self, i: usize, last: bool) {
-        let which = if last { "last" } else { "first" };
+    /// Leaves out an approach (a joint move) or a retract (a line): of the program, or of a setup in it.
+    fn leave_out(&mut self, i: usize) {
         let sourced = |i: &Item| if let Item::Move(Move { source: Some(s), .. }) = i { Some(*s) } else { None };
-        let source = if last { self.g.items.iter().rev().find_map(sourced) } else { self.g.items.iter().find_map(sourced) };
+        let (before, after) = (&self.g.items[..i], &self.g.items[i + 1..]);
+        let (from, to) = (before.iter().rev().find_map(sourced), after.iter().find_map(sourced));
+        let comes = matches!(&self.g.items[i], Item::Move(m) if m.way == Way::Joint);
+        let (which, source) = match (from, to) {
+            (_, None) => ("last", from),
+            (None, _) => ("first", to),
+            (Some(_), Some(_)) if comes => ("setup's first", to),
+            (Some(_), Some(_)) => ("setup's last", from),
+        };
+        let in_work = before.iter().rev().find_map(|i| if let Item::Move(m) = i { Some(!m.rapid) } else { None }) == Some(true);
+        if which == "setup's last" && in_work {
+            // The operator would take the part from under a tool that stands in it.
+            let why = format!("the setup before it ends with a cut, and {} mm above that the arm can't stand", self.options.approach);
+            self.findings.say(code::JOB_BEGINS_IN_WORK, to, &["after it".to_string(), why]);
+        }
         let args = [format!("{}", self.options.approach), which.to_string()];
         self.findings.say(code::ROBOT_NO_APPROACH, source, &args);
         let Item::Move(m) = self.g.items.remove(i) else { return };
@@ -200,8 +213,7 @@ impl Planner<'_> {
         if !is_ours(i) {
             return false;
         }
-        let last = self.next_move(i).is_none();
-        self.leave_out(i, last);
+        self.leave_out(i);
         true
     }
 

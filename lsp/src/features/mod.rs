@@ -98,6 +98,7 @@ pub fn diagnose(mut view: View) -> Answer<(Vec<Diagnostic>, Elsewhere)> {
                     let found = gr_machine::parse(FileId(0), &text).err().unwrap_or_default();
                     [found, gr_machine::doubts(FileId(0), &text)].concat()
                 }
+                gr_ide::config::Schema::Job => gr_machine::parse_job(FileId(0), &text).err().unwrap_or_default(),
                 gr_ide::config::Schema::Project => view.host.check_project(&view.path, &text),
             }
         }

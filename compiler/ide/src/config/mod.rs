@@ -14,6 +14,8 @@ use crate::{Completion, CompletionKind, Fold, Hover, Item, ItemKind};
 pub enum Schema {
     /// A machine file.
     Machine,
+    /// A job file.
+    Job,
     /// The project file.
     Project,
 }
@@ -25,14 +27,19 @@ impl Schema {
             return Some(Schema::Project);
         }
         let has = |start: &str| text.lines().any(|l| l.trim_start().starts_with(start));
+        if name.ends_with(".toml") && has("[[setup]]") {
+            return Some(Schema::Job);
+        }
         (name.ends_with(".toml") && has("format") && (has("[kinematics]") || has("extends") || has("[[joint]]"))).then_some(Schema::Machine)
     }
     fn json(self) -> &'static Value {
         static MACHINE: std::sync::OnceLock<Value> = std::sync::OnceLock::new();
+        static JOB: std::sync::OnceLock<Value> = std::sync::OnceLock::new();
         static PROJECT: std::sync::OnceLock<Value> = std::sync::OnceLock::new();
         let read = |text: &str| serde_json::from_str(text).unwrap_or(Value::Null);
         match self {
             Schema::Machine => MACHINE.get_or_init(|| read(&gr_machine::json_schema())),
+            Schema::Job => JOB.get_or_init(|| read(&gr_machine::job_schema())),
             Schema::Project => PROJECT.get_or_init(|| read(include_str!("../../../../spec/config/gcc-robot.schema.json"))),
         }
     }

@@ -32,15 +32,7 @@ impl Check {
                 *slot = Some(if j.kind == JointKind::Revolute { v.to_radians() } else { v });
             }
         }
-        if let Some(g) = table.get("grade").filter(|g| !g.number().is_some_and(|v| (1.0..=18.0).contains(&v))) {
-            self.value(&g.span, "ISO 286-1 has the grades 1 to 18");
-        }
         let tolerances = self.by_parameter(table, "tolerance", parameters);
-        for item in table.get("parameter").map_or(&[][..], Node::list) {
-            if item.value_of("tolerance").is_some_and(|v| v < 0.0) {
-                self.value(&item.span, "a tolerance is a plus-or-minus value: not below zero");
-            }
-        }
         Accuracy {
             joints,
             grade: table.value_of("grade").map(|v| v as u8),
@@ -99,11 +91,7 @@ impl Check {
             return None;
         };
         if form == "stiffness" {
-            let k = m.value_of(form)?;
-            if !(k > 0.0) {
-                self.value(&m.span, "a stiffness is above zero");
-            }
-            return Some(Spring::Constant(k));
+            return Some(Spring::Constant(m.value_of(form)?));
         }
         let (Some(modulus), Some(outer)) = (modulus.filter(|e| *e > 0.0), m.value_of("outer")) else {
             self.value(&m.span, "a bar or screw needs `outer`, and `modulus` in `[stiffness]`");
@@ -116,14 +104,7 @@ impl Check {
         }
         let ea = modulus * std::f64::consts::PI / 4.0 * (outer * outer - inner * inner);
         Some(match form {
-            "length" => {
-                let length = m.value_of(form)?;
-                if !(length > 0.0) {
-                    self.value(&m.span, "a length is above zero");
-                    return None;
-                }
-                Spring::Bar(ea, length)
-            }
+            "length" => Spring::Bar(ea, m.value_of(form)?),
             "shorter_by" => Spring::Screw(ea, m.value_of(form)?),
             _ => {
                 let [low, high] = m.array::<2>(form)?;

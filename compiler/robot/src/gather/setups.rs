@@ -1,0 +1,131 @@
+//! Setups of a job: where the part is clamped anew, and whether the tool may come to it there. A new clamping begins with
+//! a retract, a stop for the operator and a rapid from above, so the program must begin the setup at a rapid to a
+//! height above the work.
+
+use gr_machine::Kind;
+use gr_machine::math::{Frame, dot, norm, rotate, scale, sub};
+use gr_text::code;
+
+use super::{Clamped, Gather, Item, Move};
+use crate::Action;
+
+/// A height counts as another from here on, mm.
+const HIGHER: f64 = 1e-6;
+
+impl Gather<'_> {
+    /// Which setup of the job holds here.
+    pub(super) fn setup(&self) -> Option<usize> {
+        let setups = &self.options.setups;
+        let named = self.workingstep.as_ref().and_then(|w| setups.iter().position(|s| s.workingsteps.contains(w)));
+        named.or_else(|| setups.iter().rposition(|s| s.from_line.is_some_and(|l| l <= self.main_line)))
+    }
+
+    fn setup_name(&self, setup: Option<usize>) -> String {
+        setup.map_or_else(|| "as in the machine file".to_string(), |i| self.options.setups[i].name.clone())
+    }
+
+    /// The operator clamps the part anew.
+    pub(super) fn clamp(&mut self, setup: Option<usize>) {
+        let first = self.clamped.is_none() && !self.out.items.iter().any(|i| matches!(i, Item::Move(_)));
+        self.comes_back(setup);
+        self.clamped = setup;
+        self.begun.extend(setup);
+        if first {
+            self.first_setup = setup;
+            return;
+        }
+        let begun = Clamped { item: self.out.items.len(), setup, source: self.source, cutting: self.cutting };
+        self.clampings.push(begun);
+        self.retract();
+        let name = self.setup_name(setup);
+        self.act(Action::Message(format!("setup {name}")));
+        self.act(Action::Pause { optional: false });
+        (self.at, self.at_change) = (None, None);
+        self.anew = true;
+    }
+
+    /// Setups that begin at lines follow each other; a loop would lead back.
+    fn comes_back(&mut self, setup: Option<usize>) {
+        let line = |i: Option<usize>| i.and_then(|i| self.options.setups[i].from_line);
+        let by_line = |i: Option<usize>| i.is_none_or(|i| self.options.setups[i].workingsteps.is_empty());
+        let back = line(setup) < line(self.clamped) && by_line(setup) && by_line(self.clamped);
+        if back {
+            let why = format!("the program comes back here from setup `{}`, as in a loop", self.setup_name(self.clamped));
+            self.findings.say(code::JOB_BEGINS_IN_WORK, Some(self.source), &[self.setup_name(setup), why]);
+        }
+    }
+
+    /// Where and how high the tool point of a move is in the part: the height is measured along the tool.
+    fn height(&self, part: &Frame, m: &Move) -> ([f64; 3], f64) {
+        let frame = part.inverse().then(&self.out.frames[usize::from(m.frame)].frame);
+        let axis = rotate(&frame.turn, self.out.turns[m.turn as usize].map(|row| row[2]));
+        let up = scale(axis, if self.machine.kind == Kind::Robot { -1.0 } else { 1.0 });
+        (up, dot(up, frame.apply(m.position)))
+    }
+
+    fn part(&self, setup: Option<usize>) -> Frame {
+        setup.map_or_else(|| self.machine.cell.part_in_base(), |i| self.options.setups[i].part)
+    }
+
+    /// The highest ends of cuts, by the side they are made from. A way straight up is no cut.
+    fn tops(&self) -> Vec<([f64; 3], f64)> {
+        let mut tops: Vec<([f64; 3], f64)> = Vec::new();
+        let mut due = self.clampings.iter().peekable();
+        let mut part = self.part(self.first_setup);
+        let mut before: Option<[f64; 3]> = None;
+        for (i, item) in self.out.items.iter().enumerate() {
+            while let Some(c) = due.next_if(|c| c.item <= i) {
+                part = self.part(c.setup);
+                before = None;
+            }
+            let Item::Move(m) = item else { continue };
+            let (up, top) = self.height(&part, m);
+            let place = part.inverse().apply(self.base(m.frame, m.position, m.turn).position);
+            let way = before.replace(place).map(|b| sub(place, b));
+            let rises = way.is_some_and(|w| norm(w) > 0.0 && dot(w, up) >= norm(w) * (1.0 - 1e-9));
+            if m.rapid || rises {
+                continue;
+            }
+            match tops.iter_mut().find(|(u, _)| norm(sub(*u, up)) < 1e-3) {
+                Some((_, highest)) => *highest = highest.max(top),
+                None => tops.push((up, top)),
+            }
+        }
+        tops
+    }
+
+    /// Every setup must be begun, and from a safe place.
+    pub(super) fn setups_begin_safely(&mut self) {
+        for (i, s) in self.options.setups.iter().enumerate() {
+            if !self.begun.contains(&i) && !self.findings.bad() {
+                let what = format!("setup `{}` never begins: the program makes no move there", s.name);
+                self.findings.say(code::JOB_BAD_VALUE, Some(s.place), &[what]);
+            }
+        }
+        if self.clampings.is_empty() {
+            return;
+        }
+        let tops = self.tops();
+        for c in std::mem::take(&mut self.clampings) {
+            let own = |i: &Item| if let Item::Move(m) = i { (!m.ours).then_some(*m) } else { None };
+            // What comes before the stop is the old setup's.
+            let after = self.out.items[c.item..].iter().skip_while(|i| !matches!(i, Item::Do(s) if matches!(s.action, Action::Pause { .. })));
+            let Some(m) = after.filter_map(own).next() else { continue };
+            let name = self.setup_name(c.setup);
+            let (up, height) = self.height(&self.part(c.setup), &m);
+            let top = tops.iter().filter(|(u, _)| norm(sub(*u, up)) < 1e-3).map(|(_, t)| *t).reduce(f64::max);
+            let last = self.out.items[..c.item].iter().rev().filter_map(own).next();
+            let why = match top {
+                _ if !self.comes_from_above() && last.is_some_and(|m| !m.rapid) => {
+                    "the setup before it ends with a cut, and without an approach height the tool is not lifted".to_string()
+                }
+                _ if c.cutting => "its first move is a cut".to_string(),
+                Some(top) if height <= top + HIGHER => {
+                    format!("its first rapid ends at a height of {height:.3} mm along the tool, and cuts are made up to {top:.3} mm")
+                }
+                _ => continue,
+            };
+            self.findings.say(code::JOB_BEGINS_IN_WORK, Some(c.source), &[name, why]);
+        }
+    }
+}
