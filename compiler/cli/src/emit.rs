@@ -368,6 +368,12 @@ fn of_motion(mut motion: Motion, unit: &Unit, goal: &Goal<'_>) -> Result<Built, 
     if motion.found.iter().any(|d| d.severity == gr_text::Severity::Error) {
         return Ok(built(motion, Vec::new(), Vec::new()));
     }
+    if let Some(machine) = goal.machine {
+        let found = crate::robot::missing_axes(&motion.program, machine, &texts(&motion));
+        if !found.is_empty() {
+            return Ok(built(motion, Vec::new(), found));
+        }
+    }
     if let Err(found) = crate::robot::take_job(&mut motion, goal) {
         return Ok(built(motion, Vec::new(), found));
     }

@@ -139,7 +139,7 @@ pub fn motion(unit: &Unit, machine: Option<&gr_machine::Machine>) -> Result<(Mot
     }
     if unit.setup.dialect.family == Family::Ufmg2008 {
         let checked = unit.check()?;
-        return Ok((ufmg(unit, machine), checked));
+        return Ok((ufmg(&unit.name(), &unit.text, unit.setup.dialect, machine), checked));
     }
     let motion = gr_driver::lower(&unit.name(), unit.text.clone(), &unit.setup, Some(&unit.rules()));
     let checked = if motion.clean { unit.told(Checked::nothing()) } else { unit.check()? };
@@ -159,15 +159,23 @@ fn plain(motion: gr_driver::Motion) -> Motion {
     Motion { program: motion.program, sources, subs: motion.subs, found: Vec::new(), plan: None, setups: Vec::new() }
 }
 
+/// Motion of a program for a machine, in whatever language it is.
+pub fn motion_for(name: &str, text: &str, setup: &Setup, machine: &gr_machine::Machine) -> Motion {
+    if setup.dialect.family == Family::Ufmg2008 {
+        return ufmg(name, text, setup.dialect, Some(machine));
+    }
+    motion_of(name, text.to_string(), setup)
+}
+
 /// The UFMG 2008 language has commands of its own and no interpreter state.
-fn ufmg(unit: &Unit, machine: Option<&gr_machine::Machine>) -> Motion {
-    let name = unit.name();
-    let file = gr_driver::scan_file(&name, &unit.text, unit.setup.dialect);
+fn ufmg(name: &str, text: &str, dialect: &'static gr_spec::Dialect, machine: Option<&gr_machine::Machine>) -> Motion {
+    let text: Text = text.into();
+    let file = gr_driver::scan_file(name, &text, dialect);
     let (commands, mut found) = gr_backends::joint::language::read(FileId(0), &file);
     let builtin = gr_machine::builtin("ufmg/plano-3r").expect("the library has it");
-    let (program, more) = gr_backends::joint::ufmg::lower(FileId(0), &name, &commands, machine.unwrap_or(&builtin));
+    let (program, more) = gr_backends::joint::ufmg::lower(FileId(0), name, &commands, machine.unwrap_or(&builtin));
     found.extend(more);
     let mut sources = Sources::default();
-    sources.add(name, unit.text.clone());
+    sources.add(name, text);
     Motion { program, sources, subs: Vec::new(), found, plan: None, setups: Vec::new() }
 }

@@ -1,5 +1,7 @@
 //! Programs for robots: planned for a machine, written in its maker's language, checked, verified.
 
+use std::path::Path;
+
 use clap::Args;
 use gr_accuracy::compensate::{self, Correction};
 use gr_ir::Sources;
@@ -152,7 +154,9 @@ pub fn build(motion: &Motion, goal: &Goal<'_>, texts: &dyn Sources, name: &str) 
     let source = |n: &Option<u32>| planned.program.steps.get((*n)? as usize)?.source;
     let artifact = |f: gr_vendors::OutputFile| {
         let lines = crate::emit::main_lines(&motion.program, f.steps.iter().map(source));
-        Artifact { name: several.then_some(f.name), lines, ..Artifact::new("", f.bytes) }
+        // A program alone has the name of its file, unless the language takes no such name.
+        let own = Path::new(&f.name).file_stem().is_some_and(|s| !s.to_string_lossy().to_uppercase().starts_with(&name.to_uppercase()));
+        Artifact { name: (several || own).then_some(f.name), lines, ..Artifact::new("", f.bytes) }
     };
     let mut artifacts: Vec<Artifact> = output.files.into_iter().map(artifact).collect();
     if let Some(c) = corrected {
@@ -307,14 +311,69 @@ fn short(v: f64) -> String {
     number(v, 1)
 }
 
-/// Adds to the findings of a program what the robot has to say, when the program itself is good.
+const LETTERS: &str = "XYZABCUVW";
+
+/// Axes that a machine tool has; none for a robot, whose joints are not axes of the program.
+fn axes(machine: &Machine) -> Option<[bool; 9]> {
+    if machine.kind == Kind::Robot {
+        return None;
+    }
+    let mut has = [false; 9];
+    for j in &machine.joints {
+        let letter = j.word.or_else(|| j.name.chars().next())?.to_ascii_uppercase();
+        has[LETTERS.find(letter)?] = true;
+    }
+    Some(has)
+}
+
+/// The first move of each axis that the machine doesn't have.
+pub fn missing_axes(program: &gr_ir::Program, machine: &Machine, texts: &dyn Sources) -> Vec<Diagnostic> {
+    let Some(mut has) = axes(machine).filter(|has| has.contains(&false)) else { return Vec::new() };
+    let mut found = Vec::new();
+    let mut cursor = program.cursor();
+    while let Some(view) = cursor.next() {
+        if !view.op.moves() {
+            continue;
+        }
+        for (i, letter) in LETTERS.chars().enumerate() {
+            if view.start.axes[i] != view.end.axes[i] && !std::mem::replace(&mut has[i], true) {
+                let (file, span) = texts.place(view.source);
+                found.push(Diagnostic::new(gr_text::code::MACHINE_NO_AXIS, file, span, &[letter.to_string(), machine.id.clone()]));
+            }
+        }
+    }
+    found
+}
+
+/// Whether a machine has anything to say about a program beside what its limits say.
+fn has_a_say(machine: &Machine) -> bool {
+    machine.kind == Kind::Robot || axes(machine).is_some_and(|has| has.contains(&false))
+}
+
+/// What any machine has to say about a program: a robot that is planned, the planar arm point by point, a machine tool
+/// about its axes.
+pub fn opinion(motion: &Motion, machine: &Machine) -> Vec<Diagnostic> {
+    let texts = crate::emit::texts(motion);
+    if machine.kind != Kind::Robot {
+        return missing_axes(&motion.program, machine, &texts);
+    }
+    if !matches!(machine.chain, gr_machine::Chain::Planar3r(_)) {
+        return check(motion, machine, &texts);
+    }
+    let place = |s: gr_ir::Source| texts.place(s);
+    let found = gr_backends::joint::compile(&motion.program, machine, &gr_backends::joint::Options::default(), &place).err().unwrap_or_default();
+    // What joint G-code can't say is no matter of the arm.
+    found.into_iter().filter(|d| d.code.def().code.starts_with("E05")).collect()
+}
+
+/// Adds to the findings of a program what the machine has to say, when the program itself is good.
 pub fn ask(name: &str, text: &str, machine: &Machine, setup: &gr_interp::Setup, checked: &mut Checked) {
     let bad = checked.found.iter().any(|d| d.severity == gr_text::Severity::Error);
-    if bad || !gr_robot::along::is_planned(machine) {
+    if bad || !has_a_say(machine) {
         return;
     }
-    let motion = crate::pipeline::motion_of(name, text.to_string(), setup);
-    let found = check(&motion, machine, &crate::emit::texts(&motion));
+    let motion = crate::pipeline::motion_for(name, text, setup, machine);
+    let found = opinion(&motion, machine);
     if checked.sources.get(gr_text::FileId(0)).is_none() {
         checked.sources.add(name.to_string(), text.to_string());
     }

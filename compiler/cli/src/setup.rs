@@ -123,7 +123,11 @@ pub fn assembled(args: &SetupArgs, lints: &LintArgs, from: &Path, sources: &mut 
         limits(machine, &mut setup);
     }
     reader.remaps(&setup);
-    let lints = reader.levels(lints, project.as_ref());
+    let mut lints = reader.levels(lints, project.as_ref());
+    if machine.as_ref().is_some_and(|m| m.kind == gr_machine::Kind::Robot) {
+        // The tool point of a robot is the machine file's, with G43 and without; a tool it doesn't have is an error there.
+        lints.allow.push(code::TOOL_NO_LENGTH_OFFSET);
+    }
     let step_units = args.step_units.or(section.and_then(|s| s.step_units)).map(gr_planner::Units::from);
     let step_overlap = args.step_overlap.or(section.and_then(|s| s.step_overlap)).map(gr_planner::Overlap::from);
     let stock = section.and_then(|s| s.stock).map(|[a, b]| [std::array::from_fn(|i| a[i].min(b[i])), std::array::from_fn(|i| a[i].max(b[i]))]);

@@ -296,3 +296,83 @@ fn no_output_stays_on() {
     let at = |what: &str| all.find(what).unwrap_or_else(|| panic!("{what}: {all}"));
     assert!(at("SetDO doSpindleCw,0") < at("SetDO doSpindleCcw,1"), "one way is off before the other is on: {all}");
 }
+
+/// Words of axes that a machine tool lacks are errors at their line, for every target and in `check`.
+#[test]
+fn axes_that_a_machine_lacks() {
+    let folder = tempfile::tempdir().unwrap();
+    let source = folder.path().join("a.ngc");
+    let source = source.to_str().unwrap();
+    let mut all = String::new();
+    let cases = [
+        ("generic/mill3", "G21 G90\nG0 X10 Y10 Z-20\nG1 A10 F300\nA20 U3\nM2\n"),
+        ("unb/router", "G21 G90\nG0 X10 Y10 Z-20 C5\nM2\n"),
+        ("generic/mill5-ac-table", "G21 G90\nG0 X10 Y10 Z20 A5 C0\nG1 B10 F300\nM2\n"),
+    ];
+    for (machine, text_in) in cases {
+        std::fs::write(source, text_in).unwrap();
+        for args in [&["check", source][..], &["build", source, "--target", "rs274ngc"], &["build", source, "--target", "joint-gcode"]] {
+            let made = run(&[args, &["--machine", machine, "--message-format", "short"]].concat());
+            let told = text(&made.stderr) + &text(&made.stdout);
+            assert_eq!(made.status.code(), Some(1), "{told}");
+            let own = told.lines().filter(|l| l.contains("E0553")).map(|l| l.rsplit('/').take(2).collect::<Vec<_>>().into_iter().rev().collect::<Vec<_>>().join("/") + "\n");
+            all += &format!("{machine} {}:\n{}", args[0], own.collect::<String>());
+        }
+    }
+    insta::assert_snapshot!("axes_that_a_machine_lacks", all);
+    std::fs::write(source, "G21 G90\nG0 X10 Y10 Z-20 A0\nG1 X20 F300\nM2\n").unwrap();
+    assert!(run(&["check", source, "--machine", "generic/mill3"]).status.success());
+}
+
+/// The planar arm and templates are checked and verified like the others; a tool that is missing is told once; G43 means
+/// nothing to a robot.
+#[test]
+fn every_arm_is_checked() {
+    let folder = tempfile::tempdir().unwrap();
+    let source = folder.path().join("a.ngc");
+    let source = source.to_str().unwrap();
+    let told = |command: &str, machine: &str| {
+        let made = run(&[command, source, "--machine", machine, "--message-format", "short"]);
+        (made.status.code(), text(&made.stderr) + &text(&made.stdout))
+    };
+    std::fs::write(source, "G21 G90\nG0 X150 Y50\nG1 X-150 Y50 F600\nG1 X-400\nM2\n").unwrap();
+    for command in ["check", "verify"] {
+        let (code, found) = told(command, "ufmg/plano-3r");
+        assert!(code == Some(1) && found.contains(":4:") && found.contains("E0504"), "{found}");
+        let (code, found) = told(command, "comau/tricept806");
+        assert!(code == Some(1) && found.contains("E0534"), "{found}");
+    }
+    std::fs::write(source, "G21 G90\nT1 M6\nG0 X0 Y0 Z20\nG1 Z0 F500\nX20\nG0 Z20\nM30\n").unwrap();
+    let (code, found) = told("check", "abb/irb2400");
+    assert_eq!((code, found.matches("E0521").count(), found.matches("E0281").count()), (Some(1), 1, 0), "{found}");
+    let (_, found) = told("check", CELL);
+    assert!(!found.contains("E0281"), "{found}");
+}
+
+/// A file has the name of the program in it; programs of one build have different names on the controller.
+#[test]
+fn files_are_named_as_their_programs() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let program = "G21 G90\nT1 M6\nG0 X0 Y0 Z20\nG1 Z0 F500\nX20\nG0 Z20\nM30\n";
+    for name in ["1 prog.ngc", "a b.ngc", "a_b.ngc", "bracket_left.ngc", "bracket_left2.ngc"] {
+        std::fs::write(path(name), program).unwrap();
+    }
+    let build = |names: &[&str], target: &str| {
+        let out = format!("{}/", path(target).display());
+        std::fs::create_dir_all(&out).unwrap();
+        let files: Vec<String> = names.iter().map(|n| path(n).display().to_string()).collect();
+        let mut args = vec!["build", "--machine", CELL, "--target", target, "-o", &out];
+        args.extend(files.iter().map(String::as_str));
+        let made = run(&args);
+        let mut found: Vec<String> = std::fs::read_dir(&out).unwrap().map(|f| f.unwrap().file_name().to_string_lossy().into_owned()).collect();
+        found.sort();
+        (made.status.success(), found, text(&made.stderr))
+    };
+    let (good, files, told) = build(&["1 prog.ngc"], "fanuc-ls");
+    assert!(good && files == ["P1_PROG.LS"], "{files:?} {told}");
+    let (good, files, told) = build(&["bracket_left.ngc", "bracket_left2.ngc"], "inform");
+    assert!(good && files.len() == 2 && files.iter().all(|f| f.starts_with("BRAC") && f.len() == 12), "{files:?} {told}");
+    let (good, files, told) = build(&["a b.ngc", "a_b.ngc"], "krl");
+    assert!(!good && files.is_empty() && told.contains("E0639"), "{files:?} {told}");
+}

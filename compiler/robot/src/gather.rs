@@ -437,7 +437,7 @@ impl<'a> Gather<'a> {
             }
             None if self.machine.kind != Kind::Robot => (format!("tool{number}"), nose, None),
             None => {
-                self.findings.say(code::ROBOT_UNKNOWN_TOOL, Some(self.source), &[number.to_string()]);
+                self.findings.once_each(code::ROBOT_UNKNOWN_TOOL, Some(self.source), &[number.to_string()]);
                 return None;
             }
         };

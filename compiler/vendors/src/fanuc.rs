@@ -31,7 +31,7 @@ impl Language for Fanuc {
 
     fn emit(&self, program: &RobotProgram, sources: &dyn Sources, options: &Options) -> Output {
         let mut names = Names::new(Rule { longest: 8, reserved: &[], upper: true });
-        let name = names.give(&program.name, "P");
+        let name = names.program(&program.name, "P");
         let limits = &program.machine.cell.controller;
         let mut w = Writer {
             parts: Parts::new(limits.lines.unwrap_or(LINES), limits.points, limits.bytes, "\r\n"),
@@ -73,7 +73,7 @@ impl Writer {
         let mut main = String::new();
         let mut count = 0;
         for (i, (text, (points, lines))) in parts.iter().zip(&self.closed).enumerate() {
-            let inner = names.fresh(&format!("{}_{:03}", &name[..name.len().min(4)], i + 1));
+            let inner = names.part(name, i + 1);
             count += 1;
             let _ = write!(main, "{count:4}:  CALL {inner}    ;\r\n");
             files.push(OutputFile::new(format!("{inner}.LS"), whole(&inner, text, points, *lines)));

@@ -26,7 +26,7 @@ impl Language for Inform {
 
     fn emit(&self, program: &RobotProgram, sources: &dyn Sources, options: &Options) -> Output {
         let mut names = Names::new(Rule { longest: 8, reserved: &[], upper: true });
-        let name = names.give(&program.name, "P");
+        let name = names.program(&program.name, "P");
         let limits = &program.machine.cell.controller;
         let mut w = Writer {
             parts: Parts::new(limits.lines.unwrap_or(LINES).saturating_sub(4), limits.points, limits.bytes, "\r\n"),
@@ -70,7 +70,7 @@ impl Writer {
         }
         let (mut files, mut main) = (Vec::new(), String::new());
         for (i, (text, closed)) in parts.iter().zip(&self.closed).enumerate() {
-            let inner = names.fresh(&format!("{}_{:03}", &name[..name.len().min(4)], i + 1));
+            let inner = names.part(name, i + 1);
             let _ = write!(main, "CALL JOB:{inner}\r\n");
             files.push(OutputFile::new(format!("{inner}.JBI"), whole(&inner, text, closed)));
         }

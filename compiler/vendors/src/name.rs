@@ -37,6 +37,29 @@ impl Names {
         name
     }
 
+    /// The name of a program: one that is too long ends in three letters and digits made from the whole of it, so that
+    /// programs that only differ further on keep different names.
+    pub(crate) fn program(&mut self, wanted: &str, prefix: &str) -> String {
+        let more = if wanted.starts_with(|c: char| c.is_ascii_alphabetic()) { 0 } else { prefix.len() };
+        if wanted.chars().count() + more <= self.rule.longest {
+            return self.give(wanted, prefix);
+        }
+        let start: String = wanted.chars().take(self.rule.longest.saturating_sub(3 + more)).collect();
+        let name = self.find(&format!("{start}{}", digest(wanted)), prefix);
+        self.changed.push((wanted.to_string(), name.clone()));
+        name
+    }
+
+    /// The name of a part of a program, from the program's own name.
+    pub(crate) fn part(&mut self, program: &str, number: usize) -> String {
+        let tail = format!("_{number:03}");
+        if program.len() + tail.len() <= self.rule.longest {
+            return self.fresh(&format!("{program}{tail}"));
+        }
+        let start = &program[..self.rule.longest.saturating_sub(6).min(program.len())];
+        self.fresh(&format!("{start}{}{number:03}", digest(program)))
+    }
+
     /// A name for something of our own.
     pub(crate) fn fresh(&mut self, wanted: &str) -> String {
         self.find(wanted, "x")
@@ -77,6 +100,13 @@ impl Names {
     }
 }
 
+/// Three capital letters and digits that depend on every character of a name (FNV-1a, 32 bits).
+fn digest(name: &str) -> String {
+    const DIGITS: &[u8; 36] = b"0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZ";
+    let hash = name.to_ascii_uppercase().bytes().fold(0x811c_9dc5_u32, |h, b| (h ^ u32::from(b)).wrapping_mul(0x0100_0193));
+    (0..3).map(|i| char::from(DIGITS[(hash / 36u32.pow(i) % 36) as usize])).collect()
+}
+
 /// `V100`, `Z50`, `P12` …: the data that controllers come with are called so.
 fn predefined(upper: &str) -> bool {
     let mut rest = upper.chars();
@@ -105,6 +135,16 @@ mod tests {
         assert_eq!(n.give("v100", "t"), "v100_2");
         assert_eq!(n.give("", "t"), "t");
         assert_eq!(number("OT#(5)"), Some(5));
+        let rule = Rule { longest: 8, reserved: &[], upper: true };
+        let program = |wanted: &str| Names::new(rule).program(wanted, "P");
+        assert_eq!((program("part").as_str(), program("motion_a").as_str(), program("1 prog").as_str()), ("PART", "MOTION_A", "P1_PROG"));
+        let long = [program("bracket_left_side"), program("bracket_left_side2"), program("bracket-left_side")];
+        assert!(long.iter().all(|n| n.len() == 8 && n.starts_with("BRAC")) && long[0] != long[1] && long[0] != long[2], "{long:?}");
+        let part = |program: &str, n: usize| Names::new(rule).part(program, n);
+        assert_eq!(part("PART", 1), "PART_001");
+        let parts = [part("MOTION_A", 1), part("MOTION_B", 1), part("MOTION_A", 2), part("MOTION_A", 1000)];
+        assert!(parts.iter().all(|n| n.len() <= 8 && n.starts_with("MO")), "{parts:?}");
+        assert!(parts[0] != parts[1] && parts[0] != parts[2] && parts[2] != parts[3], "{parts:?}");
         assert_eq!(number("doSpindle"), None);
         assert_eq!(number("a1b2"), None);
         assert!(plain("doSpindle") && !plain("do spindle") && !plain("x;y"));

@@ -83,6 +83,8 @@ struct Round<'a> {
     /// Results that are written beside their goals already.
     written: Vec<(PathBuf, Pending)>,
     rules: String,
+    /// Folder and name of robot programs made so far, and what they are made of.
+    names: BTreeMap<(PathBuf, String), PathBuf>,
 }
 
 impl<'a> Round<'a> {
@@ -99,6 +101,7 @@ impl<'a> Round<'a> {
             told: Vec::new(),
             written: Vec::new(),
             rules: String::new(),
+            names: BTreeMap::new(),
         }
     }
 
@@ -296,6 +299,9 @@ impl<'a> Round<'a> {
         if built.written.is_some() {
             goals.insert(0, goal.clone());
         }
+        if crate::robot::is_language(job.target.id) && !self.names_free(&goals, &job.source) {
+            return self.fail(Exit::Findings);
+        }
         let taken = |g: &&PathBuf| self.args.depfile.as_ref() == Some(*g) || self.results.iter().map(|(p, _)| p).chain(self.written.iter().map(|(p, _)| p)).any(|p| p == *g);
         if let Some(twice) = goals.iter().find(taken) {
             eprintln!("two results would both be written to {}: give them different names or folders", twice.display());
@@ -312,6 +318,26 @@ impl<'a> Round<'a> {
         for artifact in built.artifacts {
             self.results.push((path_of(&artifact), artifact.bytes));
         }
+    }
+
+    /// Names of programs on a controller: capitals don't tell them apart.
+    fn names_free(&mut self, goals: &[PathBuf], source: &Path) -> bool {
+        let mut free = true;
+        for goal in goals {
+            let name = goal.file_name().map(|n| n.to_string_lossy().to_uppercase()).unwrap_or_default();
+            let key = (goal.parent().map(Path::to_path_buf).unwrap_or_default(), name);
+            match self.names.get(&key) {
+                Some(other) if other != source => {
+                    let args = [stem(goal), other.display().to_string(), source.display().to_string()];
+                    complain(&mut self.renderer, &mut self.sources, &source.display().to_string(), code::VENDOR_NAME_TAKEN, &args);
+                    free = false;
+                }
+                _ => {
+                    self.names.insert(key, source.to_path_buf());
+                }
+            }
+        }
+        free
     }
 
     /// Everything is made: writes it.

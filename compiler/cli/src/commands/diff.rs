@@ -135,7 +135,12 @@ pub fn verify(global: &Global, args: &VerifyArgs) -> Exit {
     }
     let goal = Goal { target: "rs274ngc", options: &args.options, machine: None, from_line: None, file: None };
     let made = load(&args.file, &station).and_then(|unit| {
-        let a = motion(&unit, None)?.0;
+        let a = motion(&unit, station.machine.as_ref())?.0;
+        // An arm that is not planned is asked about every point all the same.
+        let found = station.machine.as_ref().map_or_else(Vec::new, |m| crate::robot::opinion(&a, m));
+        if found.iter().any(|d| d.severity == gr_text::Severity::Error) {
+            return Err(super::check::Checked { sources: a.sources, found, ..super::check::Checked::nothing() });
+        }
         Ok((build(&unit, &goal)?, unit, a))
     });
     let (built, unit, a) = match made {
