@@ -280,15 +280,17 @@ pub fn summary(planned: &Planned) -> String {
     let s = &planned.summary;
     let line = |source: Option<gr_ir::Source>| source.map_or(String::new(), |s| format!(" (line {})", s.line + 1));
     let joint = |i: usize| planned.program.machine.joints.get(i).map_or(String::new(), |j| j.name.clone());
+    let accelerates = planned.program.machine.joints.iter().any(|j| j.acceleration.is_some());
     let mut out = format!(
-        "{}: {} cuts ({} arcs), {} rapids; {} at feed, {} rapid, {} waiting, without acceleration\n",
+        "{}: {} cuts ({} arcs), {} rapids; {} at feed, {} rapid, {} waiting, without {}\n",
         planned.program.machine.id,
         s.cuts,
         s.arcs,
         s.rapids,
         duration(s.cut_seconds),
         duration(s.rapid_seconds),
-        duration(s.wait_seconds)
+        duration(s.wait_seconds),
+        if accelerates { "the accelerations of the machine file (`--target setpoints` tells the time with them)" } else { "acceleration" }
     );
     let mut more = Vec::new();
     if let Some((mm, at)) = s.reach_margin {
@@ -391,11 +393,13 @@ pub fn ask(name: &str, text: &str, machine: &Machine, setup: &gr_interp::Setup, 
 
 type Files = Result<Result<Made, Vec<Diagnostic>>, String>;
 
-/// Plans for a controller that knows the words of the program itself.
-fn own_plan(motion: &Motion, goal: &Goal<'_>, texts: &dyn Sources, name: &str) -> Result<Result<(Planned, Option<Corrected>), Vec<Diagnostic>>, String> {
+/// Plans for a controller that knows the words of the program itself. Curves that become lines may take this share of the
+/// tolerance; what is left of it is for the joints between two positions.
+fn own_plan(motion: &Motion, goal: &Goal<'_>, texts: &dyn Sources, name: &str, share: f64) -> Result<Result<(Planned, Option<Corrected>), Vec<Diagnostic>>, String> {
     let machine = machine(goal)?;
-    let options = Options { own_words: true, ..options(motion, goal, name)? };
-    let tolerance = options.tolerance;
+    let all = options(motion, goal, name)?;
+    let tolerance = all.tolerance * share;
+    let options = Options { own_words: true, tolerance, ..all };
     Ok(plan(&motion.program, &machine, texts, &options).and_then(|p| compensated(p, goal, texts, tolerance)))
 }
 
@@ -404,9 +408,10 @@ fn too_many(found: &gr_robot::joints::TooMany, texts: &dyn Sources) -> Diagnosti
     Diagnostic::new(gr_text::code::ROBOT_TOO_MANY_POINTS, file, span, &[found.most.to_string()])
 }
 
-/// Whether joint-gcode goes through the planner: every robot but the planar arm, which has its own way.
+/// Whether joint-gcode goes through the planner: every robot but the planar arm, which has its own way, and mills.
 pub fn plans_joints(goal: &Goal<'_>) -> bool {
-    matches!(goal.options.reference, None | Some(crate::emit::Reference::Usp2009)) && goal.machine.is_some_and(gr_robot::along::is_planned)
+    let planned = |m: &Machine| gr_robot::along::is_planned(m) || m.kind == Kind::Mill;
+    matches!(goal.options.reference, None | Some(crate::emit::Reference::Usp2009)) && goal.machine.is_some_and(planned)
 }
 
 /// Joint positions as LinuxCNC words with inverse time, and both tables.
@@ -416,13 +421,15 @@ pub fn joint_gcode(motion: &Motion, goal: &Goal<'_>, texts: &dyn Sources, name: 
     if o.interval.is_some_and(|t| !(t > 0.0)) {
         return Err("--interval must be above zero".into());
     }
-    let (planned, corrected) = match own_plan(motion, goal, texts, name)? {
+    // Cutting curves into lines, correcting these, moving the joints: together within the tolerance.
+    let (share, rest) = if o.robot.compensate { (1.0 / 3.0, 2.0 / 3.0) } else { (0.5, 1.0) };
+    let (planned, corrected) = match own_plan(motion, goal, texts, name, share)? {
         Ok(planned) => planned,
         Err(found) => return Ok(Err(found)),
     };
     let default = JointOptions::default();
     let choice = JointOptions {
-        tolerance: o.arc_tolerance.unwrap_or(default.tolerance),
+        tolerance: o.arc_tolerance.unwrap_or(default.tolerance) * rest,
         interval: o.interval,
         joint_speed: o.joint_speed.map(f64::to_radians),
         ..default
@@ -456,7 +463,7 @@ pub fn setpoints(motion: &Motion, goal: &Goal<'_>, texts: &dyn Sources, name: &s
     if !(interval > 0.0 && smoothing >= 0.0 && smoothing.is_finite()) {
         return Err("--interval must be above zero, --smoothing zero or more".into());
     }
-    let (planned, corrected) = match own_plan(motion, goal, texts, name)? {
+    let (planned, corrected) = match own_plan(motion, goal, texts, name, 1.0)? {
         Ok(planned) => planned,
         Err(found) => return Ok(Err(found)),
     };
@@ -505,7 +512,7 @@ pub fn verify(unit: &crate::pipeline::Unit, machine: &Machine, args: &crate::opt
         return Err(Checked { sources: motion.sources, found, ..Checked::nothing() });
     }
     let texts = crate::emit::texts(&motion);
-    match own_plan(&motion, &goal, &texts, &name) {
+    match own_plan(&motion, &goal, &texts, &name, 1.0) {
         Err(text) => Ok(Err(text)),
         Ok(Ok((planned, _))) => Ok(Ok(gr_robot::verify::Report::of(&planned))),
         Ok(Err(found)) => {

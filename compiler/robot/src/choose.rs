@@ -9,10 +9,10 @@
 use gr_ir::Source;
 use gr_machine::KinematicsError;
 
+use crate::follow::{Follow, Stuck};
 use crate::gather::{Gathered, Item, Move, Way};
 use crate::path::{Mount, Path, handed_on};
 use crate::solver::{Branches, Joints, Limits, Solver};
-use crate::MAX_JOINTS;
 
 /// Moves `first ..= last` (indices into the items); the first is reached by a joint move.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -52,7 +52,9 @@ pub(crate) struct Node {
 }
 
 struct Track {
+    /// At the start, and now.
     branch: u8,
+    now_in: u8,
     now: Joints,
     start: Joints,
     low: Joints,
@@ -61,10 +63,6 @@ struct Track {
     alive: bool,
 }
 
-/// A joint that changes more than this between two looks is looked at closer, rad (mm count a hundredth).
-const SMALL: f64 = 0.12;
-/// So often a stretch is halved.
-const HALVINGS: u32 = 18;
 /// Turns of a free tool tried first.
 const COARSE: usize = 24;
 /// Looks of the first, rough pass over a chain of a free tool.
@@ -78,6 +76,8 @@ pub(crate) struct Chooser<'a> {
     pub speeds: Joints,
     /// Nodes kept per chain.
     pub kept: usize,
+    /// Where the chain begins, when that is known.
+    pub stands: Option<Joints>,
 }
 
 /// The chains of a program.
@@ -91,21 +91,6 @@ pub(crate) fn chains(items: &[Item]) -> Vec<Chain> {
         }
     }
     out
-}
-
-fn delta(a: &Joints, b: &Joints, turns: &[bool; MAX_JOINTS], count: usize) -> f64 {
-    let each = |i: usize| (a[i] - b[i]).abs() * if turns[i] { 1.0 } else { 0.01 };
-    (0..count).map(each).fold(0.0, f64::max)
-}
-
-/// Whole turns added so that angles lie next to others.
-pub(crate) fn unwrap(q: &mut Joints, near: &Joints, turns: &[bool; MAX_JOINTS], count: usize) {
-    const TURN: f64 = std::f64::consts::TAU;
-    for i in 0..count {
-        if turns[i] && (near[i] - q[i]).abs() > std::f64::consts::PI {
-            q[i] += TURN * libm::round((near[i] - q[i]) / TURN);
-        }
-    }
 }
 
 impl Chooser<'_> {
@@ -207,7 +192,7 @@ impl Chooser<'_> {
             .map(|branch| {
                 let q = all.joints[usize::from(branch)];
                 let close = self.solver.closeness(&q).0;
-                Track { branch, now: q, start: q, low: q, high: q, close, alive: true }
+                Track { branch, now_in: branch, now: q, start: q, low: q, high: q, close, alive: true }
             })
             .collect();
         let mut fault = None;
@@ -223,7 +208,7 @@ impl Chooser<'_> {
                 break;
             }
             let Item::Move(m) = &self.g.items[i] else { continue };
-            let path = Path::new(self.g, &handed_on(self.g, from, before, m, spin), m);
+            let path = Path::new(self.g, self.solver, &handed_on(self.g, from, before, m, spin), m);
             let mount = Mount::new(self.g, m, spin);
             let looks = path.looks();
             for k in 1..=looks {
@@ -252,26 +237,13 @@ impl Chooser<'_> {
 
     /// Takes a track to the next look.
     fn advance(&self, t: &mut Track, all: &Branches, path: &Path, mount: &Mount, a: f64, b: f64) -> Option<Why> {
-        let next = if self.solver.searches() {
-            match self.solver.near(&mount.flange(&path.at(b)), &t.now) {
-                Ok(q) => q,
-                Err(e) => return Some(Why::Reach(e)),
-            }
-        } else {
-            if !all.has(t.branch) {
-                // Two configurations that meet are told under one number.
-                if all.good & all.singular == 0 {
-                    return Some(Why::Jump);
-                }
-            }
-            let number = if all.has(t.branch) { t.branch } else { (all.good & all.singular).trailing_zeros() as u8 };
-            all.joints[usize::from(number)]
+        let follow = Follow { solver: self.solver, limits: self.limits, path, mount };
+        let (q, now_in) = match follow.step(all, (&t.now, t.now_in), (a, b)) {
+            Ok(next) => next,
+            Err(Stuck::Reach(e)) => return Some(Why::Reach(e)),
+            Err(Stuck::Jump) => return Some(Why::Jump),
         };
-        let mut q = next;
-        unwrap(&mut q, &t.now, &self.limits.turns, self.solver.count);
-        if delta(&q, &t.now, &self.limits.turns, self.solver.count) > SMALL && !self.smooth(t.branch, &t.now, &q, path, mount, (a, b), HALVINGS) {
-            return Some(Why::Jump);
-        }
+        t.now_in = now_in;
         t.now = q;
         for i in 0..self.solver.count {
             t.low[i] = t.low[i].min(q[i]);
@@ -281,42 +253,16 @@ impl Chooser<'_> {
         self.outside(t, &q)
     }
 
-    /// Whether a great change of joints is made of small ones; between `p` at the first share and `q` at the last.
-    #[allow(clippy::too_many_arguments)]
-    fn smooth(&self, branch: u8, p: &Joints, q: &Joints, path: &Path, mount: &Mount, (a, b): (f64, f64), left: u32) -> bool {
-        if delta(p, q, &self.limits.turns, self.solver.count) <= SMALL {
-            return true;
-        }
-        if left == 0 {
-            return false;
-        }
-        let middle = (a + b) / 2.0;
-        let flange = mount.flange(&path.at(middle));
-        let mut r = if self.solver.searches() {
-            match self.solver.near(&flange, p) {
-                Ok(r) => r,
-                Err(_) => return false,
-            }
-        } else {
-            let mut all = Branches::NONE;
-            if self.solver.all(&flange, &mut all).is_err() || !all.has(branch) {
-                return false;
-            }
-            all.joints[usize::from(branch)]
-        };
-        unwrap(&mut r, p, &self.limits.turns, self.solver.count);
-        let mut end = *q;
-        unwrap(&mut end, &r, &self.limits.turns, self.solver.count);
-        // The end must be reached by the same turns.
-        delta(&end, q, &self.limits.turns, self.solver.count) < 1e-9
-            && self.smooth(branch, p, &r, path, mount, (a, middle), left - 1)
-            && self.smooth(branch, &r, q, path, mount, (middle, b), left - 1)
-    }
-
     fn outside(&self, t: &Track, q: &Joints) -> Option<Why> {
         for i in 0..self.solver.count {
-            if self.limits.shifts(i, t.low[i], t.high[i]).is_none() {
-                let value = q[i];
+            // Whole turns from where it stands: none are free.
+            let turns = self.stands.map(|at| std::f64::consts::TAU * libm::round((at[i] - t.start[i]) / std::f64::consts::TAU));
+            let fits = match turns {
+                Some(d) => t.low[i] + d >= self.limits.min[i] && t.high[i] + d <= self.limits.max[i],
+                None => self.limits.shifts(i, t.low[i], t.high[i]).is_some(),
+            };
+            if !fits {
+                let value = q[i] + turns.unwrap_or(0.0);
                 let limit = if value > self.limits.max[i] || value - self.limits.min[i] > self.limits.max[i] - value {
                     self.limits.max[i]
                 } else {
@@ -349,6 +295,10 @@ impl Chooser<'_> {
                 }
             }
             out = next;
+        }
+        let stands = |q: &Joints, at: &Joints| (0..self.solver.count).all(|i| (q[i] - at[i]).abs() < 1e-6);
+        if let Some(at) = self.stands.filter(|at| out.iter().any(|(start, ..)| stands(start, at))) {
+            out.retain(|(start, ..)| stands(start, &at));
         }
         let close = 0.3 / (t.close + 0.05);
         out.into_iter().map(|(start, end, cost)| Node { branch: t.branch, spin, start, end, cost: cost + close }).collect()

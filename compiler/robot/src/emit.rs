@@ -6,11 +6,13 @@ use gr_machine::math::{Frame, M3, quaternion_of};
 use gr_machine::Machine;
 use gr_text::code;
 
-use crate::choose::{Chain, Node, unwrap};
+use crate::choose::{Chain, Node};
+use crate::follow::Follow;
 use crate::gather::{Findings, Gathered, Item, Move, Way};
 use crate::path::{Mount, Path, handed_on};
 use crate::plan::spun;
-use crate::solver::{Branches, Joints, Limits, Solver};
+use crate::solver::{Branches, Joints, Limits, Solver, whole_turns_off};
+use crate::program::{ON_THE_SPOT, turned_on_the_spot};
 use crate::{Action, MAX_JOINTS, RobotProgram, Step, Summary, Target, Zone};
 
 pub(crate) struct Emit<'a> {
@@ -38,6 +40,7 @@ struct Here {
     at: Frame,
     by: Move,
     joints: Joints,
+    branch: u8,
 }
 
 impl<'a> Emit<'a> {
@@ -94,7 +97,8 @@ impl<'a> Emit<'a> {
             }
         }
         let at_home = self.home_target(g, home, frame, tool);
-        if here.is_some() {
+        // A milling program says itself where the machine goes in the end.
+        if here.is_some() && self.machine.kind != gr_machine::Kind::Mill {
             self.summary.rapid_seconds += self.joint_time(&last, home, 1.0);
             let to = self.keep(at_home);
             let speed = self.machine.cell.joint_share();
@@ -110,6 +114,7 @@ impl<'a> Emit<'a> {
             targets: self.targets,
             home: at_home,
             steps: self.steps,
+            curves: std::mem::take(&mut g.curves),
         };
         (program, self.summary)
     }
@@ -145,66 +150,64 @@ impl<'a> Emit<'a> {
             self.summary.rapid_seconds += self.joint_time(last, &joints, m.speed);
             self.summary.rapids += 1;
             self.steps.push(Step { action: Action::Joint { to, speed: m.speed, zone: m.zone }, source: m.source });
-            *here = Some(Here { at: Frame { turn: g.turns[m.turn as usize], position: m.position }, by: *m, joints });
+            *here = Some(Here { at: Frame { turn: g.turns[m.turn as usize], position: m.position }, by: *m, joints, branch: node.branch });
             *last = joints;
             self.look(&joints, m.source);
             return;
         }
         let Some(h) = here else { return };
         h.at = handed_on(g, h.at, &h.by, m, node.spin);
-        let (joints, via) = self.follow(g, m, node, h, findings);
-        let to = self.keep(self.target(m.position, &turn, &joints, node.branch));
+        let ((joints, branch), via) = self.follow(g, m, node, h, findings);
+        let to = self.keep(self.target(m.position, &turn, &joints, branch));
         let action = match m.way {
             Way::Arc(i) => {
                 let a = g.arcs[i as usize];
-                let via = self.keep(self.target(a.via, &turn, &via, node.branch));
+                let via = self.keep(self.target(a.via, &turn, &via.0, via.1));
                 self.summary.arcs += 1;
                 Action::Arc { via, to, center: a.center, normal: a.normal, angle: a.angle, speed: m.speed, zone: m.zone }
             }
             _ => Action::Linear { to, speed: m.speed, zone: m.zone, rapid: m.rapid },
         };
         self.steps.push(Step { action, source: m.source });
-        *h = Here { at: Frame { turn: g.turns[m.turn as usize], position: m.position }, by: *m, joints };
+        *h = Here { at: Frame { turn: g.turns[m.turn as usize], position: m.position }, by: *m, joints, branch };
         *last = joints;
     }
 
     /// Joint values along a move: the end, the middle, and whether any joint is too fast.
-    fn follow(&mut self, g: &Gathered, m: &Move, node: &Node, h: &Here, findings: &mut Findings<'_>) -> (Joints, Joints) {
-        let path = Path::new(g, &h.at, m);
+    fn follow(&mut self, g: &Gathered, m: &Move, node: &Node, h: &Here, findings: &mut Findings<'_>) -> ((Joints, u8), (Joints, u8)) {
+        let path = Path::new(g, self.solver, &h.at, m);
         let mount = Mount::new(g, m, node.spin);
         let looks = path.looks();
         // An even number of looks has one in the middle.
         let looks = if matches!(m.way, Way::Arc(_)) { looks.next_multiple_of(2) } else { looks };
-        let (mut q, mut middle) = (h.joints, h.joints);
+        let (mut q, mut branch) = (h.joints, h.branch);
+        let mut middle = (q, branch);
         let mut all = Branches::NONE;
-        let seconds = if path.length > 0.0 { path.length / m.speed } else { 0.0 };
+        // Change of a joint over its limit, by the share of the way.
         let mut worst = (0.0f64, 0usize);
+        let follow = Follow { solver: self.solver, limits: self.limits, path: &path, mount: &mount };
         for k in 1..=looks {
-            let share = k as f64 / looks as f64;
-            let flange = mount.flange(&path.at(share));
-            let mut next = q;
-            if self.solver.searches() {
-                next = self.solver.near(&flange, &q).unwrap_or(q);
-            } else if self.solver.all(&flange, &mut all).is_ok() {
-                let number = if all.has(node.branch) { node.branch } else { nearest(&all, &q, self.solver.count) };
-                next = all.joints[usize::from(number)];
-            }
-            unwrap(&mut next, &q, &self.limits.turns, self.solver.count);
+            let (a, b) = ((k - 1) as f64 / looks as f64, k as f64 / looks as f64);
+            // The chooser has been here: nothing is out of reach.
+            let _ = self.solver.all(&mount.flange(&path.at(b)), &mut all);
+            let next = follow.step(&all, (&q, branch), (a, b)).unwrap_or((q, branch));
+            let rates = follow.rates((&q, branch), (&next.0, next.1), (a, b));
             for i in 0..self.solver.count {
-                let speed = (next[i] - q[i]).abs() * looks as f64 / seconds;
-                let part = speed / self.speeds[i];
+                let part = rates[i] / self.speeds[i];
                 if part > worst.0 {
                     worst = (part, i);
                 }
             }
-            q = next;
+            (q, branch) = next;
             if 2 * k == looks {
-                middle = q;
+                middle = next;
             }
             self.look(&q, m.source);
         }
+        let on_the_spot = || turned_on_the_spot(self.machine, &h.joints, &q) / m.speed;
+        let seconds = if path.length > ON_THE_SPOT { path.length / m.speed } else { on_the_spot() };
         if !m.rapid && seconds > 0.0 {
-            self.fast(m, worst, findings);
+            self.fast(m, (worst.0 / seconds, worst.1), findings);
         }
         if m.rapid {
             self.summary.rapids += 1;
@@ -213,7 +216,7 @@ impl<'a> Emit<'a> {
             self.summary.cuts += 1;
             self.summary.cut_seconds += seconds;
         }
-        (q, middle)
+        ((q, branch), middle)
     }
 
     fn fast(&mut self, m: &Move, (part, i): (f64, usize), findings: &mut Findings<'_>) {
@@ -288,11 +291,6 @@ impl<'a> Emit<'a> {
 
 /// The configuration nearest to some joint values.
 fn nearest(all: &Branches, q: &Joints, count: usize) -> u8 {
-    let far = |b: u8| (0..count).map(|i| gr_turn(all.joints[usize::from(b)][i] - q[i]).abs()).fold(0.0, f64::max);
+    let far = |b: u8| (0..count).map(|i| whole_turns_off(all.joints[usize::from(b)][i] - q[i]).abs()).fold(0.0, f64::max);
     (0..8).filter(|b| all.has(*b)).min_by(|a, b| far(*a).total_cmp(&far(*b))).unwrap_or(0)
-}
-
-fn gr_turn(angle: f64) -> f64 {
-    const TURN: f64 = std::f64::consts::TAU;
-    angle - TURN * libm::round(angle / TURN)
 }

@@ -14,7 +14,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::PI;
 
 use crate::cell::Cells;
-use crate::{Action, Options, Step, Tool, WorkFrame, Zone};
+use crate::{Action, Curves, Options, Step, Tool, WorkFrame, Zone};
 
 /// How a move goes.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -67,6 +67,10 @@ pub(crate) struct Gathered {
     pub tools: Vec<Tool>,
     pub frames: Vec<WorkFrame>,
     pub wait_seconds: f64,
+    /// Curves that became straight pieces.
+    pub curves: Curves,
+    /// The program says how the tool points, not where rotary axes stand.
+    pub by_direction: bool,
 }
 
 /// Collects findings, one per line and code.
@@ -147,6 +151,8 @@ pub(crate) struct Gather<'a> {
     at: Option<Frame>,
     /// Where it would stand with the tool that came since, had the changer left the machine where it was.
     at_change: Option<Frame>,
+    /// A mill that has not moved yet.
+    starts: bool,
     /// A tool was changed since the last move.
     exchanged: bool,
     /// The program had a rapid since the last move.
@@ -192,6 +198,8 @@ impl<'a> Gather<'a> {
             tools: Vec::new(),
             frames: Vec::new(),
             wait_seconds: 0.0,
+            curves: Curves { tolerance: options.tolerance, lines: BTreeSet::new() },
+            by_direction: false,
         };
         let control = machine.kinematics().control();
         let source_machine = match (&machine.orientation, machine.kind) {
@@ -208,12 +216,14 @@ impl<'a> Gather<'a> {
             source_machine,
             control,
             planar: matches!(machine.chain, Chain::Planar3r(_)),
-            seen: [false; 3],
+            // A mill's axes stand where they stood; what a program leaves out stays.
+            seen: [machine.kind == Kind::Mill; 3],
             waiting: false,
             frame: None,
             tool: None,
-            at: None,
+            at: nose_at_home(machine),
             at_change: None,
+            starts: machine.kind == Kind::Mill,
             exchanged: false,
             rapids: false,
             offset: false,
@@ -307,7 +317,8 @@ impl<'a> Gather<'a> {
                 self.act(Action::Dwell(t));
             }
             Op::ToolChange(_) => {
-                self.exchanged = true;
+                // On a mill the tool changer brings no other place.
+                self.exchanged = self.machine.kind != Kind::Mill;
                 self.change(state.tool);
             }
             // What is on is on the first spindle; the others are only told to stop.
@@ -415,7 +426,8 @@ impl<'a> Gather<'a> {
     fn tool(&mut self, state: &State) -> Option<u16> {
         let number = u32::try_from(state.tool).unwrap_or(0);
         let length = state.tool_offset[2];
-        let known = self.machine.cell.tools.get(&number);
+        // On a mill the spindle's nose is what moves until G43 says otherwise.
+        let known = self.machine.cell.tools.get(&number).filter(|_| self.machine.kind != Kind::Mill || length != 0.0);
         let nose = self.machine.cell.tool_frame(u32::MAX);
         let (name, frame, mass) = match known {
             Some(t) => {
@@ -456,18 +468,16 @@ impl<'a> Gather<'a> {
         };
         if self.tool != Some(index) {
             self.act(Action::UseTool(index));
-            if let Some(old) = self.tool {
-                self.other_point(old, index);
-            }
+            let old = self.tool.map_or(nose, |old| self.out.tools[usize::from(old)].frame);
+            self.other_point(&old, index);
             self.tool = Some(index);
         }
         Some(index)
     }
 
     /// Another tool point on a machine that stands still; a changer leaves it nobody knows where.
-    fn other_point(&mut self, old: u16, new: u16) {
-        let [old, new] = [old, new].map(|t| self.out.tools[usize::from(t)].frame);
-        let step = old.inverse().then(&new);
+    fn other_point(&mut self, old: &Frame, new: u16) {
+        let step = old.inverse().then(&self.out.tools[usize::from(new)].frame);
         // Beside the tool's axis the point depends on the turn about it, which is chosen later.
         let along = step.position[0].abs() < TINY && step.position[1].abs() < TINY && same_turn(&step.turn, &Frame::IDENTITY.turn);
         let stands = self.at.filter(|_| along).map(|at| at.then(&step));
@@ -489,6 +499,7 @@ impl<'a> Gather<'a> {
     fn turn_unrotated(&mut self, pose: &Pose, state: &State) -> Option<M3> {
         let up = self.machine.kind == Kind::Robot;
         if let Some(axis) = pose.tool_axis {
+            self.out.by_direction = true;
             return Some(along(if up { scale(axis, -1.0) } else { axis }, pose.spin.unwrap_or(0.0)));
         }
         let words = self.rotary(pose, state);
@@ -567,6 +578,15 @@ impl<'a> Gather<'a> {
     }
 
     fn push(&mut self, m: Move) {
+        if let (true, Some(at)) = (self.starts, self.at) {
+            // A mill goes straight everywhere, from where it stands.
+            let here = self.out.frames[usize::from(m.frame)].frame.inverse().then(&at);
+            let turn = self.turn_index(here.turn);
+            let speed = self.machine.cell.joint_share();
+            let start = Move { way: Way::Joint, position: here.position, turn, speed, length: 0.0, rapid: true, source: None, zone: Zone::Stop, ..m };
+            self.out.items.push(Item::Move(start));
+        }
+        self.starts = false;
         self.at = Some(self.base(m.frame, m.position, m.turn));
         self.at_change = None;
         (self.exchanged, self.rapids) = (false, false);
@@ -719,10 +739,27 @@ impl<'a> Gather<'a> {
             let Some((.., held)) = self.held(Op::Rapid, start, end, lag) else { return };
             to = held.xyz();
         }
+        let words = self.words(start, end);
+        if self.machine.kind == Kind::Mill && words > 0.0 && self.at.is_some() {
+            let from = self.turn(start, state).map(|t| self.turn_index(t)).unwrap_or(turn);
+            let length = norm(sub(to, add(start.xyz(), lag)));
+            let m = Move { way: Way::Line, position: to, turn: from, frame, tool, speed: self.rapid_speed(), zone: self.zone_of_rapid(), length, rapid: true, free: false, ours: false, source: Some(self.source) };
+            let [mut start, mut end] = [*start, *end];
+            for i in 0..3 {
+                start.axes[i] += lag[i];
+                end.axes[i] = to[i];
+            }
+            return self.turning(&View { index: 0, op: Op::Rapid, start: &start, end: &end, state, source: self.source }, m, words);
+        }
         let here = self.base(frame, to, turn);
         if self.at.is_none_or(|at| norm(sub(at.position, here.position)) > TINY || !same_turn(&at.turn, &here.turn)) {
             self.come(frame, tool, to, turn);
         }
+    }
+
+    /// How far rotary words go, as LinuxCNC counts it for a feed of theirs, rad.
+    fn words(&self, start: &Pose, end: &Pose) -> f64 {
+        libm::sqrt((3..6).map(|i| (end.axes[i] - start.axes[i]) * (end.axes[i] - start.axes[i])).sum())
     }
 
     fn zone_of_rapid(&self) -> Zone {
@@ -743,6 +780,15 @@ impl<'a> Gather<'a> {
         };
         let size = zones.max.map_or(size, |m| size.min(m));
         if size > 0.0 { Zone::Blend(size) } else { Zone::Stop }
+    }
+
+    /// Speed of the rotary axes while the tool point stands still, rad/s.
+    fn turn_speed(&mut self, state: &State, words: f64) -> Option<f64> {
+        match (state.sync, state.feed_mode) {
+            (None, FeedMode::PerTime) if state.feed_angular > 0.0 => Some(state.feed_angular),
+            (None, FeedMode::Inverse) if state.feed > 0.0 => Some(words * state.feed),
+            _ => self.speed(state, 0.0),
+        }
     }
 
     /// Speed of the tool point, mm/s.
@@ -799,10 +845,13 @@ impl<'a> Gather<'a> {
         if length <= TINY && words == 0.0 && angle < 1e-12 {
             return;
         }
-        let Some(speed) = self.speed(state, length) else { return };
+        let on_the_spot = length <= TINY;
+        let mill = self.machine.kind == Kind::Mill;
+        let asked = if on_the_spot && mill { self.turn_speed(state, self.words(view.start, view.end)) } else { self.speed(state, length) };
+        let Some(speed) = asked else { return };
         let start = self.turn_index(from);
         self.come_to_cut(frame, tool, view.start.xyz(), start);
-        if length <= TINY {
+        if on_the_spot && !mill {
             self.findings.once(code::ROBOT_TURN_SPEED, Some(self.source), &[]);
         }
         let m = Move {
@@ -829,6 +878,9 @@ impl<'a> Gather<'a> {
 
     /// A move in which the tool turns: cut so that words and directions agree within a small angle.
     fn turning(&mut self, view: &View<'_, '_>, m: Move, angle: f64) {
+        if !matches!(view.op, Op::Linear | Op::Rapid) {
+            self.curved();
+        }
         let by_turn = libm::ceil(angle / TURN_STEP - 1e-9).clamp(1.0, 10_000.0) as usize;
         let mut points: Vec<[f64; 9]> = vec![view.start.axes];
         gr_ir::geometry::flatten(&view.op, view.start, view.end, self.options.tolerance, |p| points.push(*p));
@@ -857,7 +909,13 @@ impl<'a> Gather<'a> {
         }
     }
 
+    /// This line's curve becomes straight pieces.
+    fn curved(&mut self) {
+        self.out.curves.lines.insert((self.source.file.0, self.source.line));
+    }
+
     fn pieces(&mut self, view: &View<'_, '_>, m: Move) {
+        self.curved();
         let mut points: Vec<[f64; 3]> = Vec::new();
         gr_ir::geometry::flatten(&view.op, view.start, view.end, self.options.tolerance, |p| points.push([p[0], p[1], p[2]]));
         let mut last = view.start.xyz();
@@ -879,6 +937,7 @@ impl<'a> Gather<'a> {
         let angle = shape.sweep.abs() / count as f64;
         let sagitta = shape.radius * (1.0 - libm::cos(angle / 2.0));
         if sagitta < self.options.tolerance.min(1e-3) && shape.sweep.abs() < 0.5 {
+            self.curved();
             return self.push(m);
         }
         let normal = if shape.sweep < 0.0 { scale(shape.normal, -1.0) } else { shape.normal };
@@ -984,6 +1043,13 @@ fn along(z: [f64; 3], spin: f64) -> M3 {
     let y = gr_machine::math::cross(z, x);
     let turn = [[x[0], y[0], z[0]], [x[1], y[1], z[1]], [x[2], y[2], z[2]]];
     if spin == 0.0 { turn } else { product(&turn, &rot_z(spin)) }
+}
+
+/// The spindle's nose of a mill that stands at home.
+fn nose_at_home(machine: &Machine) -> Option<Frame> {
+    let home = crate::plan::home_joints(machine).filter(|_| machine.kind == Kind::Mill)?;
+    let flange = machine.kinematics().forward_frame(&home).ok()?;
+    Some(flange.then(&machine.cell.tool_frame(u32::MAX)))
 }
 
 /// A five-axis machine and the places of its rotary joints.

@@ -8,10 +8,11 @@ use gr_machine::JointKind;
 use gr_machine::math::{Frame, norm, sub, turn_of};
 use gr_text::{Diagnostic, code};
 
-use crate::choose::unwrap;
+use crate::follow::{Follow, nearer, unwrap};
 use crate::gather::{ArcPiece, Findings, Gathered, Move, Way};
 use crate::path::{Mount, Path};
 use crate::solver::{Branches, Joints, Limits, Solver};
+use crate::program::{ON_THE_SPOT, turned_on_the_spot};
 use crate::{Action, MAX_JOINTS, RobotProgram, Step, Target, Zone};
 
 /// What can be chosen.
@@ -109,6 +110,8 @@ pub fn joint_path(program: &RobotProgram, options: &JointOptions) -> Result<Join
         tools: program.tools.clone(),
         frames: program.frames.clone(),
         wait_seconds: 0.0,
+        curves: crate::Curves::default(),
+        by_direction: false,
     };
     let solver = Solver::new(&program.machine);
     let mut run = Run {
@@ -222,13 +225,21 @@ impl Run<'_> {
             ours: false,
             source,
         };
-        let path = Path::new(&self.g, &Frame { turn: turns.0, position: self.here.position }, &m);
+        let path = Path::new(&self.g, &self.solver, &Frame { turn: turns.0, position: self.here.position }, &m);
         let mount = Mount::new(&self.g, &m, 0.0);
-        let mut seconds = if path.length > 0.0 { path.length / speed } else { self.joint_time(&self.here.joints, &to.joints) };
+        let turned = turned_on_the_spot(&self.program.machine, &self.here.joints, &to.joints);
+        let mut seconds = match path.length {
+            l if l > ON_THE_SPOT => l / speed,
+            _ if turned > 0.0 && !rapid => turned / speed,
+            _ => self.joint_time(&self.here.joints, &to.joints),
+        };
         if rapid {
             seconds = seconds.max(self.joint_time(&self.here.joints, &to.joints));
         }
-        let looks = path.looks().max(self.options.interval.map_or(1, |t| libm::ceil(seconds / t - 1e-9).clamp(1.0, 1e9) as usize));
+        // Without a turn a mill's axes go as the tool does.
+        let straight = self.program.machine.kind == gr_machine::Kind::Mill && arc.is_none() && self.here.quaternion == to.quaternion;
+        let looks = if straight { 1 } else { path.looks() };
+        let looks = looks.max(self.options.interval.map_or(1, |t| libm::ceil(seconds / t - 1e-9).clamp(1.0, 1e9) as usize));
         let room = self.options.most.saturating_sub(self.points);
         // With an interval every look becomes a position: those that can't be kept aren't worked out.
         if self.options.interval.is_some() && looks > room {
@@ -236,17 +247,25 @@ impl Run<'_> {
         }
         let tip = self.g.tools.get(usize::from(self.tool)).map_or(Frame::IDENTITY, |t| t.frame);
         let base = self.g.frames[usize::from(self.frame)].frame;
-        let mut cut = Cut { solver: &self.solver, limits: &self.limits, path: &path, mount: &mount, tip, base, branch: to.branch, tolerance: self.options.tolerance, room, found: Vec::new() };
-        let mut q = self.here.joints;
+        let mut cut = Cut { solver: &self.solver, limits: &self.limits, path: &path, mount: &mount, tip, base, tolerance: self.program.curves.left(self.options.tolerance, source), room, found: Vec::new() };
+        let follow = Follow { solver: &self.solver, limits: &self.limits, path: &path, mount: &mount };
+        let mut all = Branches::NONE;
+        let (mut q, mut branch) = (self.here.joints, self.here.branch);
         for k in 1..=looks {
             let (a, b) = ((k - 1) as f64 / looks as f64, k as f64 / looks as f64);
             if cut.found.len() > room {
                 return Err(TooMany { most: self.options.most, source });
             }
-            let next = if k == looks { to.joints } else { cut.solve(b, &q) };
-            cut.between(a, &q, b, &next, 24);
-            cut.found.push((b, next));
-            q = next;
+            let next = if k == looks {
+                (to.joints, to.branch)
+            } else {
+                // Not out of reach: the plan has been here.
+                let _ = self.solver.all(&mount.flange(&path.at(b)), &mut all);
+                follow.step(&all, (&q, branch), (a, b)).unwrap_or((q, branch))
+            };
+            cut.between((a, &q, branch), (b, &next.0, next.1), 24);
+            cut.found.push((b, next.0));
+            (q, branch) = next;
         }
         let found = cut.merged(self.here.joints, self.options.interval.is_some());
         let mut last = 0.0;
@@ -267,7 +286,6 @@ struct Cut<'a> {
     mount: &'a Mount,
     tip: Frame,
     base: Frame,
-    branch: u8,
     tolerance: f64,
     /// Positions there is room for.
     room: usize,
@@ -275,18 +293,23 @@ struct Cut<'a> {
 }
 
 impl Cut<'_> {
-    fn solve(&self, share: f64, near: &Joints) -> Joints {
+    /// Joint values between two others, in the configuration of one of them.
+    fn solve(&self, share: f64, (p, q): (&Joints, &Joints), pair: [u8; 2]) -> (Joints, u8) {
         let flange = self.mount.flange(&self.path.at(share));
-        let mut all = Branches::NONE;
-        let mut q = *near;
+        let mut guide = *p;
+        (0..self.solver.count).for_each(|i| guide[i] = (p[i] + q[i]) / 2.0);
         if self.solver.searches() {
-            q = self.solver.near(&flange, near).unwrap_or(q);
-        } else if self.solver.all(&flange, &mut all).is_ok() {
-            let branch = if all.has(self.branch) { self.branch } else { all.good.trailing_zeros() as u8 & 7 };
-            (0..self.solver.count).for_each(|i| q[i] = all.joints[usize::from(branch)][i]);
+            let mut r = self.solver.near(&flange, &guide).unwrap_or(guide);
+            unwrap(&mut r, &guide, &self.limits.turns, self.solver.count);
+            return (r, pair[0]);
         }
-        unwrap(&mut q, near, &self.limits.turns, self.solver.count);
-        q
+        let mut all = Branches::NONE;
+        let reached = self.solver.all(&flange, &mut all).is_ok();
+        let meets = all.good.trailing_zeros() as u8 & 7;
+        let pair = if pair.iter().any(|b| all.has(*b)) { pair } else { [meets; 2] };
+        let near = if pair[0] == pair[1] { p } else { &guide };
+        let found = if reached { nearer(self.solver, self.limits, &all, pair, near) } else { None };
+        found.unwrap_or((guide, pair[0]))
     }
 
     /// Greatest distance of the tool point from its path between two positions.
@@ -301,15 +324,15 @@ impl Cut<'_> {
     }
 
     /// Positions between two, so that the tolerance holds. Nine tenths of it, as it is looked at three places only.
-    fn between(&mut self, a: f64, p: &Joints, b: f64, q: &Joints, left: u32) {
+    fn between(&mut self, (a, p, from): (f64, &Joints, u8), (b, q, to): (f64, &Joints, u8), left: u32) {
         if left == 0 || self.found.len() > self.room || self.off(a, p, b, q) <= 0.9 * self.tolerance {
             return;
         }
         let middle = (a + b) / 2.0;
-        let r = self.solve(middle, p);
-        self.between(a, p, middle, &r, left - 1);
+        let (r, branch) = self.solve(middle, (p, q), [from, to]);
+        self.between((a, p, from), (middle, &r, branch), left - 1);
         self.found.push((middle, r));
-        self.between(middle, &r, b, q, left - 1);
+        self.between((middle, &r, branch), (b, q, to), left - 1);
     }
 
     /// Leaves out positions that the tolerance doesn't need; with an interval all are needed.
@@ -342,18 +365,20 @@ pub fn gcode(program: &RobotProgram, path: &JointPath, decimals: usize, sources:
     let letters = ['X', 'Y', 'Z', 'A', 'B', 'C', 'U', 'V', 'W'];
     let words: Vec<char> = machine.joints.iter().zip(letters).map(|(j, l)| j.word.unwrap_or(l)).collect();
     let head = format!("({}: joint positions of {}; degrees and mm, inverse time)\nG21 G90 G40 G49 G80\nG61\nG93\n", plain(&program.name), plain(&machine.id));
+    let mill = machine.kind == gr_machine::Kind::Mill;
+    let head = if mill { head + &begins(program, &words, decimals) } else { head };
     let from = vec![None; head.lines().count()];
     let mut out = Words { text: head, from, findings: Findings::new(sources), labels: 0 };
     let mut first = true;
     for event in &path.events {
         match event {
             Event::Point(p) => {
-                let mut line = String::from("G1");
-                for ((joint, value), word) in machine.joints.iter().zip(&p.joints).zip(&words) {
-                    let shown = if joint.kind == JointKind::Revolute { value.to_degrees() } else { *value };
-                    let _ = write!(line, " {word}{}", number(shown, decimals));
-                }
-                if first {
+                let fast = mill && p.rapid;
+                let line = String::from(if fast { "G0" } else { "G1" }) + &axis_words(machine, &p.joints, &words, decimals);
+                if first && mill {
+                } else if fast && p.seconds > 0.0 {
+                    out.line(&line, p.source);
+                } else if first {
                     // The machine stands at home already, or goes there in a second.
                     out.line(&format!("{line} F60"), p.source);
                 } else if p.seconds > 0.0 {
@@ -366,6 +391,20 @@ pub fn gcode(program: &RobotProgram, path: &JointPath, decimals: usize, sources:
     }
     out.line("G94\nM2", None);
     (out.text, out.from, out.findings.take())
+}
+
+fn axis_words(machine: &gr_machine::Machine, joints: &Joints, words: &[char], decimals: usize) -> String {
+    let mut out = String::new();
+    for ((joint, value), word) in machine.joints.iter().zip(joints).zip(words) {
+        let shown = if joint.kind == JointKind::Revolute { value.to_degrees() } else { *value };
+        let _ = write!(out, " {word}{}", number(shown, decimals));
+    }
+    out
+}
+
+/// A mill is not sent home: its program goes on from there.
+fn begins(program: &RobotProgram, words: &[char], decimals: usize) -> String {
+    format!("(begins at{}, without offsets)\n", axis_words(&program.machine, &program.home.joints, words, decimals))
 }
 
 /// What is no motion, in the words of LinuxCNC.

@@ -13,6 +13,7 @@
 //! | `cell` | M words → signals, or a request to the operator |
 //! | `path` | the real path of a move |
 //! | `solver` | joint values and limits |
+//! | `follow` | joint values from look to look, without a jump |
 //! | `choose` | one configuration per chain of cuts, chosen over all of them |
 //! | `emit` | targets, speed checks, figures |
 //! | `reference` | the solver of a publication |
@@ -28,6 +29,7 @@ pub mod along;
 mod cell;
 mod choose;
 mod emit;
+mod follow;
 mod gather;
 pub mod joints;
 mod options;
@@ -41,4 +43,4 @@ pub mod verify;
 
 pub use options::{Options, Planned, Setup, Singularity, Summary};
 pub use plan::plan;
-pub use program::{Action, MAX_JOINTS, RobotProgram, Step, Target, Tool, Word, WorkFrame, Zone};
+pub use program::{Action, Curves, MAX_JOINTS, RobotProgram, Step, Target, Tool, Word, WorkFrame, Zone};

@@ -2,7 +2,10 @@
 
 use gr_machine::math::{Frame, M3, about, add, norm, product, rot_z, rotate, rotation_vector, scale, sub, transpose};
 
+use gr_machine::FiveAxis;
+
 use crate::gather::{ArcPiece, Gathered, Move, Way};
+use crate::solver::Solver;
 
 /// One move between two tool frames in its work frame.
 pub(crate) struct Path {
@@ -13,7 +16,37 @@ pub(crate) struct Path {
     vector: [f64; 3],
     angle: f64,
     arc: Option<ArcPiece>,
+    rotary: Option<Rotary>,
     pub length: f64,
+}
+
+/// The rotary axes of a five-axis machine, which go evenly from end to end when the program names them.
+struct Rotary {
+    machine: FiveAxis,
+    from: [f64; 2],
+    by: [f64; 2],
+    /// From the base to the work frame, and from the flange to the tool.
+    frame: M3,
+    tool: M3,
+}
+
+/// Further than this the rotary axes don't go in one move: it has been cut before, rad.
+const ROTARY: f64 = 0.2;
+
+impl Rotary {
+    fn new(g: &Gathered, solver: &Solver, start: &Frame, m: &Move) -> Option<Rotary> {
+        let machine = *solver.five_axis()?;
+        let mount = Mount::new(g, m, 0.0);
+        let end = Frame { turn: g.turns[m.turn as usize], position: m.position };
+        let (p, q) = (machine.exact(&mount.flange(start))?, machine.exact(&mount.flange(&end))?);
+        let by = [3, 4].map(|i| crate::solver::whole_turns_off(q[i] - p[i]));
+        let (frame, tool) = (transpose(&mount.frame.turn), g.tools[usize::from(m.tool)].frame.turn);
+        by.iter().all(|v| v.abs() <= ROTARY).then_some(Rotary { machine, from: [p[3], p[4]], by, frame, tool })
+    }
+    fn turn(&self, share: f64) -> M3 {
+        let angles = [0, 1].map(|i| self.from[i] + self.by[i] * share);
+        product(&self.frame, &product(&self.machine.turn(angles), &self.tool))
+    }
 }
 
 /// Longest stretch between two looks, mm and rad.
@@ -22,17 +55,19 @@ const ANGLE: f64 = 0.1;
 
 impl Path {
     /// From a tool frame in the move's own work frame.
-    pub fn new(g: &Gathered, start: &Frame, m: &Move) -> Path {
+    pub fn new(g: &Gathered, solver: &Solver, start: &Frame, m: &Move) -> Path {
         let (a, b, from) = (&start.turn, &g.turns[m.turn as usize], start.position);
         let vector = if a == b { [0.0; 3] } else { rotation_vector(&product(b, &transpose(a))) };
         let arc = if let Way::Arc(i) = m.way { Some(g.arcs[i as usize]) } else { None };
+        let rotary = if a == b { None } else { Rotary::new(g, solver, start, m) };
         let length = arc.map_or_else(|| norm(sub(m.position, from)), |a| norm(sub(from, a.center)) * a.angle);
-        Path { from, to: m.position, turn: *a, vector, angle: norm(vector), arc, length }
+        Path { from, to: m.position, turn: *a, vector, angle: norm(vector), arc, rotary, length }
     }
 
     /// Into how many stretches it is cut to be looked at.
     pub fn looks(&self) -> usize {
-        let turned = self.angle.max(self.arc.map_or(0.0, |a| a.angle / 2.0));
+        let words = self.rotary.as_ref().map_or(0.0, |r| r.by[0].abs().max(r.by[1].abs()));
+        let turned = self.angle.max(words).max(self.arc.map_or(0.0, |a| a.angle / 2.0));
         let count = (self.length / STEP).max(turned / ANGLE);
         libm::ceil(count).clamp(1.0, 100_000.0) as usize
     }
@@ -50,6 +85,9 @@ impl Path {
     }
 
     pub fn turn(&self, share: f64) -> M3 {
+        if let Some(rotary) = &self.rotary {
+            return rotary.turn(share);
+        }
         if self.angle < 1e-12 {
             return self.turn;
         }

@@ -22,17 +22,28 @@ pub fn plan(program: &Program, machine: &Machine, sources: &dyn Sources, options
     }
     gather.run(program);
     let Gather { out: gathered, findings, .. } = gather;
+    let mut solver = Solver::new(machine);
+    solver.words = !gathered.by_direction;
     let mut planner = Planner {
         machine,
         options,
         g: gathered,
         findings,
-        solver: Solver::new(machine),
+        solver,
         limits: Limits::new(machine),
         speeds: speeds(machine),
         told: std::collections::BTreeSet::new(),
     };
     planner.run()
+}
+
+/// Joint values of the home position, checked or not.
+pub(crate) fn home_joints(machine: &Machine) -> Option<Vec<f64>> {
+    let given = machine.cell.home.clone().or_else(|| machine.start_joints.clone());
+    given.or_else(|| {
+        let frame = machine.start.frame();
+        machine.kinematics().inverse_frame(&frame).ok().and_then(|all| all.into_iter().next()).map(|s| s.joints)
+    })
 }
 
 /// Greatest speed of each joint in a rapid.
@@ -62,9 +73,9 @@ impl Planner<'_> {
         let mut chosen = Vec::new();
         let mut list = Vec::new();
         if let Some(home) = home {
-            list = self.nodes(&mut chosen);
+            list = self.nodes(&home, &mut chosen);
             if !self.findings.bad() {
-                chosen = vec![self.chooser(list.len()).cheapest(&chosen, &home)];
+                chosen = vec![self.chooser(list.len(), None).cheapest(&chosen, &home)];
             }
         }
         let (Some(home), false) = (home, self.findings.bad()) else { return Err(self.findings.take()) };
@@ -78,20 +89,14 @@ impl Planner<'_> {
     }
 
     /// Chooses among the configurations of so many chains.
-    fn chooser(&self, chains: usize) -> Chooser<'_> {
+    fn chooser(&self, chains: usize, stands: Option<Joints>) -> Chooser<'_> {
         let count = chains.max(1);
-        Chooser { g: &self.g, solver: &self.solver, limits: &self.limits, speeds: self.speeds, kept: (2_000_000 / count).clamp(8, 48) }
+        Chooser { g: &self.g, solver: &self.solver, limits: &self.limits, speeds: self.speeds, kept: (2_000_000 / count).clamp(8, 48), stands }
     }
 
     /// Joint values of the home position.
     fn home(&mut self) -> Option<Joints> {
-        let cell = &self.machine.cell;
-        let given = cell.home.clone().or_else(|| self.machine.start_joints.clone());
-        let given = given.or_else(|| {
-            let frame = self.machine.start.frame();
-            self.machine.kinematics().inverse_frame(&frame).ok().and_then(|all| all.into_iter().next()).map(|s| s.joints)
-        });
-        let Some(given) = given else {
+        let Some(given) = home_joints(self.machine) else {
             self.findings.say(code::ROBOT_HOME, None, &["the machine file gives none, and the start can't be reached".into()]);
             return None;
         };
@@ -164,12 +169,14 @@ impl Planner<'_> {
     }
 
     /// Nodes of all chains; a chain without any is a finding, or is divided where that was asked for.
-    fn nodes(&mut self, out: &mut Vec<Vec<Node>>) -> Vec<Chain> {
+    fn nodes(&mut self, home: &Joints, out: &mut Vec<Vec<Node>>) -> Vec<Chain> {
         let mut list = chains(&self.g.items);
         let (mut k, mut count) = (0, list.len());
         while k < list.len() {
             let chain = list[k];
-            let found = self.chooser(count).nodes(chain);
+            // A mill goes on from where it stands, whole turns and all.
+            let stands = (k == 0 && self.machine.kind == Kind::Mill).then_some(*home);
+            let found = self.chooser(count, stands).nodes(chain);
             match found {
                 Ok(nodes) => {
                     out.push(nodes);
@@ -286,7 +293,7 @@ impl Planner<'_> {
         let j = &self.machine.joints[joint];
         let (value, bound) = (j.show(value), j.show(limit));
         let Item::Move(m) = &self.g.items[fault.item] else { return };
-        if fault.item > chain.first && self.stands_at(fault, m) {
+        if fault.item > chain.first && self.machine.kind != Kind::Mill && self.stands_at(fault, m) {
             let why = format!("joint {} would have to go to {value}, its limit is {bound}", j.name);
             return self.findings.say(code::ROBOT_CONFIGURATION, source, &[first.to_string(), why]);
         }

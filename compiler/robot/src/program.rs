@@ -2,7 +2,7 @@
 
 use gr_ir::Source;
 use gr_machine::math::{Frame, product, quaternion_of, transpose, turn_of};
-use gr_machine::{Machine, Signal};
+use gr_machine::{JointKind, Kind, Machine, Signal};
 
 /// No machine here has more joints, external axes included.
 pub const MAX_JOINTS: usize = gr_machine::MOST_JOINTS;
@@ -147,7 +147,7 @@ pub enum Action {
     Linear {
         /// Where to.
         to: u32,
-        /// Of the tool point, mm/s.
+        /// Of the tool point, mm/s; of the rotary axes of a mill while the tool point stands still on the part, rad/s.
         speed: f64,
         /// At its end.
         zone: Zone,
@@ -224,6 +224,36 @@ pub struct Step {
     pub source: Option<Source>,
 }
 
+/// Where curves of the program are written as straight pieces, and how far these may be from them.
+#[derive(Clone, PartialEq, Debug, Default)]
+pub struct Curves {
+    /// mm.
+    pub tolerance: f64,
+    /// File and line.
+    pub lines: std::collections::BTreeSet<(u32, u32)>,
+}
+
+impl Curves {
+    /// What is left of a tolerance at a line, mm.
+    pub(crate) fn left(&self, tolerance: f64, source: Option<gr_ir::Source>) -> f64 {
+        let cut = source.is_some_and(|s| self.lines.contains(&(s.file.0, s.line)));
+        if cut { (tolerance - self.tolerance).max(0.1 * tolerance) } else { tolerance }
+    }
+}
+
+/// A way of the tool point shorter than this is none, mm.
+pub(crate) const ON_THE_SPOT: f64 = 1e-9;
+
+/// How far the rotary axes of a mill go between two joint positions, as LinuxCNC counts it for a feed of theirs: the root
+/// of the sum of squares, rad. 0 on other machines, whose controllers have a law of their own for it.
+pub(crate) fn turned_on_the_spot(machine: &Machine, from: &[f64; MAX_JOINTS], to: &[f64; MAX_JOINTS]) -> f64 {
+    if machine.kind != Kind::Mill {
+        return 0.0;
+    }
+    let turns = machine.joints.iter().zip(from.iter().zip(to)).filter(|(j, _)| j.kind == JointKind::Revolute);
+    libm::sqrt(turns.map(|(_, (a, b))| (a - b) * (a - b)).sum())
+}
+
 /// The motion of one machine.
 #[derive(Clone, PartialEq, Debug)]
 pub struct RobotProgram {
@@ -241,4 +271,6 @@ pub struct RobotProgram {
     pub home: Target,
     /// What happens, in order.
     pub steps: Vec<Step>,
+    /// Curves that are straight pieces here.
+    pub curves: Curves,
 }

@@ -15,11 +15,12 @@ use gr_machine::JointKind;
 use gr_machine::math::{Frame, turn_of};
 use gr_text::{Diagnostic, code};
 
-use crate::choose::unwrap;
+use crate::follow::{nearer, unwrap};
 use crate::gather::{ArcPiece, Gathered, Move, Way};
 use crate::joints::TooMany;
 use crate::path::{Mount, Path};
 use crate::solver::{Branches, Joints, Limits, Solver};
+use crate::program::{ON_THE_SPOT, turned_on_the_spot};
 use crate::{Action, MAX_JOINTS, RobotProgram, Target, Zone};
 
 /// What can be chosen.
@@ -118,7 +119,8 @@ struct Piece {
     seconds: f64,
     from: Joints,
     to: Joints,
-    branch: u8,
+    /// Configurations at both ends.
+    branches: [u8; 2],
     /// None: all joints evenly.
     path: Option<(Path, Mount)>,
     stop: bool,
@@ -208,6 +210,8 @@ impl<'a> Maker<'a> {
             tools: self.program.tools.clone(),
             frames: self.program.frames.clone(),
             wait_seconds: 0.0,
+            curves: crate::Curves::default(),
+            by_direction: false,
         };
         let (mut tool, mut frame) = (0u16, 0u16);
         let mut here = self.program.home;
@@ -290,10 +294,12 @@ impl<'a> Maker<'a> {
             ours: false,
             source: None,
         };
-        let path = Path::new(g, &Frame { turn: g.turns[0], position: here.position }, &m);
+        let path = Path::new(g, &self.solver, &Frame { turn: g.turns[0], position: here.position }, &m);
         let times = (0..self.solver.count).map(|i| (to.joints[i] - here.joints[i]).abs() / self.speed[i]);
         let least = times.fold(0.0, f64::max);
-        let seconds = if path.length > 0.0 { (path.length / speed).max(least) } else { least };
+        let turned = turned_on_the_spot(&self.program.machine, &here.joints, &to.joints);
+        let asked = if path.length > ON_THE_SPOT { path.length } else { turned };
+        let seconds = (asked / speed).max(least);
         let mount = Mount::new(g, &m, 0.0);
         self.add(&here, &to, seconds, Some((path, mount)), zone);
         to
@@ -307,7 +313,7 @@ impl<'a> Maker<'a> {
             seconds,
             from: from.joints,
             to: to.joints,
-            branch: to.branch,
+            branches: [from.branch, to.branch],
             path,
             stop: zone == Zone::Stop,
             source: self.source,
@@ -335,11 +341,12 @@ impl<'a> Maker<'a> {
         let mut all = Branches::NONE;
         if self.solver.searches() {
             q = self.solver.near(&flange, &even).unwrap_or(even);
+            unwrap(&mut q, &even, &self.limits.turns, self.solver.count);
         } else if self.solver.all(&flange, &mut all).is_ok() {
-            let branch = if all.has(p.branch) { p.branch } else { all.good.trailing_zeros() as u8 & 7 };
-            (0..self.solver.count).for_each(|i| q[i] = all.joints[usize::from(branch)][i]);
+            let meets = all.good.trailing_zeros() as u8 & 7;
+            let pair = if p.branches.iter().any(|b| all.has(*b)) { p.branches } else { [meets; 2] };
+            q = nearer(&self.solver, &self.limits, &all, pair, &even).map_or(even, |f| f.0);
         }
-        unwrap(&mut q, &even, &self.limits.turns, self.solver.count);
         q
     }
 

@@ -2,11 +2,14 @@
 //! arm, and one configuration followed along a path.
 
 use gr_machine::math::Frame;
-use gr_machine::{Chain, Control, Kinematics, KinematicsError, Machine, Opw, Serial, Violation};
+use gr_machine::{Chain, Control, FiveAxis, Kinematics, KinematicsError, Machine, Opw, Serial, Violation};
 
 use crate::{MAX_JOINTS, Singularity};
 
 pub(crate) type Joints = [f64; MAX_JOINTS];
+
+/// A wrist bent less than this is straight: the error of direction is far below a micrometer at the tool, rad.
+const STRAIGHT: f64 = 1e-9;
 
 /// Configurations of one flange, by number.
 #[derive(Clone)]
@@ -26,6 +29,7 @@ impl Branches {
 enum Arm {
     Opw(Opw),
     Serial(Serial),
+    Five(FiveAxis),
     Any,
 }
 
@@ -34,6 +38,8 @@ pub(crate) struct Solver {
     any: Box<dyn Kinematics>,
     pub count: usize,
     pub control: Control,
+    /// The program names the rotary axes of the five-axis machine itself.
+    pub words: bool,
     /// Angle of the line elbow–wrist on the forearm, reach of the arm, for closeness.
     fore: (f64, f64, f64),
 }
@@ -44,6 +50,7 @@ impl Solver {
         let arm = match &machine.chain {
             Chain::Opw(k) => Arm::Opw(*k),
             Chain::Serial(k) => Arm::Serial(k.clone()),
+            Chain::FiveAxis(k) => Arm::Five(*k),
             _ => Arm::Any,
         };
         let fore = match &arm {
@@ -53,7 +60,7 @@ impl Solver {
             }
             _ => (0.0, 0.0, 0.0),
         };
-        Solver { count: any.joint_count(), control: any.control(), arm, any, fore }
+        Solver { count: any.joint_count(), control: any.control(), arm, any, words: false, fore }
     }
 
     /// All configurations.
@@ -73,6 +80,12 @@ impl Solver {
             (out.good, out.singular) = (all.good, all.singular);
             return Ok(());
         }
+        if let (Arm::Five(k), true) = (&self.arm, self.words) {
+            let q = k.exact(flange).ok_or(KinematicsError::Direction)?;
+            out.joints[0][..5].copy_from_slice(&q);
+            out.good = 1;
+            return Ok(());
+        }
         for s in self.any.inverse_frame(flange)? {
             let bit = 1u8 << (s.branch & 7);
             let slot = &mut out.joints[usize::from(s.branch & 7)];
@@ -87,19 +100,54 @@ impl Solver {
         Ok(())
     }
 
-    /// Whether a search must start from the values before: configurations have no fixed numbers.
-    pub fn searches(&self) -> bool {
-        matches!(self.arm, Arm::Serial(_))
+    /// The machine, where it is one with five axes.
+    pub fn five_axis(&self) -> Option<&FiveAxis> {
+        if let Arm::Five(k) = &self.arm { Some(k) } else { None }
     }
 
-    /// Joint values near others, by search.
+    /// Whether values must be found next to those before: configurations have no fixed numbers, or go over into each
+    /// other.
+    pub fn searches(&self) -> bool {
+        matches!(self.arm, Arm::Serial(_) | Arm::Five(_))
+    }
+
+    /// Joint values near others.
     pub fn near(&self, flange: &Frame, from: &Joints) -> Result<Joints, KinematicsError> {
-        let Arm::Serial(k) = &self.arm else { return Err(KinematicsError::Singular) };
         let mut out = [0.0; MAX_JOINTS];
+        if let Arm::Five(k) = &self.arm {
+            let q = if self.words { k.exact(flange).ok_or(KinematicsError::Direction)? } else { k.next_to(flange, [from[3], from[4]])? };
+            out[..5].copy_from_slice(&q);
+            return Ok(out);
+        }
+        let Arm::Serial(k) = &self.arm else { return Err(KinematicsError::Singular) };
         for (to, from) in out.iter_mut().zip(k.search(flange, &from[..self.count])?) {
             *to = from;
         }
         Ok(out)
+    }
+
+    /// The configuration that a straight wrist leads over to, where the arm has one.
+    pub fn over_the_wrist(&self, branch: u8) -> Option<u8> {
+        matches!(self.arm, Arm::Opw(_)).then_some(branch ^ 1)
+    }
+
+    /// Values of a wrist with the fourth and the sixth axis in line: only their sum counts, so the fourth stays where it
+    /// was.
+    pub fn at_the_pole(&self, q: &mut Joints, near: &Joints) {
+        let Arm::Opw(k) = &self.arm else { return };
+        let (o, s) = (k.offsets(), k.signs());
+        if whole_turns_off(q[4] * s[4] - o[4]).abs() <= STRAIGHT {
+            // Signs are ±1: the model's angles add up.
+            let moved = (near[3] - q[3]) * s[3];
+            q[3] = near[3];
+            q[5] -= moved * s[5];
+        }
+    }
+
+    /// How far the wrist is bent; none where the arm has no such wrist.
+    pub fn bend(&self, q: &Joints) -> Option<f64> {
+        let Arm::Opw(k) = &self.arm else { return None };
+        Some(whole_turns_off(q[4] * k.signs()[4] - k.offsets()[4]))
     }
 
     pub fn forward(&self, joints: &Joints) -> Option<Frame> {
@@ -113,7 +161,7 @@ impl Solver {
     }
 
     pub fn violations(&self, joints: &Joints) -> Vec<Violation> {
-        if matches!(self.arm, Arm::Any) { self.any.violations(&joints[..self.count]) } else { Vec::new() }
+        if matches!(self.arm, Arm::Any | Arm::Five(_)) { self.any.violations(&joints[..self.count]) } else { Vec::new() }
     }
 
     /// Angle left to the next singular position, rad, and which one; infinite when the machine's kind has none that
@@ -148,6 +196,12 @@ impl Solver {
         let distance = libm::sqrt((c2 * c2 + fore * fore + 2.0 * c2 * fore * libm::cos(bend)).max(0.0));
         Some((c2 + fore - distance).min(distance - (c2 - fore).abs()))
     }
+}
+
+/// An angle brought into −π … π.
+pub(crate) fn whole_turns_off(angle: f64) -> f64 {
+    const TURN: f64 = std::f64::consts::TAU;
+    angle - TURN * libm::round(angle / TURN)
 }
 
 /// Distance of an angle from 0 or half a turn, whichever is nearer.

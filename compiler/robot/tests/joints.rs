@@ -233,3 +233,203 @@ fn a_turned_frame_is_no_jump() {
     let step = |w: &[&JointPoint]| (0..6).map(|i| (w[1].joints[i] - w[0].joints[i]).abs()).fold(0.0, f64::max);
     assert!(points.windows(2).map(step).fold(0.0, f64::max) < 0.02);
 }
+
+/// Distance of the tool from a curve with all joints moving evenly from position to position, as a joint program is run;
+/// `curve` gives the nearest point of the curve to a point in the work frame.
+fn worst(program: &RobotProgram, line: u32, tolerance: f64, curve: &dyn Fn([f64; 3]) -> [f64; 3]) -> f64 {
+    let path = joint_path(program, &JointOptions { tolerance, ..JointOptions::default() }).unwrap();
+    let points: Vec<&JointPoint> = path.points().collect();
+    let back = program.frames[0].frame.inverse();
+    let mut worst = 0.0f64;
+    for pair in points.windows(2).filter(|w| !w[1].rapid && w[1].source.is_some_and(|s| s.line + 1 == line)) {
+        for k in 0..=16 {
+            let at = back.apply(between(program, pair[0], pair[1], f64::from(k) / 16.0));
+            worst = worst.max(norm(sub(at, curve(at))));
+        }
+    }
+    worst
+}
+
+/// Lines, arcs, helices and splines: cutting the curve and moving the joints evenly share one tolerance.
+#[test]
+fn one_tolerance_for_all() {
+    for tolerance in [0.1, 0.01, 0.001] {
+        let half = |text: &str| {
+            let setup = gr_interp::Setup { tools: gr_interp::assumed_tools(), ..gr_interp::Setup::default() };
+            let program = gr_driver::lower("part.ngc", text.into(), &setup, None).program;
+            let options = Options { own_words: true, tolerance: tolerance / 2.0, ..Options::default() };
+            plan(&program, &cell(), &Texts::new([(FileId(0), text)]), &options).unwrap().program
+        };
+        let good = |name: &str, worst: f64| assert!(worst <= tolerance && worst > tolerance / 20.0, "{name}: {worst} for {tolerance}");
+        let line = half("T1 M6\nG0 X0 Y0 Z20\nG1 X300 Y80 Z5 F3000\nM2\n");
+        let ends = ([0.0, 0.0, 20.0], [300.0, 80.0, 5.0]);
+        good("line", worst(&line, 3, tolerance, &|p| {
+            let d = sub(ends.1, ends.0);
+            let share = (0..3).map(|i| (p[i] - ends.0[i]) * d[i]).sum::<f64>() / (norm(d) * norm(d));
+            [0, 1, 2].map(|i| ends.0[i] + d[i] * share)
+        }));
+        for (radius, rise) in [(30.0, -5.0), (150.0, -5.0), (100.0, 0.0), (60.0, 80.0)] {
+            let text = format!("T1 M6\nG0 X{} Y100 Z20\nG3 X{} Y100 I-{radius} J0 Z{} F3000\nM2\n", 100.0 + radius, 100.0 + radius, 20.0 + rise);
+            let found = worst(&half(&text), 3, tolerance, &|p| {
+                let angle = (p[1] - 100.0).atan2(p[0] - 100.0);
+                let turned = |a: f64| [100.0 + radius * a.cos(), 100.0 + radius * a.sin(), 20.0 + rise * a / std::f64::consts::TAU];
+                // The way round begins at angle 0; near it both ends are tried.
+                let all = [angle, angle + std::f64::consts::TAU].map(|a| a.clamp(0.0, std::f64::consts::TAU)).map(turned);
+                if norm(sub(p, all[0])) < norm(sub(p, all[1])) { all[0] } else { all[1] }
+            });
+            good(&format!("radius {radius}, rise {rise}"), found);
+        }
+        let spline = half("T1 M6\nG0 X0 Y0 Z5\nG5 I40 J90 P-30 Q-90 X200 Y60 F3000\nM2\n");
+        let ends = [[0.0, 0.0], [40.0, 90.0], [170.0, -30.0], [200.0, 60.0]];
+        let bezier = |t: f64| {
+            let w = [(1.0 - t).powi(3), 3.0 * t * (1.0 - t) * (1.0 - t), 3.0 * t * t * (1.0 - t), t.powi(3)];
+            [(0..4).map(|i| w[i] * ends[i][0]).sum::<f64>(), (0..4).map(|i| w[i] * ends[i][1]).sum(), 5.0]
+        };
+        let found = worst(&spline, 3, tolerance, &|p| {
+            let far = |t: f64| norm(sub(p, bezier(t)));
+            let coarse = (0..=400).map(|k| f64::from(k) / 400.0).min_by(|a, b| far(*a).total_cmp(&far(*b))).unwrap();
+            let (mut low, mut high) = ((coarse - 0.0025).max(0.0), (coarse + 0.0025).min(1.0));
+            for _ in 0..60 {
+                let (a, b) = (low + (high - low) / 3.0, high - (high - low) / 3.0);
+                if far(a) < far(b) { high = b } else { low = a }
+            }
+            bezier((low + high) / 2.0)
+        });
+        good("spline", found);
+    }
+}
+
+const MILLS: [(&str, [char; 2]); 4] =
+    [("generic/mill5-ac-table", ['A', 'C']), ("generic/mill5-bc-table", ['B', 'C']), ("generic/mill5-cb-head", ['B', 'C']), ("generic/mill5-b-head-c-table", ['B', 'C'])];
+
+fn milled(text: &str, id: &str) -> RobotProgram {
+    let machine = gr_machine::builtin(id).unwrap();
+    let setup = gr_interp::Setup { tools: gr_interp::assumed_tools(), ..gr_interp::Setup::default() };
+    let program = gr_driver::lower("part.ngc", text.into(), &setup, None).program;
+    let texts = Texts::new([(FileId(0), text)]);
+    let told = |e: Vec<gr_text::Diagnostic>| e.iter().map(|d| format!("{} {}\n", d.code.def().code, d.message)).collect::<String>();
+    plan(&program, &machine, &texts, &Options { own_words: true, tolerance: 0.005, ..Options::default() }).unwrap_or_else(|e| panic!("{id}: {}", told(e))).program
+}
+
+/// Words of a line of a joint program, by letter.
+fn words(line: &str) -> std::collections::BTreeMap<char, f64> {
+    line.split(' ').skip(1).map(|w| (w.chars().next().unwrap(), w[1..].parse().unwrap())).collect()
+}
+
+/// A tilt through zero: the rotary axes go as the program says, the tool stays where it was, in all four mills.
+#[test]
+fn a_tilt_goes_through_zero() {
+    for (id, [tilt, turn]) in MILLS {
+        let text = format!("T1 M6 G43.1 Z50\nG0 X10 Y10 Z-50 {tilt}20 {turn}0\nG1 Z-60 F500\nG1 {tilt}-20 F500\nG1 X20 {tilt}10 {turn}90\nG1 {tilt}0 {turn}0\nG1 {turn}45 F1000\nG0 {turn}300\nG0 Z-30\nM2\n");
+        let program = milled(&text, id);
+        let path = joint_path(&program, &JointOptions::default()).unwrap();
+        let at = |letter: char| program.machine.joints.iter().position(|j| j.word == Some(letter)).unwrap();
+        let ends: std::collections::BTreeMap<u32, [f64; 2]> = path.points().filter_map(|p| Some((p.source?.line + 1, [tilt, turn].map(|l| p.joints[at(l)].to_degrees())))).collect();
+        let expected = [(2, [20.0, 0.0]), (3, [20.0, 0.0]), (4, [-20.0, 0.0]), (5, [10.0, 90.0]), (6, [0.0, 0.0]), (7, [0.0, 45.0]), (8, [0.0, 300.0]), (9, [0.0, 300.0])];
+        for (line, [a, b]) in expected {
+            let got = ends[&line];
+            assert!((got[0] - a).abs() < 1e-6 && (got[1] - b).abs() < 1e-6, "{id}, line {line}: {got:?}");
+        }
+        // The tool stays on the part where only the rotary axes move, and no joint jumps.
+        let points: Vec<&JointPoint> = path.points().filter(|p| p.source.is_some()).collect();
+        for pair in points.windows(2) {
+            let line = pair[1].source.unwrap().line + 1;
+            for k in 0..=8 {
+                let share = f64::from(k) / 8.0;
+                let q: Vec<f64> = (0..5).map(|i| pair[0].joints[i] + (pair[1].joints[i] - pair[0].joints[i]) * share).collect();
+                let tip = program.machine.kinematics().forward_frame(&q).unwrap().then(&program.tools[0].frame).position;
+                if line == 4 {
+                    assert!(norm(sub(tip, [10.0, 10.0, -60.0])) <= 0.01, "{id}: {tip:?}");
+                }
+            }
+            assert!((0..5).all(|i| (pair[0].joints[i] - pair[1].joints[i]).abs() < if i < 3 { 60.0 } else { 0.6 }), "{id}, line {line}: {pair:?}");
+        }
+        // 40° at 500°/min, 45° at 1000°/min.
+        let seconds = |line: u32| path.points().filter(|p| p.source.is_some_and(|s| s.line + 1 == line)).map(|p| p.seconds).sum::<f64>();
+        assert!((seconds(4) - 40.0 / 500.0 * 60.0).abs() < 1e-9 && (seconds(7) - 45.0 / 1000.0 * 60.0).abs() < 1e-9, "{id}: {} {}", seconds(4), seconds(7));
+    }
+}
+
+/// A rotary axis goes to the angle that the program names, not to one that looks the same.
+#[test]
+fn a_rotary_axis_ends_at_its_limit() {
+    let text = "G0 X10 Y10 Z-50\nG1 C350 F3000\nG1 C400\nM2\n";
+    let setup = gr_interp::Setup::default();
+    let program = gr_driver::lower("part.ngc", text.into(), &setup, None).program;
+    let machine = gr_machine::builtin("generic/mill5-cb-head").unwrap();
+    let found = plan(&program, &machine, &Texts::new([(FileId(0), text)]), &Options::default()).unwrap_err();
+    let told: Vec<String> = found.iter().map(|d| format!("{} {}", d.code.def().code, d.message)).collect();
+    assert_eq!(told, ["E0507 joint C would have to go to 365°, its limit is 360°"]);
+}
+
+/// A mill's program keeps every word that is no motion; the rest is axis words with inverse time, which LinuxCNC reads.
+#[test]
+fn joint_gcode_of_mills() {
+    let text = "G21 G90 G94 G54\n(rough)\nT1 M6\nG43.1 Z50\nS3000 M3\nM8\nG0 X10 Y10 Z-50 A10 C0\nG1 Z-65 F500\nG4 P1\nG2 X30 I10 J0\nG1 A20 X20\nM62 P1\nM0\nM5\nM9\nG0 Z-30\nM2\n";
+    let program = milled(text, "generic/mill5-ac-table");
+    let path = joint_path(&program, &JointOptions::default()).unwrap();
+    let (out, _, found) = gcode(&program, &path, 6, &gr_ir::NoSources);
+    assert_eq!(found, []);
+    assert!(motion_is_good(&out));
+    insta::assert_snapshot!("mill5_joint_gcode", out.lines().filter(|l| !l.starts_with("G1 ")).collect::<Vec<_>>().join("\n"));
+    // What is written leads back to the program's path: the arc of line 10, and Σ time = length / F.
+    let k = program.machine.kinematics();
+    let tool = program.tools[0].frame;
+    let tip = |w: &std::collections::BTreeMap<char, f64>| {
+        let q = [w[&'X'], w[&'Y'], w[&'Z'], w[&'A'].to_radians(), w[&'C'].to_radians()];
+        k.forward_frame(&q).unwrap().then(&tool).position
+    };
+    let arc: Vec<_> = out.lines().skip_while(|l| !l.starts_with("G4 P1")).skip(1).take_while(|l| l.starts_with("G1")).map(words).collect();
+    let round = arc.iter().take_while(|w| tip(w)[1] > 10.0 + 1e-3).count() + 1;
+    for w in &arc[..round] {
+        let p = tip(w);
+        assert!((((p[0] - 20.0).powi(2) + (p[1] - 10.0).powi(2)).sqrt() - 10.0).abs() < 0.01 && (p[2] + 65.0).abs() < 0.01, "{p:?}");
+    }
+    let seconds: f64 = arc[..round].iter().map(|w| 60.0 / w[&'F']).sum();
+    assert!((seconds - std::f64::consts::PI * 10.0 / 500.0 * 60.0).abs() < 1e-9, "{seconds}");
+    let flat = milled("T1 M6\nS3000 M3\nG0 X10 Y10\nG0 Z50\nG1 Z5 F500\nG2 X30 I10\nG0 Z50\nM2\n", "generic/mill3");
+    let path = joint_path(&flat, &JointOptions::default()).unwrap();
+    insta::assert_snapshot!("mill3_joint_gcode", gcode(&flat, &path, 3, &gr_ir::NoSources).0.lines().take(16).collect::<Vec<_>>().join("\n"));
+}
+
+/// A straight wrist on the way is no jump: the fifth joint changes its sign, the fourth and the sixth stay.
+#[test]
+fn a_wrist_goes_straight_through() {
+    let file = include_str!("../../../docs/examples/irb2400-cell.toml")
+        .replace("position = [900, -100, 400]", "position = [900, 0, 850]")
+        .replace("rotation = [0, 45, 0]", "rotation = [0, 0, 0]")
+        .replace("position = [60, 0, 110]", "position = [0, 0, 110]")
+        .replace("extends =", "orientation = \"abc-euler-xyz\"\nextends =");
+    let machine = gr_machine::parse(FileId(0), &file).unwrap_or_else(|e| panic!("{e:?}"));
+    let text = "T1 M6\nG0 X100 Y0 Z600 B-90\nG1 Z200 F1000\nG1 Z600\nM2\n";
+    let setup = gr_interp::Setup { tools: gr_interp::assumed_tools(), ..gr_interp::Setup::default() };
+    let motion = gr_driver::lower("part.ngc", text.into(), &setup, None).program;
+    let told = |e: Vec<gr_text::Diagnostic>| e.iter().map(|d| format!("{} {}\n", d.code.def().code, d.message)).collect::<String>();
+    let program = plan(&motion, &machine, &Texts::new([(FileId(0), text)]), &Options::default()).unwrap_or_else(|e| panic!("{}", told(e))).program;
+    let path = joint_path(&program, &JointOptions::default()).unwrap();
+    let points: Vec<&JointPoint> = path.points().collect();
+    let bends: Vec<f64> = points.iter().map(|p| p.joints[4]).collect();
+    assert!(bends.iter().any(|b| *b > 0.05) && bends.iter().any(|b| *b < -0.05), "{bends:?}");
+    for pair in points.windows(2).filter(|w| !w[1].rapid) {
+        assert!([3, 5].iter().all(|i| (pair[0].joints[*i] - pair[1].joints[*i]).abs() < 1e-6), "{pair:?}");
+        for k in 0..=8 {
+            let at = between(&program, pair[0], pair[1], f64::from(k) / 8.0);
+            assert!(((at[0] - 1000.0).powi(2) + at[1].powi(2)).sqrt() <= 0.01, "{at:?}");
+        }
+    }
+    // Every pose by the configuration that is told for it.
+    for s in &program.steps {
+        if let Action::Linear { to, .. } = s.action {
+            let t = &program.targets[to as usize];
+            let all = machine.kinematics().inverse_frame(&machine.kinematics().forward_frame(&t.joints[..6]).unwrap()).unwrap();
+            let own = all.iter().find(|s| s.branch == t.branch).unwrap();
+            assert!((own.joints[4] - t.joints[4]).abs() < 1e-6, "{own:?} {t:?}");
+        }
+    }
+    let made = setpoints(&program, &SetpointOptions::default()).unwrap_or_else(|e| panic!("{e:?}"));
+    assert!(made.rows.len() > 100);
+    // Beside the plane the fourth joint really has to turn: at this feed that is an error.
+    let beside = text.replace("Y0", "Y0.001");
+    let motion = gr_driver::lower("part.ngc", beside.clone().into(), &setup, None).program;
+    assert!(plan(&motion, &machine, &Texts::new([(FileId(0), beside.as_str())]), &Options::default()).is_err());
+}

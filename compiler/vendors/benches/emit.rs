@@ -39,6 +39,7 @@ fn program() -> RobotProgram {
         targets: (0..COUNT).map(at).collect(),
         home: at(0),
         steps,
+        curves: gr_robot::Curves::default(),
     }
 }
 

@@ -45,6 +45,7 @@ fn program(id: &str, degrees: [f64; 6]) -> RobotProgram {
         home: Target { joints: { let mut h = joints; h[0] = 0.1; h }, ..targets[0] },
         targets,
         steps: actions.map(|action| Step { action, source: None }).into(),
+        curves: gr_robot::Curves::default(),
     }
 }
 

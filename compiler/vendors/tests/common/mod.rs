@@ -75,7 +75,7 @@ impl Builder {
             WorkFrame { name: "G55".into(), frame: Frame::new(add(near, [10.0, 20.0, -5.0]), tilt) },
         ];
         let home = Target { position: [0.0; 3], quaternion: [1.0, 0.0, 0.0, 0.0], joints, branch: branch(&machine, &joints) };
-        let program = RobotProgram { name: "part one".into(), machine, tools, frames, targets: Vec::new(), home, steps: Vec::new() };
+        let program = RobotProgram { name: "part one".into(), machine, tools, frames, targets: Vec::new(), home, steps: Vec::new(), curves: gr_robot::Curves::default() };
         let mut b = Builder { program, here: home, tool: 0, frame: 0, line: 0 };
         b.step(Action::UseTool(0));
         b.step(Action::UseFrame(0));
