@@ -1,4 +1,5 @@
-//! Universal Robots URScript: one script, meters and radians, poses in the robot's base.
+//! Universal Robots URScript: meters and radians, poses in the robot's base. One script, or where the machine file limits
+//! what one may hold, several to be run one after the other: no script can call another file.
 //!
 //! Every arm carries its own calibration, so points are poses; joint values only say which way the arm takes to them
 //! (`get_inverse_kin` with the joints nearby). Facts: signatures of the *URScript Programming Language* manual.
@@ -34,41 +35,113 @@ impl Language for UrScript {
     fn emit(&self, program: &RobotProgram, sources: &dyn Sources, options: &Options) -> Output {
         let mut names = Names::new(Rule { longest: 60, reserved: RESERVED, upper: false });
         let name = names.give(&program.name.to_lowercase(), "p");
-        let mut w = Writer { text: String::new(), points: 0, waits: 0 };
+        let mut w = Writer::new(&program.machine.cell.controller);
         let mut out = walk(program, sources, options, &TRAITS, &mut w);
         if !any_error(&out.findings) {
             names.tell(&mut out, TRAITS.title);
-            let text = format!("def {name}():\n{}end\n{name}()\n", w.text);
-            out.files = vec![OutputFile::new(format!("{name}.script"), text)];
+            out.files = w.files(&name);
         }
         out
     }
 }
 
 struct Writer {
+    /// The part in work.
     text: String,
+    lines: u64,
     points: u64,
+    /// Points of all parts.
+    all: u64,
+    /// Bytes of marks in `text`.
+    marks: usize,
     waits: u32,
+    /// Lines, points and bytes of one script at most.
+    most: (u64, u64, u64),
+    /// Scripts before the one in work.
+    done: Vec<String>,
+    /// The last move ends in a blend: the next must stand in the same script.
+    blended: bool,
+    /// Tool and payload in force.
+    tool: Vec<String>,
+    /// Where the last move ends.
+    last: String,
 }
 
+/// Lines around a part: definition, guard, tool, call.
+const AROUND: u64 = 8;
+/// Lines kept for what may come after a move without stopping it, and for one statement.
+const ROOM: u64 = 10;
+
 impl Writer {
-    fn line(&mut self, cx: &Cx, text: &str) {
-        self.text.push_str("  ");
-        self.text.push_str(text);
-        if let Some(line) = cx.remark {
-            let _ = write!(self.text, "  # {line}");
+    fn new(limits: &gr_machine::Controller) -> Writer {
+        let all = u64::MAX;
+        // Smaller ones hold no statement.
+        let most = (limits.lines.unwrap_or(all).max(AROUND + 2 * ROOM), limits.points.unwrap_or(all).max(4), limits.bytes.unwrap_or(all).max(8000));
+        Writer {
+            text: String::new(),
+            lines: 0,
+            points: 0,
+            all: 0,
+            marks: 0,
+            waits: 0,
+            most,
+            done: Vec::new(),
+            blended: false,
+            tool: Vec::new(),
+            last: String::new(),
         }
-        crate::marks::put(&mut self.text, cx.step);
-        self.text.push('\n');
     }
 
-    fn count(&mut self, cx: &mut Cx, points: u64) {
-        self.points += points;
+    fn put(&mut self, text: &str, remark: Option<u32>, step: Option<u32>) {
+        self.text.push_str("  ");
+        self.text.push_str(text);
+        if let Some(line) = remark {
+            let _ = write!(self.text, "  # {line}");
+        }
+        self.marks += crate::marks::put(&mut self.text, step);
+        self.text.push('\n');
+        self.lines += 1;
+    }
+
+    fn line(&mut self, cx: &Cx, text: &str) {
+        self.put(text, cx.remark, cx.step);
+    }
+
+    /// Whether so many more lines have room, and another move after them.
+    fn room(&self, lines: u64) -> bool {
+        let bytes = self.text.len().saturating_sub(self.marks) as u64;
+        self.lines + lines + AROUND <= self.most.0 && self.points + 2 <= self.most.1 && bytes + 160 * (lines + AROUND) <= self.most.2
+    }
+
+    /// Closes a script that has no room for so many more lines. Where the tool must be is looked at before the next goes on.
+    fn part(&mut self, lines: u64) {
+        if self.blended || self.last.is_empty() || self.room(lines) {
+            return;
+        }
+        self.done.push(std::mem::take(&mut self.text));
+        (self.lines, self.points, self.marks) = (0, 0, 0);
+        let guard = format!("if point_dist(get_actual_tcp_pose(),{})>0.001:", self.last);
+        let stop = ["  popup(\"this part goes on where the one before ended\",\"wrong place\",False,True,blocking=True)", "  halt", "end"];
+        for text in self.tool.clone().iter().map(String::as_str).chain([guard.as_str()]).chain(stop) {
+            self.put(text, None, None);
+        }
+    }
+
+    fn files(mut self, name: &str) -> Vec<OutputFile> {
+        let script = |name: &str, text: &str| OutputFile::new(format!("{name}.script"), format!("def {name}():\n{text}end\n{name}()\n"));
+        self.done.push(self.text);
+        match self.done.as_slice() {
+            [one] => vec![script(name, one)],
+            parts => parts.iter().enumerate().map(|(i, part)| script(&format!("{name}_{:03}", i + 1), part)).collect(),
+        }
+    }
+
+    /// A move of so many points to a pose that stops there where the script has no room for more.
+    fn moved(&mut self, cx: &mut Cx, points: u64, to: &Target) {
+        (self.points, self.all) = (self.points + points, self.all + points);
+        self.last = point(cx, to);
         let limits = &cx.machine.cell.controller;
-        if let Some(most) = limits.points.filter(|m| self.points > *m) {
-            let args = ["too many".to_string(), "points".into(), most.to_string(), TRAITS.title.into()];
-            cx.say(code::VENDOR_PROGRAM_TOO_LONG, &args);
-        } else if limits.points.is_none() && self.points > POINTS {
+        if limits.lines.or(limits.points).or(limits.bytes).is_none() && self.all > POINTS {
             let args = [format!("more than {POINTS}"), "points".into(), TRAITS.title.into(), format!("{POINTS} points")];
             cx.say(code::VENDOR_PROGRAM_SIZE, &args);
         }
@@ -107,6 +180,7 @@ fn blend(cx: &Cx, zone: Option<f64>) -> String {
 
 impl Body for Writer {
     fn op(&mut self, cx: &mut Cx, op: Op) {
+        self.part(ROOM);
         match op {
             Op::Line(number, text) => {
                 let text = cx.ascii(text);
@@ -114,26 +188,35 @@ impl Body for Writer {
             }
             Op::Home(t) => self.joint(cx, t, 0.25, false),
             Op::Joint { to, share, .. } => {
-                self.count(cx, 1);
+                self.moved(cx, 1, to);
+                self.blended = false;
                 self.joint(cx, to, share, true);
             }
             Op::Linear { to, speed, zone } => {
-                self.count(cx, 1);
-                let text = format!("movel({},a=1.2,v={},t=0,r={})", point(cx, to), single(speed / 1000.0), blend(cx, zone));
+                self.moved(cx, 1, to);
+                // Remarks may come before the move that the blend goes over into.
+                let radius = if self.room(2 * ROOM) { blend(cx, zone) } else { "0".into() };
+                self.blended = radius != "0";
+                let text = format!("movel({},a=1.2,v={},t=0,r={radius})", self.last, single(speed / 1000.0));
                 self.line(cx, &text);
             }
             Op::Arc { via, to, speed, .. } => {
-                self.count(cx, 2);
+                self.moved(cx, 2, to);
+                self.blended = false;
                 let (via, to) = (point(cx, via), point(cx, to));
                 self.line(cx, &format!("movec({via},{to},a=1.2,v={},r=0,mode=0)", single(speed / 1000.0)));
             }
             Op::Tool(i) => {
                 let tool = &cx.program.tools[i];
-                self.line(cx, &format!("set_tcp({})", pose(&tool.frame, 7)));
+                let mut words = vec![format!("set_tcp({})", pose(&tool.frame, 7))];
                 if let Some(mass) = tool.mass {
                     let c = tool.frame.position.map(|v| num(v / 2000.0, 6)).join(",");
-                    self.line(cx, &format!("set_payload({},[{c}])", num(mass, 3)));
+                    words.push(format!("set_payload({},[{c}])", num(mass, 3)));
                 }
+                words.iter().for_each(|w| self.line(cx, w));
+                self.tool = words;
+                // Where the arm stands is another pose for another point: no script ends here.
+                self.last.clear();
             }
             Op::Frame(i) => {
                 let name = cx.ascii(&cx.program.frames[i].name);

@@ -62,8 +62,13 @@ fn every_finding() {
         b.add(&Move::Line { shift: [if i % 2 == 0 { 1.0 } else { -1.0 }, 0.0, 0.0], turn: [0.0; 3], speed: 10.0, zone: None });
     }
     note("E0627 a long script", run("urscript", &b, true));
-    b.program.machine.cell.controller.points = Some(100);
-    note("E0635 longer than the machine file allows", run("urscript", &b, true));
+    let (id, home, _) = robot_of("kawasaki-as");
+    let mut b = Builder::new(machine(id), home);
+    for i in 0..200 {
+        b.add(&Move::Line { shift: [if i % 2 == 0 { 1.0 } else { -1.0 }, 0.0, 0.0], turn: [0.0; 3], speed: 10.0, zone: None });
+    }
+    b.program.machine.cell.controller.lines = Some(100);
+    note("E0635 longer than the machine file allows", run("kawasaki-as", &b, true));
     let (id, home, _) = robot_of("rapid");
     let mut b = Builder::new(machine(id), home);
     b.program.name = "module".into();

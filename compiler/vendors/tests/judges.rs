@@ -157,3 +157,31 @@ fn numbers_of(target: &str, q: [f64; 4]) -> Vec<f64> {
     };
     head.split(|c: char| !(c.is_ascii_digit() || c == '.' || c == '-')).filter_map(|t| t.parse().ok()).take(7).collect()
 }
+
+/// A long URScript program becomes scripts that are run one after the other: each keeps to the limits, stops at its end and
+/// looks at its beginning whether the tool is where the one before left it.
+#[test]
+fn urscript_in_parts() {
+    let (id, home, _) = robot_of("urscript");
+    let mut b = Builder::new(machine(id), home);
+    for i in 0..200 {
+        b.add(&Move::Line { shift: [if i % 2 == 0 { 5.0 } else { -5.0 }, 0.0, 0.1], turn: [0.0; 3], speed: 10.0, zone: Some(1.0) });
+    }
+    b.program.machine.cell.controller.lines = Some(60);
+    let files = texts(&emit("urscript", &b.program));
+    assert!(files.len() > 3, "{}", files.len());
+    let pose = |line: &str| line.split_once("p[").unwrap().1.split(']').next().unwrap().to_string();
+    for (i, (name, text)) in files.iter().enumerate() {
+        assert!(name.ends_with(&format!("_{:03}.script", i + 1)), "{name}");
+        assert!(text.lines().count() <= 60, "{name}: {}", text.lines().count());
+        let last = text.lines().rfind(|l| l.contains("move")).unwrap();
+        assert!(last.contains("r=0)") || last.contains("movej"), "{last}");
+        if i > 0 {
+            let before = files[i - 1].1.lines().rfind(|l| l.contains("movel(")).unwrap();
+            let guard = text.lines().find(|l| l.contains("point_dist(")).unwrap();
+            assert_eq!(pose(guard.split_once("pose(),").unwrap().1), pose(before), "{name}");
+            assert!(text.find("set_tcp(").unwrap() < text.find("point_dist(").unwrap());
+        }
+    }
+    insta::assert_snapshot!("urscript_part", files[1].1.lines().take(10).collect::<Vec<_>>().join("\n"));
+}

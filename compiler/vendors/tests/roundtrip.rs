@@ -368,7 +368,7 @@ proptest! {
     #[test]
     fn random_programs_come_back(moves in moves(), robot in 0usize..3, split in prop_oneof![Just(None), Just(Some(60u64))]) {
         for target in TARGETS {
-            let splits = matches!(target, "rapid" | "krl" | "fanuc-ls" | "inform" | "val3");
+            let splits = matches!(target, "rapid" | "krl" | "fanuc-ls" | "inform" | "val3" | "urscript");
             let program = program(target, robot, &moves, split.filter(|_| splits));
             let result = compare(target, &program);
             prop_assert!(result.is_ok(), "{target}: {}", result.unwrap_err());

@@ -4,12 +4,19 @@ use super::simple::{State, signal};
 use super::{Configuration, Event, Fault, File, Place, after, between, numbers, without_remark};
 use gr_machine::math::{Frame, about, norm, scale};
 
-/// Reads a script.
+/// Reads scripts that are run one after the other.
 pub fn read(files: &[File]) -> Result<Vec<Event>, Fault> {
-    let text = &super::main_file(files, ".script")?.1;
+    super::main_file(files, ".script")?;
     let mut s = State::new();
     // Poses are in the base.
     s.frame = Some(Frame::IDENTITY);
+    for (_, text) in files.iter().filter(|f| f.0.ends_with(".script")) {
+        script(&mut s, text)?;
+    }
+    Ok(s.events)
+}
+
+fn script(s: &mut State, text: &str) -> Result<(), Fault> {
     let mut depth = 0;
     for raw in text.lines() {
         let line = without_remark(raw, "#");
@@ -26,10 +33,11 @@ pub fn read(files: &[File]) -> Result<Vec<Event>, Fault> {
             continue;
         }
         let Some((name, rest)) = line.split_once('(') else { continue };
-        step(&mut s, name, rest).ok_or_else(fault)?;
+        step(s, name, rest).ok_or_else(fault)?;
     }
+    // The call of the script itself.
     s.events.pop();
-    Ok(s.events)
+    Ok(())
 }
 
 /// Meters and rotation vector.
