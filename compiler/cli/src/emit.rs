@@ -396,7 +396,13 @@ fn of_motion(mut motion: Motion, unit: &Unit, goal: &Goal<'_>) -> Result<Built, 
     };
     if let Some(made) = planned {
         return Ok(match made {
-            Ok(m) => Built { summary: Some(m.summary), ..built(motion, m.artifacts, m.notes) },
+            Ok(mut m) => {
+                if let Some(c) = corrected {
+                    m.summary += &c.summary;
+                    m.artifacts.push(c.table);
+                }
+                Built { summary: Some(m.summary), ..built(motion, m.artifacts, m.notes) }
+            }
             Err(found) => built(motion, Vec::new(), found),
         });
     }

@@ -234,7 +234,9 @@ fn compensated(
 
 /// Whether a target is made from a plan of the machine's joints, which is then what is corrected.
 pub fn is_planned(goal: &Goal<'_>) -> bool {
-    is_language(goal.target) || goal.target == "setpoints" || goal.target == "joint-gcode" && plans_joints(goal)
+    // A mill's motion is corrected before its joints are planned.
+    let mill = goal.machine.is_some_and(|m| m.kind == Kind::Mill);
+    is_language(goal.target) || !mill && (goal.target == "setpoints" || goal.target == "joint-gcode" && plans_joints(goal))
 }
 
 /// A program as motion, corrected for the machine's known geometry.
@@ -400,7 +402,8 @@ fn own_plan(motion: &Motion, goal: &Goal<'_>, texts: &dyn Sources, name: &str, s
     let all = options(motion, goal, name)?;
     let tolerance = all.tolerance * share;
     let options = Options { own_words: true, tolerance, ..all };
-    Ok(plan(&motion.program, &machine, texts, &options).and_then(|p| compensated(p, goal, texts, tolerance)))
+    let corrected = |p| if machine.kind == Kind::Mill { Ok((p, None)) } else { compensated(p, goal, texts, tolerance) };
+    Ok(plan(&motion.program, &machine, texts, &options).and_then(corrected))
 }
 
 fn too_many(found: &gr_robot::joints::TooMany, texts: &dyn Sources) -> Diagnostic {
