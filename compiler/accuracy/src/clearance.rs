@@ -63,6 +63,12 @@ impl Lattice {
         self.step
     }
 
+    /// Least and greatest coordinate of the nodes within reach.
+    pub fn span(&self, axis: usize) -> Option<(f64, f64)> {
+        let some = (0..self.reached.len()).filter(|n| self.reached[*n]).map(|n| self.place(n)[axis]);
+        some.fold(None, |ends: Option<(f64, f64)>, v| Some(ends.map_or((v, v), |(a, b)| (a.min(v), b.max(v)))))
+    }
+
     fn place(&self, n: usize) -> V3 {
         let [x, y, _] = self.size;
         let at = [n % x, n / x % y, n / (x * y)];

@@ -134,6 +134,13 @@ impl Sensitivity {
         })
     }
 
+    /// With the geometry's part counted from a place where the machine was told that it is right: a zero that was touched.
+    #[must_use]
+    pub fn since(mut self, zero: &Sensitivity) -> Sensitivity {
+        self.geometry.iter_mut().zip(&zero.geometry).for_each(|(c, z)| *c = sub(*c, *z));
+        self
+    }
+
     /// Compliance of the tool point, mm/N; none where the stiffness of a joint that carries the force is not known.
     /// The virtual work of a force on the tool equals that of the joints' springs.
     pub fn compliance(&self) -> Option<[[f64; 3]; 3]> {

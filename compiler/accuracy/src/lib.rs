@@ -31,4 +31,4 @@ pub mod report;
 mod words;
 
 pub use error::{Budget, BudgetOptions, Errors, Sensitivity, Spread, closed_form};
-pub use words::{put_down, work_shift};
+pub use words::{Named, put_down, work_shift};

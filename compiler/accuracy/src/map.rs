@@ -1,8 +1,10 @@
 //! Maps over the work space: a quantity on a grid in a plane of the base.
 
-use crate::error::{Budget, Sensitivity, Spread, at_lever};
-use gr_machine::math::{Frame, M3, V3, dot, eigenvalues, norm, product, rot_x, rotate, sub};
-use gr_machine::{Chain, Control, JointKind, Kinematics, Machine, Opw, TwoLegs, differential};
+use crate::clearance::Lattice;
+use crate::error::{Budget, Sensitivity, Spread, at_lever, closed_form};
+use crate::words::{Asked, Words};
+use gr_machine::math::{Frame, M3, V3, dot, eigenvalues, norm, rot_x, rotate, sub};
+use gr_machine::{Chain, Control, JointKind, Kind, Kinematics, Machine, Opw, TwoLegs, differential};
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -168,7 +170,7 @@ pub struct Map {
     pub centred: bool,
     /// There is a deflection in it.
     pub elastic: bool,
-    /// Nodes within reach that have no value: a spring has no length left there.
+    /// Nodes within reach that have no value: a spring has no length left there, or the place is singular.
     pub lost: usize,
     /// Values.
     pub values: Vec<f32>,
@@ -278,6 +280,8 @@ pub struct Probe<'a> {
     /// Tool point on the flange.
     tool: Frame,
     start: Vec<f64>,
+    /// What moves the tool point where the part was touched: errors by the geometry count from there.
+    zero: Option<Sensitivity>,
     /// What one radian of a turning joint counts beside one mm of a sliding one, mm; once it is asked for.
     lever: OnceLock<f64>,
     /// The part of the base the tool can reach; once it is asked for.
@@ -290,14 +294,52 @@ impl<'a> Probe<'a> {
         let start = machine.start_joints.clone().unwrap_or_default();
         let kinematics = machine.kinematics();
         let turn = machine.start.frame().turn;
-        Probe { machine, kinematics, turn, tool: Frame::IDENTITY, start, lever: OnceLock::new(), extent: OnceLock::new() }
+        Probe { machine, kinematics, turn, tool: Frame::IDENTITY, start, zero: None, lever: OnceLock::new(), extent: OnceLock::new() }
     }
 
-    /// With the point of this tool (on the flange) in place of the flange, and its axis as the flange's was; in a base
-    /// turned by `part`.
-    pub fn with_tool(self, tool: Frame, part: &M3) -> Probe<'a> {
+    /// As on a machine tool whose part was touched there; other machines have no such zero.
+    pub fn touched(self, at: V3) -> Probe<'a> {
+        let zero = match Words::of(self.machine) {
+            Ok(Words::Joints(slides)) if self.machine.kind != Kind::Robot => {
+                let asked = Asked { tip: at, tool: self.tool, rotary: [0.0; 3] };
+                slides.sensitivity(self.machine, &*self.kinematics, &asked)
+            }
+            _ => None,
+        };
+        Probe { zero, ..self }
+    }
+
+    /// Whether errors by the geometry count from a zero that was touched.
+    pub fn counts_from_zero(&self) -> bool {
+        self.zero.is_some()
+    }
+
+    /// Whether it is for whoever asks how the tool is turned: neither the machine nor a spindle that can't turn decides it.
+    pub fn turns_as_asked(&self) -> bool {
+        !matches!(self.machine.chain, Chain::Cartesian) && self.kinematics.control() != Control::Position
+    }
+
+    /// The turn of a planar arm's tool about Z, rad.
+    pub fn planar_angle(&self) -> Option<f64> {
+        matches!(self.machine.chain, Chain::Planar3r(_)).then(|| libm::atan2(self.turn[1][0], self.turn[0][0]))
+    }
+
+    /// Whether only the lean of its tool is its own: the spindle turns it about itself anyway.
+    pub fn leans(&self) -> bool {
+        self.kinematics.control() == Control::Axis
+    }
+
+    /// Least and greatest coordinate that is within reach, on a lattice, and how fine that is, mm.
+    pub fn span(&self, axis: usize) -> Option<(f64, f64, f64)> {
+        let count = if closed_form(self.machine) { 60_000 } else { 4_000 };
+        let lattice = Lattice::new(self.extent(), count, &|p| self.reaches(p), &|_, _| {});
+        lattice.span(axis).map(|(low, high)| (low, high, lattice.step()))
+    }
+
+    /// With the tool (on the flange) in this turn in the base.
+    pub fn held(self, tool: Frame, turn: M3) -> Probe<'a> {
         // A spindle that can't turn its part stands as it stands.
-        let turn = if matches!(self.machine.chain, Chain::Cartesian) { self.turn } else { product(part, &self.turn) };
+        let turn = if matches!(self.machine.chain, Chain::Cartesian) { self.turn } else { turn };
         Probe { tool, turn, ..self }
     }
 
@@ -376,6 +418,14 @@ impl<'a> Probe<'a> {
 
     /// What moves the tool there; none where it can't be put.
     pub fn sensitivity(&self, p: V3, geometry: bool) -> Option<Sensitivity> {
+        let s = self.sensed(p, geometry)?;
+        Some(match &self.zero {
+            Some(zero) => s.since(zero),
+            None => s,
+        })
+    }
+
+    fn sensed(&self, p: V3, geometry: bool) -> Option<Sensitivity> {
         match &self.machine.chain {
             Chain::TwoLegs(k) => {
                 let at = k.place_of(self.flange(p).position);
@@ -458,12 +508,29 @@ impl<'a> Probe<'a> {
         [0, 1, 2].map(|i| (out[2 * i], out[2 * i + 1]))
     }
 
+    /// The longest way from an axis of a turning joint to the tool, mm: what a radian counts beside a mm.
+    fn longest_lever(&self) -> f64 {
+        let lever = |q: &[f64]| {
+            let columns = differential::velocity(self.machine, q).ok()?;
+            let turning = columns.iter().zip(&self.machine.joints).filter(|(_, j)| j.kind == JointKind::Revolute);
+            turning.map(|(c, _)| norm([c[0], c[1], c[2]])).reduce(f64::max)
+        };
+        let places = (1..LEVERS).map(|n| spread_joints(self.machine, n));
+        let mut found: Vec<(f64, Vec<f64>)> = places.filter_map(|q| Some((lever(&q)?, q))).collect();
+        found.sort_by(|a, b| b.0.total_cmp(&a.0));
+        // The forward solution of a Tricept is a search itself.
+        let (climbs, halvings) = if matches!(self.machine.chain, Chain::Tricept(_)) { (1, 10) } else { (CLIMBED, 40) };
+        found.truncate(climbs);
+        let longest = found.into_iter().map(|(v, q)| self.climbed(v, q, halvings, lever)).fold(0.0, f64::max);
+        if longest > 0.0 { longest } else { 1.0 }
+    }
+
     /// The greatest value near those joints: one joint after the other, in steps that are halved.
     fn climbed(&self, mut best: f64, mut q: Vec<f64>, halvings: u32, value: impl Fn(&[f64]) -> Option<f64>) -> f64 {
         for halving in 0..halvings {
             for (i, joint) in self.machine.joints.iter().enumerate() {
                 let (low, high) = limits(joint);
-                let step = (high - low) / f64::from(4u32 << halving);
+                let step = (high - low) / libm::ldexp(4.0, halving as i32);
                 for by in [step, -step] {
                     let was = q[i];
                     q[i] = (was + by).clamp(low, high);
@@ -484,7 +551,7 @@ impl<'a> Probe<'a> {
         if matches!(self.machine.chain, Chain::TwoLegs(_) | Chain::Cartesian) || self.kinematics.control() == Control::Position {
             return Some(share(&self.sensitivity(p, false)?.joints));
         }
-        let size = *self.lever.get_or_init(|| longest_lever(self.machine));
+        let size = *self.lever.get_or_init(|| self.longest_lever());
         let (q, mut columns) = match &self.machine.chain {
             Chain::Opw(k) => {
                 let q = self.opw(k, p)?;
@@ -534,8 +601,8 @@ impl<'a> Probe<'a> {
             return self.reaches(p).then_some(1.0);
         }
         match request.quantity {
-            Quantity::Condition => return self.evenness(p).map(|v| 1.0 / v.max(1e-12)),
-            Quantity::Singularity => return self.evenness(p),
+            Quantity::Condition => return self.evenness(p).map(|v| if v < SINGULAR { f64::NAN } else { 1.0 / v }),
+            Quantity::Singularity => return self.evenness(p).map(|v| if v < SINGULAR { 0.0 } else { v }),
             _ => {}
         }
         let geometry = matches!(request.quantity, Quantity::Geometric(_) | Quantity::Total | Quantity::TotalRss);
@@ -593,19 +660,11 @@ fn legs_reach(k: &TwoLegs, at: V3) -> bool {
     within(h[0], s.legs[0]) && within(h[1], s.legs[1]) && k.broken(at).is_empty()
 }
 
-/// Places of the joints that are looked at for the longest lever.
+/// Below this the least singular value is rounding: the place is singular.
+const SINGULAR: f64 = 1e-7;
+/// Places of the joints that are looked at for the longest lever, and how many of the best are climbed from.
 const LEVERS: u32 = 100;
-
-/// The longest way from an axis of a turning joint to the tool, mm: what a radian counts beside a mm.
-fn longest_lever(machine: &Machine) -> f64 {
-    let mut longest = 0.0f64;
-    for n in 1..LEVERS {
-        let Ok(columns) = differential::velocity(machine, &spread_joints(machine, n)) else { continue };
-        let turning = columns.iter().zip(&machine.joints).filter(|(_, j)| j.kind == JointKind::Revolute);
-        longest = turning.map(|(c, _)| norm([c[0], c[1], c[2]])).fold(longest, f64::max);
-    }
-    if longest > 0.0 { longest } else { 1.0 }
-}
+const CLIMBED: usize = 6;
 
 /// Limits of a joint; half a turn or half a metre where it has none.
 pub(crate) fn limits(j: &gr_machine::Joint) -> (f64, f64) {

@@ -65,6 +65,37 @@ fn number(v: f64, span: f64) -> String {
     if text == "-0" { "0".into() } else { text.to_string() }
 }
 
+/// The values that the colors tell apart. Where a few places take nearly all of the range the rest would be one color: then
+/// the colors end before them, which is said.
+fn told_apart(map: &Map, (low, high): (f64, f64)) -> ((f64, f64), Option<String>) {
+    const FEW: f64 = 0.02;
+    const LEAST: f64 = 0.4;
+    let mut values: Vec<f32> = map.values.iter().copied().filter(|v| !v.is_nan()).collect();
+    values.sort_by(f32::total_cmp);
+    let count = values.len();
+    if count < 50 {
+        return ((low, high), None);
+    }
+    let at = |share: f64| f64::from(values[((count - 1) as f64 * share) as usize]);
+    let (a, b) = (at(FEW), at(1.0 - FEW));
+    let top = if b - low < LEAST * (high - low) { b } else { high };
+    let bottom = if top - a < LEAST * (top - low) { a } else { low };
+    if (bottom, top) == (low, high) || !(top > bottom) {
+        return ((low, high), None);
+    }
+    let above = values.iter().filter(|v| f64::from(**v) > top).count();
+    let below = values.iter().filter(|v| f64::from(**v) < bottom).count();
+    let wide = top - bottom;
+    let mut parts = Vec::new();
+    if above > 0 {
+        parts.push(format!("{above} of {count} nodes are above {}", number(top, wide)));
+    }
+    if below > 0 {
+        parts.push(format!("{below} of {count} nodes are below {}", number(bottom, wide)));
+    }
+    ((bottom, top), Some(format!("colors end where only a few nodes are: {}", parts.join(", "))))
+}
+
 impl Picture {
     fn text(&mut self, text: impl Into<String>, at: [f32; 2], height: f32, anchor: f32) {
         self.shapes.push(Shape::Text(text.into(), at, height, anchor));
@@ -88,6 +119,11 @@ impl Picture {
         let span = [0, 1].map(|i| (border[i].1 - border[i].0).max(1e-9));
         let scale = (f64::from(WIDE) / span[0]).min(f64::from(TALL) / span[1]);
         let (w, h) = ((span[0] * scale) as f32, (span[1] * scale) as f32);
+        let summary = map.summary();
+        let whole = summary.map_or((0.0, 1.0), |s| (s.least.0, s.greatest.0));
+        let (range, beyond) = told_apart(map, whole);
+        let mut notes = notes.to_vec();
+        notes.extend(beyond);
         // The machine in the first line, what is shown in the second.
         let (machine, what) = title.split_once(": ").unwrap_or((title, ""));
         let longest = notes.iter().map(|n| font::width(n, NOTE)).fold(font::width(machine, 14.0).max(font::width(what, 11.0)), f32::max);
@@ -96,8 +132,6 @@ impl Picture {
         let mut p = Picture { size, title: title.to_string(), shapes: Vec::new() };
         p.text(machine, [LEFT, 26.0], 14.0, 0.0);
         p.text(what, [LEFT, 48.0], 11.0, 0.0);
-        let summary = map.summary();
-        let range = summary.map_or((0.0, 1.0), |s| (s.least.0, s.greatest.0));
         let flat = !(range.1 - range.0 > 1e-9 * range.1.abs().max(1e-9));
         let share = |v: f64| if flat { 0.6 } else { (v - range.0) / (range.1 - range.0) };
         let (iw, ih) = (w.max(1.0) as usize, h.max(1.0) as usize);
@@ -127,11 +161,11 @@ impl Picture {
             let text = if map.quantity == Quantity::Workspace {
                 format!("area {:.2} dm²", s.area / 1e4)
             } else {
-                let wide = range.1.abs().max(range.0.abs());
+                let wide = whole.1.abs().max(whole.0.abs());
                 format!(
                     "least {} {unit}  greatest {} {unit}  mean {} {unit}",
-                    number(range.0, wide),
-                    number(range.1, wide),
+                    number(whole.0, wide),
+                    number(whole.1, wide),
                     number(s.mean, wide)
                 )
             };

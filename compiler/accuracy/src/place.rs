@@ -4,7 +4,7 @@
 mod arm;
 mod mill;
 
-pub use arm::{Arm, Part};
+pub use arm::{Arm, Part, around};
 pub use mill::Mill;
 
 use crate::error::Budget;
@@ -118,6 +118,15 @@ struct Search<'a> {
     room: [(f64, f64); 3],
 }
 
+/// Errors nearer to each other than this are one, mm.
+const SAME_ERROR: f64 = 1e-6;
+
+/// What a place is worth by its error; of places with the same the one that is more free.
+fn by_error(error: f64, free: f64) -> f64 {
+    const MOST_FREE: f64 = 1e5;
+    SAME_ERROR * (free.min(MOST_FREE) / MOST_FREE - libm::round(error / SAME_ERROR))
+}
+
 impl Search<'_> {
     fn count(&self) -> [usize; 3] {
         self.room.map(|(low, high)| if high > low { GRID } else { 1 })
@@ -140,7 +149,7 @@ impl Search<'_> {
         if !self.by_error {
             return Some(free);
         }
-        self.reach.error(self.budget, at, Look::Glance, f64::INFINITY).map(|e| -e)
+        self.reach.error(self.budget, at, Look::Glance, f64::INFINITY).map(|e| by_error(e, free))
     }
 
     /// What a place is worth, where that is more than `least`.
@@ -150,7 +159,7 @@ impl Search<'_> {
             return Some(Best { worth: free, at, free });
         }
         let free = self.reach.free(at, Look::All, 0.0)?;
-        let worth = -self.reach.error(self.budget, at, Look::Some, -least)?;
+        let worth = by_error(self.reach.error(self.budget, at, Look::Some, -least + 2.0 * SAME_ERROR)?, free);
         (worth > least).then_some(Best { worth, at, free })
     }
 
@@ -185,7 +194,7 @@ impl Search<'_> {
             for way in 0..27 {
                 let by = [way % 3, way / 3 % 3, way / 9].map(|v| f64::from(v) - 1.0);
                 let at = [0, 1, 2].map(|i| around[i] + by[i] * step[i]);
-                if let Some(better) = self.worth(at, best.worth + 1e-9).filter(|_| self.reach.fits(at)) {
+                if let Some(better) = self.worth(at, best.worth + if self.by_error { 1e-14 } else { 1e-9 }).filter(|_| self.reach.fits(at)) {
                     best = better;
                 }
             }

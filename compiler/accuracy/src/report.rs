@@ -7,7 +7,7 @@ pub(crate) use mill::turns_apart;
 
 use crate::error::{Budget, Errors, Sensitivity};
 use crate::material::{Bore, Cut, Material};
-use gr_ir::{Marker, Op, Program, Source, State, Turn};
+use gr_ir::{Marker, Op, Program, Source, State, Turn, View};
 use gr_machine::{Chain, Control, Kind, Kinematics, Machine};
 use gr_machine::math::{Frame, V3, add, about, cross, dot, norm, rotate, scale, sub, turn_of};
 use gr_robot::{Action, RobotProgram, Target};
@@ -52,10 +52,10 @@ impl CutData {
     /// Names of what is not known for this kind of work.
     pub fn missing(&self, work: Work) -> Vec<&'static str> {
         let mill = [
-            (self.diameter, "the diameter of the tool"),
-            (self.teeth, "its number of teeth"),
-            (self.depth, "the depth of cut"),
-            (self.width, "the width of cut"),
+            (self.diameter, "the diameter of the tool (`--diameter`)"),
+            (self.teeth, "its number of teeth (`--teeth`)"),
+            (self.depth, "the depth of cut (`--depth`)"),
+            (self.width, "the width of cut (`--width`)"),
         ];
         let drill = [(self.diameter, "the diameter of the drill"), (self.point, "the point angle of the drill (`--point`)")];
         let all = match work {
@@ -75,7 +75,7 @@ pub enum Work {
     Mill,
     /// Along its axis, with lips at its end: G73 G81 G82 G83, and the drilling of STEP-NC.
     Drill,
-    /// Tapping, boring, reaming, countersinking: no law here.
+    /// Tapping, threading, boring, reaming, countersinking: no law here.
     Other,
 }
 
@@ -83,6 +83,12 @@ impl Work {
     /// By a canned cycle's number times ten.
     fn of_cycle(code: i32) -> Work {
         if matches!(code, 730 | 810 | 820 | 830) { Work::Drill } else { Work::Other }
+    }
+
+    /// A move that is locked to the spindle's angle cuts a thread, whatever is around it.
+    fn of_move(self, view: &View<'_, '_>) -> Work {
+        let locked = matches!(view.op, Op::RigidTap { .. }) || view.state.sync.is_some_and(|s| !s.velocity);
+        if locked { Work::Other } else { self }
     }
 }
 
@@ -165,7 +171,8 @@ impl Operations {
                 tool = (loaded, String::new());
                 open = None;
             }
-            if view.op.feeds() {
+            if view.op.cuts() {
+                let work = work.of_move(&view);
                 let at = *open.get_or_insert_with(|| {
                     let name = match &step {
                         Some((id, name)) if name.is_empty() => format!("#{id}"),
@@ -232,6 +239,8 @@ pub struct Stretch {
 pub enum Unforced {
     /// A mill is fed along its axis.
     Axial,
+    /// A drill is fed another way than along its axis.
+    Across,
     /// There is no law of such work here.
     NoLaw,
     /// No turns per minute are known.
@@ -271,6 +280,9 @@ pub struct Report {
     pub rows: Vec<Row>,
     /// Joints that a program in words of the machine sends beyond their limits: each with the first place and its value.
     pub outside: Vec<(Source, usize, f64)>,
+    /// The program's zero in the base, mm, the first where there are several: errors by the geometry count from there, where it was
+    /// touched on the machine.
+    pub touched: Option<V3>,
 }
 
 /// Never further apart than this are the places looked at, mm.
@@ -279,6 +291,10 @@ const APART: f64 = 10.0;
 const NEAR: f64 = 1.0;
 /// Unless a rotary axis has turned by more than this, rad.
 const LEAN: f64 = std::f64::consts::PI / 180.0;
+/// Or the direction of the feed by more than this: cosine of 2°.
+const SAME_WAY: f64 = 0.999_39;
+/// Along an arc the feed turns by no more than this between places, rad.
+const BEND: f64 = std::f64::consts::PI / 36.0;
 
 /// Draws up a report; `progress` hears how many steps of how many are done.
 pub fn report(
@@ -341,6 +357,8 @@ struct Spot {
     lever: V3,
     /// Direction of the feed in the base; zero where it does not move.
     feed: V3,
+    /// The geometry's part at the program's zero, where errors count from there.
+    zero: Option<std::rc::Rc<Sensitivity>>,
     /// Direction from the tip to the spindle in the base.
     axis: V3,
     /// Speed of the tool point, mm/s.
@@ -349,6 +367,24 @@ struct Spot {
     turns: bool,
     /// Rotary words of a machine tool, rad.
     rotary: [f64; 3],
+}
+
+/// What was looked at last.
+struct Last {
+    place: Place,
+    point: V3,
+    rotary: [f64; 3],
+    feed: V3,
+    speed: f64,
+}
+
+/// What moves the tool point at the joints that were looked at last: the same place with another feed is no other.
+struct Sensed {
+    joints: Vec<f64>,
+    lever: V3,
+    zero: Option<std::rc::Rc<Sensitivity>>,
+    at: Sensitivity,
+    errors: Errors,
 }
 
 struct Walk<'a> {
@@ -362,7 +398,8 @@ struct Walk<'a> {
     frame: Frame,
     tool: Frame,
     rows: Vec<Row>,
-    last: Option<(usize, V3, [f64; 3])>,
+    last: Option<Last>,
+    sensed: Option<Sensed>,
     /// The move that is looked at only turns the tool.
     turning: bool,
     /// The operation whose stretch over the tolerance is going on.
@@ -382,21 +419,25 @@ impl<'a> Walk<'a> {
         let rows = operations.list.iter().map(|o| row(o.clone())).collect();
         let (frame, tool) = (Frame::IDENTITY, Frame::IDENTITY);
         let measured = crate::compensate::deviations(machine);
-        Walk { machine, operations, budget, material, kinematics, measured, frame, tool, rows, last: None, turning: false, over: None, outside: Vec::new() }
+        Walk { machine, operations, budget, material, kinematics, measured, frame, tool, rows, last: None, sensed: None, turning: false, over: None, outside: Vec::new() }
     }
 
     fn finish(self) -> Report {
-        Report { rows: self.rows.into_iter().filter(|r| r.places > 0).collect(), outside: self.outside }
+        let rows = self.rows.into_iter().filter(|r| r.places > 0).collect();
+        Report { rows, outside: self.outside, touched: None }
     }
 
-    /// What happens at a place of the source, where it is not too near to the one before; with the rotary words of machine tools.
-    fn place(&self, source: Source, point: V3, rotary: [f64; 3]) -> Option<Place> {
+    /// What happens at a place of the source, where it is not too near to the one before and all that decides the force is as
+    /// there; with the rotary words of machine tools.
+    fn place(&self, source: Source, point: V3, (feed, speed): (V3, f64), rotary: [f64; 3]) -> Option<Place> {
         let mut place = *self.operations.places.get(&source)?;
         let operation = self.operations.list.get(place.operation)?;
         place.work = operation.work.unwrap_or(place.work);
-        let near = self.last.is_some_and(|(o, q, r)| {
-            let turned = r.iter().zip(rotary).any(|(a, b)| (a - b).abs() > LEAN);
-            o == place.operation && norm(sub(q, point)) < NEAR && !turned
+        let near = self.last.as_ref().is_some_and(|last| {
+            let turned = last.rotary.iter().zip(rotary).any(|(a, b)| (a - b).abs() > LEAN);
+            let as_fast = (last.speed - speed).abs() <= 1e-9 * speed.abs();
+            let same_way = dot(last.feed, feed) > SAME_WAY;
+            last.place == place && norm(sub(last.point, point)) < NEAR && !turned && as_fast && same_way
         });
         (!near || self.turning).then_some(place)
     }
@@ -407,7 +448,7 @@ impl<'a> Walk<'a> {
         self.turning = length < 1e-9 && from.quaternion != end.quaternion;
         let pieces = pieces(length);
         let feed = if length > 0.0 { scale(way, 1.0 / length) } else { [0.0; 3] };
-        for i in 1..=pieces {
+        for i in 0..=pieces {
             let t = i as f64 / pieces as f64;
             let p = add(from.position, scale(way, t));
             self.look(p, from, end, t, feed, speed, source);
@@ -418,8 +459,8 @@ impl<'a> Walk<'a> {
         self.turning = false;
         let spoke = sub(from.position, center);
         let rise = dot(sub(end.position, from.position), normal);
-        let pieces = pieces(norm(spoke) * angle);
-        for i in 1..=pieces {
+        let pieces = pieces(norm(spoke) * angle).max(libm::ceil(angle / BEND).clamp(1.0, 1e4) as usize);
+        for i in 0..=pieces {
             let t = i as f64 / pieces as f64;
             let out = rotate(&about(normal, angle * t), spoke);
             let p = add(add(center, out), scale(normal, rise * t));
@@ -436,6 +477,9 @@ impl<'a> Walk<'a> {
         if t >= 1.0 {
             return Some(b.to_vec());
         }
+        if t <= 0.0 {
+            return Some(a.to_vec());
+        }
         let guess: Vec<f64> = a.iter().zip(b).map(|(a, b)| a + (b - a) * t).collect();
         let far = |q: &Vec<f64>| q.iter().zip(&guess).map(|(a, b)| (a - b) * (a - b)).sum::<f64>();
         let all = self.kinematics.inverse_frame(flange).ok()?.into_iter().map(|s| s.joints);
@@ -445,28 +489,43 @@ impl<'a> Walk<'a> {
     #[allow(clippy::too_many_arguments)]
     fn look(&mut self, p: V3, from: &Target, end: &Target, t: f64, feed: V3, speed: f64, source: Source) {
         let here = self.frame.then(&Frame { position: p, turn: turn_of(end.quaternion) });
-        let Some(place) = self.place(source, here.position, [0.0; 3]) else { return };
+        let feed = rotate(&self.frame.turn, feed);
+        let Some(place) = self.place(source, here.position, (feed, speed), [0.0; 3]) else { return };
         let flange = here.then(&self.tool.inverse());
         let Some(joints) = self.joints(&flange, from, end, t) else { return };
         // A machine that decides the turn of its tool itself stands otherwise than asked; the tool point is the same.
         let Ok(real) = self.kinematics.forward_frame(&joints) else { return };
         let lever = rotate(&real.turn, self.tool.position);
         let axis = self.towards_spindle(&here, &real);
-        let feed = rotate(&self.frame.turn, feed);
-        self.record(&Spot { place, source, joints, point: here.position, lever, feed, axis, speed, turns: self.turning, rotary: [0.0; 3] });
+        let (turns, rotary) = (self.turning, [0.0; 3]);
+        self.record(&Spot { place, source, joints, point: here.position, lever, feed, zero: None, axis, speed, turns, rotary });
     }
 
     /// Puts what is predicted at a place into its row.
     fn record(&mut self, spot: &Spot) {
-        let Ok(at) = Sensitivity::new(self.machine, &spot.joints, spot.lever) else { return };
+        let known = self.sensed.take().filter(|k| k.joints == spot.joints && k.lever == spot.lever && k.zero == spot.zero);
+        let Some(sensed) = known.or_else(|| self.sense(spot)) else { return };
+        self.put(spot, &sensed);
+        self.sensed = Some(sensed);
+    }
+
+    fn sense(&self, spot: &Spot) -> Option<Sensed> {
+        let at = Sensitivity::new(self.machine, &spot.joints, spot.lever).ok()?;
+        let at = spot.zero.as_ref().map_or(at.clone(), |zero| at.since(zero));
+        let errors = Errors::new(&at, self.budget, None);
+        Some(Sensed { joints: spot.joints.clone(), lever: spot.lever, zero: spot.zero.clone(), at, errors })
+    }
+
+    fn put(&mut self, spot: &Spot, sensed: &Sensed) {
+        let at = &sensed.at;
         let (source, operation) = (spot.source, spot.place.operation);
-        self.last = Some((operation, spot.point, spot.rotary));
+        self.last = Some(Last { place: spot.place, point: spot.point, rotary: spot.rotary, feed: spot.feed, speed: spot.speed });
         let force = match spot.place.work {
             Work::Drill => self.thrust(spot),
             Work::Mill => self.force(spot),
             Work::Other => None,
         };
-        let errors = Errors::new(&at, self.budget, force.map(|f| f.0));
+        let errors = Errors { elastic: force.and_then(|f| at.deflection(f.0)), ..sensed.errors };
         let unforced = if force.is_none() { self.unforced(spot) } else { None };
         let Some(row) = self.rows.get_mut(operation) else { return };
         if let Some(why) = unforced.filter(|why| row.unforced.iter().all(|(_, w)| w != why)) {
@@ -512,7 +571,7 @@ impl<'a> Walk<'a> {
             self.over = None;
         }
         if row.worst.as_ref().is_none_or(|w| sum > w.errors.sum()) {
-            let causes = causes(self.machine, &at, self.budget);
+            let causes = causes(self.machine, at, self.budget);
             row.worst = Some(Worst { source, point: spot.point, joints: spot.joints.clone(), errors, causes });
         }
     }
@@ -541,6 +600,7 @@ impl<'a> Walk<'a> {
             Place { work: Work::Mill, .. } if cut.too_wide() => Unforced::TooWide,
             // A move of no length at all cuts nothing.
             _ if norm(spot.feed) < 0.5 => return spot.turns.then_some(Unforced::Turning),
+            Place { work: Work::Drill, .. } => Unforced::Across,
             _ => Unforced::Axial,
         })
     }
@@ -548,7 +608,12 @@ impl<'a> Walk<'a> {
     /// Thrust of a drill, and the thickness of its chip; on the way out there is none.
     fn thrust(&self, spot: &Spot) -> Option<(V3, Option<f64>)> {
         let cut = self.operations.list.get(spot.place.operation)?.cut;
-        if dot(spot.feed, spot.axis) > 0.0 {
+        let out = dot(spot.feed, spot.axis);
+        // Aslant or across its axis a drill is no drill.
+        if out.abs() < SAME_WAY {
+            return None;
+        }
+        if out > 0.0 {
             return Some(([0.0; 3], None));
         }
         let bore = Bore {

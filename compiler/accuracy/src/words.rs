@@ -1,16 +1,49 @@
 //! How the words of a program put the tool of a machine tool where it is: joints from X Y Z and rotary words, frames and
 //! tools as the program's state has them. Arms are no matter of this: their configuration is chosen by `gr-robot`.
 
-use gr_ir::{Axes, State};
+use crate::error::Sensitivity;
+use gr_ir::{Axes, State, View};
 use gr_machine::math::{Frame, V3, norm, rot_z, solve, sub};
 use gr_machine::{Chain, Control, JointKind, Kinematics, KinematicsError, Machine};
 
 /// How the words of a program put the tool where it is.
 pub(crate) enum Words {
-    /// Rotary words are rotary joints; these are the joints that slide, and joint and word of each that turns.
-    Joints { sliding: [usize; 3], turning: Vec<(usize, usize)> },
+    /// Rotary words are rotary joints.
+    Joints(Slides),
     /// X Y Z alone.
     Point,
+}
+
+/// Joints that slide, and joint and word of each that turns.
+pub(crate) struct Slides {
+    pub sliding: [usize; 3],
+    pub turning: Vec<(usize, usize)>,
+}
+
+/// How a machine tool stands.
+pub(crate) struct Stand {
+    pub joints: Vec<f64>,
+    /// From the flange to the tool point, base directions, mm.
+    pub lever: V3,
+    /// Direction of the spindle in the base.
+    pub axis: V3,
+}
+
+impl Slides {
+    /// How the machine stands for the words of a program.
+    pub(crate) fn stand(&self, machine: &Machine, kinematics: &dyn Kinematics, asked: &Asked) -> Option<Stand> {
+        let begun = started(machine, asked, &self.sliding, &self.turning);
+        let joints = slid(kinematics, &begun, &self.sliding, asked).ok()?;
+        let real = kinematics.forward_frame(&joints).ok()?;
+        let lever = sub(real.then(&Frame::shift(asked.tool.position)).position, real.position);
+        Some(Stand { joints, lever, axis: real.axis(2) })
+    }
+
+    /// What moves the tool point there.
+    pub(crate) fn sensitivity(&self, machine: &Machine, kinematics: &dyn Kinematics, asked: &Asked) -> Option<Sensitivity> {
+        let stand = self.stand(machine, kinematics, asked)?;
+        Sensitivity::new(machine, &stand.joints, stand.lever).ok()
+    }
 }
 
 impl Words {
@@ -24,7 +57,7 @@ impl Words {
             let sliding: Vec<usize> = of_kind(JointKind::Prismatic).filter(|i| word(*i).is_some_and(|w| w < 3)).collect();
             let turning = of_kind(JointKind::Revolute).filter_map(|i| Some((i, word(i)?))).collect();
             let sliding = sliding.try_into().map_err(|_| "its machine has no X, Y and Z that slide".to_string())?;
-            return Ok(Words::Joints { sliding, turning });
+            return Ok(Words::Joints(Slides { sliding, turning }));
         }
         if machine.kinematics().control() == Control::Position {
             return Ok(Words::Point);
@@ -32,6 +65,23 @@ impl Words {
         Err("which configuration the joints take is not in this target; a robot's own language or joint-gcode has it".into())
     }
 }
+
+/// Coordinates that a program has named so far: before that the machine stands where it happens to.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct Named([bool; 3]);
+
+impl Named {
+    /// With the next operation: a coordinate is named when it changes, all of them by a cut.
+    pub fn step(&mut self, view: &View<'_, '_>) -> [bool; 3] {
+        for i in 0..3 {
+            self.0[i] |= view.op.cuts() || (view.op.moves() && view.start.axes[i] != view.end.axes[i]);
+        }
+        self.0
+    }
+}
+
+/// What the errors at a place depend on: point, tool and rotary words.
+pub(crate) type ZeroKey = (V3, Frame, [f64; 3]);
 
 /// A point as the program has it.
 pub(crate) struct Asked {
@@ -45,6 +95,10 @@ impl Asked {
     pub(crate) fn new(machine: &Machine, axes: &Axes, state: &State) -> Asked {
         let tip = frame(machine, state).apply([axes[0], axes[1], axes[2]]);
         Asked { tip, tool: tool(machine, state), rotary: rotary(axes, state) }
+    }
+
+    pub(crate) fn key(&self) -> ZeroKey {
+        (self.tip, self.tool, self.rotary)
     }
 }
 

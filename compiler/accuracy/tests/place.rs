@@ -6,7 +6,8 @@ use gr_accuracy::{Budget, BudgetOptions};
 use gr_machine::math::{Frame, M3, V3, add, norm, scale};
 use gr_machine::{Machine, builtin};
 
-const STRAIGHT: M3 = Frame::IDENTITY.turn;
+/// The tool of an arm points down.
+const DOWN: M3 = [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]];
 
 /// Two levels of a plate with a hole, each 5 mm, and a lift between them.
 fn plate(width: f64, height: f64) -> Vec<V3> {
@@ -25,7 +26,7 @@ fn parts<'a>(machine: &'a Machine, lengths: &[f64], points: &[V3]) -> Vec<Part<'
     let tool = |l: &f64| Frame::shift([0.0, 0.0, *l]);
     lengths
         .iter()
-        .map(|l| Part { probe: Probe::downward(machine).with_tool(tool(l), &STRAIGHT), points: points.to_vec(), cuts: points.len() })
+        .map(|l| Part { probe: Probe::downward(machine).held(tool(l), DOWN), points: points.to_vec(), cuts: points.len() })
         .collect()
 }
 
@@ -152,7 +153,7 @@ fn margin_of_a_mill_with_rotary_words() {
     ];
     let made = program(&stops);
     let reach = Mill::new(&machine, &made, true).unwrap();
-    assert!(reach.turned.is_empty());
+    assert!(reach.beyond.is_empty());
     let found = found(&reach, &machine, Aim::Margin).unwrap();
     assert!(found.margin > 30.0, "{found:?}");
     for by in shifts(found.margin) {
@@ -177,7 +178,7 @@ fn margin_of_a_mill_with_rotary_words() {
     }
     let far = program(&[([0.0; 3], [0.0; 3]), ([0.0; 3], [35.0, 0.0, 0.0])]);
     let reach = Mill::new(&machine, &far, true).unwrap();
-    assert_eq!(reach.turned.iter().map(|t| (t.0.line, t.1)).collect::<Vec<_>>(), [(1, 3)]);
+    assert_eq!(reach.beyond.iter().map(|t| (t.0.line, t.1)).collect::<Vec<_>>(), [(1, 3)]);
 }
 
 /// A place that is refused is not proposed, and the search goes on with the next best.
@@ -205,4 +206,27 @@ fn smallest_error() {
     let (free, best) = (found(&reach, &machine, Aim::Margin).unwrap(), found(&reach, &machine, Aim::Error).unwrap());
     assert!(best.error.unwrap() < free.error.unwrap(), "{best:?} {free:?}");
     assert!(best.margin <= free.margin + 1.0 && shifts(best.margin).all(|by| reach.fits(add(best.position, by))));
+}
+
+/// A tool that turns along the whole path: the part is moved all over the ball of its margin, and every point is looked at with its
+/// own turn.
+#[test]
+fn margin_of_a_tool_that_turns() {
+    let machine = builtin("abb/irb2400").unwrap();
+    let turned = |n: u32| {
+        let (s, c) = libm::sincos(f64::from(n) * -0.04);
+        let tilt: M3 = [[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]];
+        gr_machine::math::product(&tilt, &DOWN)
+    };
+    let tool = Frame::shift([0.0, 0.0, 80.0]);
+    let one = |n: u32| {
+        let points = vec![[f64::from(n) * 4.0, 0.0, 0.0]];
+        Part { probe: Probe::downward(&machine).held(tool, turned(n)), points, cuts: 1 }
+    };
+    let reach = arm((0..25).map(one).collect());
+    let found = found(&reach, &machine, Aim::Margin).unwrap();
+    assert!(found.margin > 100.0 && found.apart > 0.0, "{found:?}");
+    for by in shifts(found.margin) {
+        assert!(reach.fits(add(found.position, by)), "{found:?} moved by {by:?}");
+    }
 }

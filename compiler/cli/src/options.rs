@@ -597,6 +597,12 @@ pub struct MapArgs {
     /// Grade of ISO 286-1 of the machine's geometry, in place of its file's
     #[arg(long = "it", value_name = "GRADE", value_parser = clap::value_parser!(u8).range(1..=18))]
     pub grade: Option<u8>,
+    /// How the tool is turned, as by the words A, B and C, degrees; without it straight down on arms, upright on mills
+    #[arg(long, value_name = "A,B,C", allow_hyphen_values = true)]
+    pub tool_turn: Option<String>,
+    /// Where a mill's part was touched, in the base, mm: errors by the geometry count from there [default: 0,0,0]
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
+    pub zero: Option<String>,
     /// The model of a publication: its grid of 5 mm too
     #[arg(long, value_enum, value_name = "SYSTEM")]
     pub reference: Option<AccuracyReference>,
@@ -616,6 +622,9 @@ pub struct PlaceArgs {
     /// Heights of the rectangle: a number or two, mm
     #[arg(long, value_name = "FROM,TO", default_value = "0", allow_hyphen_values = true)]
     pub heights: String,
+    /// Without a program: how the tool is turned, as by the words A, B and C, degrees; without it straight down on arms, upright on mills
+    #[arg(long, value_name = "A,B,C", allow_hyphen_values = true)]
+    pub tool_turn: Option<String>,
     /// How the result is written
     #[arg(long, value_enum, default_value_t, value_name = "FORMAT")]
     pub format: TableFormat,

@@ -575,3 +575,219 @@ fn a_report_with_its_map() {
     assert!(o.status.success(), "{}", whole(&o));
     assert!(std::fs::read(&goal).unwrap().starts_with(b"\x89PNG"));
 }
+
+fn json(o: &Output) -> serde_json::Value {
+    serde_json::from_slice(&o.stdout).unwrap_or_else(|e| panic!("{e}\n{}", whole(o)))
+}
+
+/// Ways about a place, up to so far.
+fn ways(far: f64) -> Vec<[f64; 3]> {
+    let share = |n: u32, by: f64| (f64::from(n) * by).fract() * 2.0 - 1.0;
+    let all = (1..160u32).map(|n| [share(n, 0.754_877_666), share(n, 0.569_840_290), share(n, 0.362_010_4)]);
+    let long = |v: &[f64; 3]| v.iter().map(|c| c * c).sum::<f64>().sqrt();
+    all.filter(|v| long(v) > 0.3).map(|v| v.map(|c| c * far / long(&v))).take(24).collect()
+}
+
+/// Rotary words of a program turn the tool of an arm: everywhere within the margin the program can be made, tilted once for all
+/// and tilted along the way.
+#[test]
+fn margins_with_turned_tools() {
+    let folder = tempfile::tempdir().unwrap();
+    let head = "G21 G90 G94 F600\nT1 M6\nG43 H1\nS1000 M3\n";
+    let programs = ["G0 X0 Y0 Z0 A-60\nG1 X60\nG1 Y40\nM5\nM2\n", "G0 X0 Y0 Z0\nG1 X60 A-30\nG1 Y20 C40\nG1 A-60\nM5\nM2\n"];
+    for program in programs {
+        std::fs::write(folder.path().join("p.ngc"), format!("{head}{program}")).unwrap();
+        let found = json(&run(folder.path(), &["place", "p.ngc", "--machine=abb/irb2400", "--format=json", "-q"]));
+        let margin = found["margin"].as_f64().unwrap();
+        assert!(margin > 200.0, "{found}");
+        for by in ways(margin - 0.01) {
+            let at: Vec<String> = (0..3).map(|i| (found["position"][i].as_f64().unwrap() + by[i]).to_string()).collect();
+            let o = run(folder.path(), &["accuracy", "p.ngc", "--machine=abb/irb2400", "-q", "--message-format=short", &format!("--part={}", at.join(","))]);
+            assert!(o.status.success(), "{found}\n{}", whole(&o));
+        }
+    }
+}
+
+const SQUARE: &str = "format = 1\nextends = \"generic/mill3\"\nid = \"test/square\"\n[accuracy]\nsource = \"made up\"\njoints = [0.005, 0.005, 0.005]\n\
+    [[accuracy.parameter]]\nname = \"square-xy\"\ntolerance = 0.05\n[as_built]\nsource = \"made up\"\n[[as_built.parameter]]\nname = \"square-xy\"\ndeviation = 0.05\n";
+
+/// The part is touched on this very machine: errors of a mill count from there, as compensation does, wherever the part is; so the
+/// place of the smallest error is the one with the most room.
+#[test]
+fn errors_count_from_the_touched_zero() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("m.toml"), SQUARE).unwrap();
+    std::fs::write(folder.path().join("p.ngc"), "G21 G90 G94 F600\nT1 M6\nS1000 M3\nG0 X-5 Y0 Z0\nG1 X5\nG1 Y10\nM5\nM2\n").unwrap();
+    // 10 mm square to X, turned by 0.05°.
+    let own = 10.0 * 0.05f64.to_radians();
+    for part in ["0,0,0", "300,200,0", "-300,-200,50"] {
+        let v = json(&run(folder.path(), &["accuracy", "p.ngc", "--machine=m.toml", "--format=json", "-q", &format!("--part={part}")]));
+        let row = &v["operations"][0];
+        assert!((row["worst"]["geometric"]["longest"].as_f64().unwrap() - own).abs() < 1e-9, "{part}: {row}");
+        assert!((row["measured"].as_f64().unwrap() - own).abs() < 1e-9, "{part}: {row}");
+        assert_eq!(v["geometry_from_zero"], true);
+    }
+    let o = run(folder.path(), &["build", "p.ngc", "--machine=m.toml", "--compensate", "-oq.ngc"]);
+    assert!(whole(&o).contains("by up to 8.7 µm"), "{}", whole(&o));
+    let place = |aim: &str| json(&run(folder.path(), &["place", "p.ngc", "--machine=m.toml", "--format=json", "-q", aim]));
+    let (free, exact) = (place("--aim=margin"), place("--aim=error"));
+    assert!((exact["margin"].as_f64().unwrap() - free["margin"].as_f64().unwrap()).abs() < 1.0, "{free} {exact}");
+    assert!((exact["error_um"].as_f64().unwrap() - free["error_um"].as_f64().unwrap()).abs() < 1e-3, "{free} {exact}");
+}
+
+/// A coordinate that the program has not named yet says nothing of where the part must be.
+#[test]
+fn coordinates_not_named_yet() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("p.ngc"), "G21 G90 G94 F600\nT1 M6\nS1000 M3\nG0 Z20\nG0 X500 Y0\nG1 X510\nG0 Z20\nM5\nM2\n").unwrap();
+    let v = json(&run(folder.path(), &["place", "p.ngc", "--machine=generic/mill3", "--format=json", "-q"]));
+    assert_eq!(v["position"][0], -505.0, "{v}");
+}
+
+fn springs() -> String {
+    let one = |j: &str| format!("[[stiffness.member]]\njoint = \"{j}\"\nname = \"drive\"\nstiffness = 10000\n");
+    format!("format = 1\nextends = \"generic/mill3\"\nid = \"test/springs\"\n[stiffness]\nsource = \"made up\"\n{}{}{}", one("X"), one("Y"), one("Z"))
+}
+
+/// The start of a cut is a place of it, and a short cut at another feed is another cut.
+#[test]
+fn starts_and_short_cuts() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("m.toml"), springs()).unwrap();
+    let head = "G21 G90 G94 F600\nT1 M6\nS1000 M3\n";
+    let sum = |text: &str, args: &[&str]| {
+        std::fs::write(folder.path().join("p.ngc"), format!("{head}{text}M5\nM2\n")).unwrap();
+        let v = json(&run(folder.path(), &[&["accuracy", "p.ngc", "--format=json", "-q"], args].concat()));
+        (v["operations"][0]["worst"]["sum"].as_f64().unwrap(), v["operations"][0]["worst"]["line"].as_u64().unwrap())
+    };
+    let legs = ["--machine=usp/2ups-prp", "--part=800,0,0"];
+    let there = sum("G0 X0 Y0 Z0\nG1 X240\nG1 X0\n", &legs);
+    let back = sum("G0 X240 Y0 Z0\nG1 X231\nG1 X0\n", &legs);
+    assert!((there.0 - back.0).abs() < 1e-12 && there.0 > 0.0695, "{there:?} {back:?}");
+    let mill = ["--machine=m.toml", "--material=1045", "--teeth=4", "--depth=0.5", "--width=2", "--diameter=10"];
+    let slow = sum("G0 X0 Y0 Z0\nG1 X20 F6\n", &mill);
+    let fast = sum("G0 X0 Y0 Z0\nG1 X20 F6\nG1 X20.9 F6000\nG1 X20 F6\n", &mill);
+    let long = sum("G0 X0 Y0 Z0\nG1 X20 F6\nG1 X26 F6000\nG1 X20 F6\n", &mill);
+    assert!((fast.0 - long.0).abs() < 1e-9 && fast.0 > 50.0 * slow.0 && fast.1 == 6, "{slow:?} {fast:?} {long:?}");
+    // Round a small hole the force turns with the feed: as on a large one.
+    let elastic = |radius: f64| sum(&format!("G0 X{radius} Y0 Z0\nG3 X{radius} Y0 I-{radius}\n"), &mill).0;
+    assert!((elastic(3.0) / elastic(300.0) - 1.0).abs() < 2e-3, "{} {}", elastic(3.0), elastic(300.0));
+}
+
+/// Threads have their row and no law; a drill has one along its axis only; a rotary word needs an axis; a width that the file does
+/// not say is asked for; a tool without a length is told by `place` too; an option that does nothing is refused; what is too long is
+/// told.
+#[test]
+fn what_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("m.toml"), springs()).unwrap();
+    let head = "G21 G90 G94 F600\nT1 M6\nS1000 M3\nG0 X-5 Y0 Z0\n";
+    let told = |text: &str, args: &[&str]| {
+        std::fs::write(folder.path().join("p.ngc"), format!("{head}{text}M5\nM2\n")).unwrap();
+        whole(&run(folder.path(), &[args, &["-q"]].concat()))
+    };
+    let short = ["accuracy", "p.ngc", "--machine=m.toml", "--material=1045", "--point=118", "--diameter=10", "--message-format=short"];
+    let step = std::fs::read_to_string(examples().join("stepnc/case-study.p21")).unwrap();
+    let line = step.lines().find(|l| l.starts_with("#39=") || l.starts_with("#39 =")).unwrap();
+    let comma = line.match_indices(',').map(|(i, _)| i).collect::<Vec<_>>();
+    assert!(line.contains(",2.,3.6,"), "{line} {comma:?}");
+    std::fs::write(folder.path().join("part.p21"), step.replace(line, &line.replace(",2.,3.6,", ",2.,$,"))).unwrap();
+    let part = ["accuracy", "part.p21", "--machine=usp/2ups-prp", "--part=700,-100,0", "--teeth=2", "--point=118", "--material=1045", "-q"];
+    let without = whole(&run(folder.path(), &[&part[..], &["--message-format=short"]].concat()));
+    let elastic = |width: &str| {
+        let v = json(&run(folder.path(), &[&part[..], &["--format=json", width]].concat()));
+        let all = v["operations"].as_array().unwrap().clone();
+        all.iter().find(|o| o["operation"].as_str().unwrap().contains("slot A")).unwrap()["most"][2].as_f64().unwrap()
+    };
+    assert!(elastic("--width=1") != elastic("--width=3"), "{} {}", elastic("--width=1"), elastic("--width=3"));
+    let all = [
+        told("G33.1 Z-10 K1\nG0 X50\n", &short),
+        told("G33 Z-10 K1\nG0 X50\n", &short),
+        told("G18\nG81 X5 Z5 Y-10 R2 F250\nG80\nG17\n", &short),
+        told("G1 X60 A-30\n", &short),
+        told("G1 X60 A-30\n", &["place", "p.ngc", "--machine=generic/mill3"]),
+        told("G1 X2000\n", &["place", "p.ngc", "--machine=generic/mill3"]),
+        told("G1 X2000\n", &["place", "p.ngc", "--machine=usp/2ups-prp"]),
+        without.lines().filter(|l| l.contains("width")).collect(),
+        whole(&run(folder.path(), &["place", "--machine=usp/2ups-prp", "--aim=error", "--message-format=short"])),
+    ];
+    insta::assert_snapshot!(all.join("\n"));
+}
+
+/// What is wrong is told down the program.
+#[test]
+fn warnings_down_the_program() {
+    let o = run(examples(), &[&PLACED[..], &["--depth=1", "--width=6", "--tolerance=0.06", "--message-format=short", "--point=118"]].concat());
+    let text = String::from_utf8(o.stderr).unwrap();
+    let lines: Vec<u32> = text.lines().filter(|l| l.contains("E0700")).map(|l| l.split(':').nth(1).unwrap().parse().unwrap()).collect();
+    assert!(lines.len() > 3 && lines.is_sorted(), "{lines:?}");
+}
+
+/// How the tool is held in a map is said, and can be chosen: a planar arm's reach at another turn, a mill of five axes that is
+/// singular only while its tool is upright. Zeros of mills can be chosen too.
+#[test]
+fn how_the_tool_is_held() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("m.toml"), SQUARE).unwrap();
+    let map = |args: &[&str]| {
+        let text = whole(&run(folder.path(), &[&["map", "--resolution=40", "--message-format=short", "-q"], args].concat()));
+        text.lines().filter(|l| !l.starts_with("outline")).collect::<Vec<_>>().join("\n")
+    };
+    let square = ["--machine=m.toml", "--quantity=geometric"];
+    let all = [
+        map(&["--machine=ufmg/plano-3r", "-or.csv"]),
+        map(&["--machine=ufmg/plano-3r", "--tool-turn=0,0,90"]),
+        map(&["--machine=universal-robots/ur5", "--plane=z=300", "--tool-turn=0,30,0"]),
+        map(&["--machine=generic/mill5-b-head-c-table", "--quantity=condition", "-oc.png"]),
+        map(&["--machine=generic/mill5-b-head-c-table", "--quantity=singularity"]),
+        map(&["--machine=generic/mill5-b-head-c-table", "--quantity=condition", "--tool-turn=0,30,0"]),
+        map(&["--machine=usp/2ups-prp", "--plane=z=670"]),
+        map(&["--machine=usp/2ups-prp", "--plane=x=550"]),
+        map(&square),
+        map(&[&square[..], &["--zero=100,50,0"]].concat()),
+        map(&["--machine=usp/2ups-prp", "--zero=1,2,3"]),
+        map(&["--machine=generic/mill3", "--tool-turn=0,30,0"]),
+        map(&["--machine=abb/irb2400", "--tool-turn=0,30"]),
+        whole(&run(folder.path(), &["place", "--machine=abb/irb2400", "--heights=600,700", "--tool-turn=0,30,0"])),
+        whole(&run(folder.path(), &["place", "--machine=usp/2ups-prp", "--heights=660", "--message-format=short"])),
+    ];
+    insta::assert_snapshot!(all.join("\n\n"));
+    assert!(std::fs::read_to_string(folder.path().join("r.csv")).unwrap().starts_with("x mm,y mm,\"workspace (tool turned as at the start"));
+}
+
+/// The condition of an arm by its own Jacobian, lengths in units of the longest lever: all three links in a row, 300 mm.
+#[test]
+fn condition_in_units_of_the_longest_lever() {
+    let folder = tempfile::tempdir().unwrap();
+    let o = run(folder.path(), &["map", "--machine=ufmg/plano-3r", "--quantity=condition", "--resolution=20", "-oc.csv", "-q"]);
+    assert!(o.status.success(), "{}", whole(&o));
+    let csv = std::fs::read_to_string(folder.path().join("c.csv")).unwrap();
+    let machine = gr_machine::builtin("ufmg/plano-3r").unwrap();
+    let start = machine.start.frame().turn;
+    let mut looked = 0;
+    for line in csv.lines().skip(1) {
+        let v: Vec<f64> = line.split(',').map(|v| v.parse().unwrap()).collect();
+        let frame = gr_machine::math::Frame { position: [v[0], v[1], 0.0], turn: start };
+        let fits = machine.kinematics().inverse_frame(&frame).unwrap().into_iter().filter(|s| machine.outside(&s.joints).is_empty());
+        // Both elbows have the same condition up to a mirror: any of them.
+        let close = fits.into_iter().any(|s| {
+            let mut at = [0.0; 3];
+            let mut heading = 0.0;
+            let mut joints = [[0.0; 2]; 3];
+            for (k, q) in s.joints.iter().enumerate() {
+                joints[k] = [at[0], at[1]];
+                heading += q;
+                at = [at[0] + 100.0 * heading.cos(), at[1] + 100.0 * heading.sin(), 0.0];
+            }
+            // Columns (−dy, dx) / 300 and 1.
+            let columns: Vec<[f64; 3]> = joints.iter().map(|j| [-(at[1] - j[1]) / 300.0, (at[0] - j[0]) / 300.0, 1.0]).collect();
+            let square: Vec<Vec<f64>> = (0..3).map(|i| (0..3).map(|k| columns.iter().map(|c| c[i] * c[k]).sum()).collect()).collect();
+            let values = gr_machine::math::eigenvalues(square);
+            let (least, most) = values.iter().fold((f64::INFINITY, 0.0f64), |(a, b), v| (a.min(*v), b.max(*v)));
+            ((most / least).sqrt() / v[2] - 1.0).abs() < 1e-4
+        });
+        assert!(close, "{line}");
+        looked += 1;
+    }
+    assert!(looked > 50, "{looked}");
+}

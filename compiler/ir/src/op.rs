@@ -372,6 +372,10 @@ impl Op<'_> {
     pub fn feeds(&self) -> bool {
         matches!(self, Op::Linear | Op::Arc(_) | Op::Nurbs { .. })
     }
+    /// Whether it takes material away: moves at feed, or taps.
+    pub fn cuts(&self) -> bool {
+        self.feeds() || matches!(self, Op::RigidTap { .. })
+    }
 }
 
 use crate::Sync;

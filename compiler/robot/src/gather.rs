@@ -7,13 +7,14 @@ mod signals;
 
 use gr_ir::geometry::ArcShape;
 use gr_ir::{FeedMode, Note, Op, PathMode, Pose, Program, Source, Sources, State, Stop, Turn, View};
-use gr_machine::math::{Frame, M3, add, dot, euler, norm, product, rot_x, rot_z, rotation_vector, scale, sub, transpose};
-use gr_machine::{Chain, Control, Kind, Machine, Orientation, Rapid};
+use gr_machine::math::{Frame, M3, add, dot, norm, product, rot_z, rotation_vector, scale, sub, transpose};
+use gr_machine::{Chain, Control, Kind, Machine, Rapid};
 use gr_text::{Code, Diagnostic, code};
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::PI;
 
 use crate::cell::Cells;
+use crate::turns::Turns;
 use crate::{Action, Curves, Options, Step, Tool, WorkFrame, Zone};
 
 /// How a move goes.
@@ -138,7 +139,7 @@ pub(crate) struct Gather<'a> {
     pub findings: Findings<'a>,
     pub out: Gathered,
     cells: Cells,
-    source_machine: Option<(Machine, [usize; 2])>,
+    turns: Turns<'a>,
     control: Control,
     planar: bool,
     /// Coordinates that the program has said.
@@ -202,18 +203,13 @@ impl<'a> Gather<'a> {
             by_direction: false,
         };
         let control = machine.kinematics().control();
-        let source_machine = match (&machine.orientation, machine.kind) {
-            (Some(Orientation::SourceMachine(id)), _) => gr_machine::builtin(id).and_then(rotary_joints),
-            (_, Kind::Mill) => rotary_joints(machine.clone()),
-            _ => None,
-        };
         Gather {
             machine,
             options,
             findings: Findings::new(sources),
             out,
             cells: Cells::new(machine, options.own_words),
-            source_machine,
+            turns: Turns::new(machine),
             control,
             planar: matches!(machine.chain, Chain::Planar3r(_)),
             // A mill's axes stand where they stood; what a program leaves out stays.
@@ -484,45 +480,16 @@ impl<'a> Gather<'a> {
         (self.at, self.at_change) = if self.exchanged { (None, stands) } else { (stands, None) };
     }
 
-    /// Rotary words with their offsets.
-    fn rotary(&self, pose: &Pose, state: &State) -> [f64; 3] {
-        [3, 4, 5].map(|i| pose.axes[i] + state.work_offset[i] + state.local_offset[i] + state.tool_offset[i])
-    }
-
-    /// How the tool is turned in the work frame; none when the machine file doesn't say. G10 R and its like turn the
-    /// coordinates of X and Y, not the tool.
+    /// How the tool is turned in the work frame; none when the machine file doesn't say.
     fn turn(&mut self, pose: &Pose, state: &State) -> Option<M3> {
-        let turn = self.turn_unrotated(pose, state)?;
-        Some(if state.rotation == 0.0 || pose.tool_axis.is_some() { turn } else { product(&rot_z(-state.rotation), &turn) })
-    }
-
-    fn turn_unrotated(&mut self, pose: &Pose, state: &State) -> Option<M3> {
-        let up = self.machine.kind == Kind::Robot;
-        if let Some(axis) = pose.tool_axis {
-            self.out.by_direction = true;
-            return Some(along(if up { scale(axis, -1.0) } else { axis }, pose.spin.unwrap_or(0.0)));
-        }
-        let words = self.rotary(pose, state);
-        let still = if up && !self.planar && self.control != Control::Position { rot_x(PI) } else { euler([0.0; 3]) };
-        let some = (0..3).find(|i| words[*i] != 0.0);
-        match (&self.machine.orientation, some) {
-            (_, Some(_)) if self.control == Control::Position => None,
-            (Some(Orientation::AbcEulerXyz), _) => Some(product(&euler(words), &still)),
-            (_, None) if self.source_machine.is_none() => Some(still),
-            (Some(Orientation::SourceMachine(_)), _) | (None, _) if self.source_machine.is_some() => {
-                let (machine, at) = self.source_machine.as_ref()?;
-                let mut joints = vec![0.0; machine.joints.len()];
-                for (slot, word) in at.iter().zip(rotary_letters(machine, *at)) {
-                    joints[*slot] = words[word];
-                }
-                let turn = machine.kinematics().forward_frame(&joints).ok()?.turn;
-                Some(if up { product(&turn, &rot_x(PI)) } else { turn })
-            }
-            (_, Some(i)) => {
-                self.findings.say(code::ROBOT_ROTARY_WORDS, Some(self.source), &[["A", "B", "C"][i].into()]);
+        self.out.by_direction |= pose.tool_axis.is_some();
+        match self.turns.of(pose, state) {
+            Ok(turn) => Some(turn),
+            Err(Some(word)) => {
+                self.findings.say(code::ROBOT_ROTARY_WORDS, Some(self.source), &[word.into()]);
                 None
             }
-            _ => Some(still),
+            Err(None) => None,
         }
     }
 
@@ -1033,37 +1000,11 @@ fn through(zone: Zone) -> Zone {
     }
 }
 
-/// A frame with this Z; X as near to the X of the work frame as can be, then turned about Z.
-fn along(z: [f64; 3], spin: f64) -> M3 {
-    let l = norm(z).max(f64::MIN_POSITIVE);
-    let z = scale(z, 1.0 / l);
-    let help = if z[0].abs() < 0.9 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] };
-    let x = sub(help, scale(z, dot(help, z)));
-    let x = scale(x, 1.0 / norm(x).max(f64::MIN_POSITIVE));
-    let y = gr_machine::math::cross(z, x);
-    let turn = [[x[0], y[0], z[0]], [x[1], y[1], z[1]], [x[2], y[2], z[2]]];
-    if spin == 0.0 { turn } else { product(&turn, &rot_z(spin)) }
-}
-
 /// The spindle's nose of a mill that stands at home.
 fn nose_at_home(machine: &Machine) -> Option<Frame> {
     let home = crate::plan::home_joints(machine).filter(|_| machine.kind == Kind::Mill)?;
     let flange = machine.kinematics().forward_frame(&home).ok()?;
     Some(flange.then(&machine.cell.tool_frame(u32::MAX)))
-}
-
-/// A five-axis machine and the places of its rotary joints.
-fn rotary_joints(machine: Machine) -> Option<(Machine, [usize; 2])> {
-    matches!(machine.chain, Chain::FiveAxis(_)).then_some((machine, [3, 4]))
-}
-
-/// Which of the words A B C drives each rotary joint.
-fn rotary_letters(machine: &Machine, at: [usize; 2]) -> [usize; 2] {
-    at.map(|i| match machine.joints[i].word.or_else(|| machine.joints[i].name.chars().next()) {
-        Some('A' | 'a') => 0,
-        Some('B' | 'b') => 1,
-        _ => 2,
-    })
 }
 
 /// `G54` … `G59.3`.

@@ -11,6 +11,7 @@
 //! | `plan` | the passes in order, findings |
 //! | `gather` | motion IR → moves in work frames, actions of the cell |
 //! | `cell` | M words → signals, or a request to the operator |
+//! | `turns` | how rotary words turn the tool |
 //! | `path` | the real path of a move |
 //! | `solver` | joint values and limits |
 //! | `follow` | joint values from look to look, without a jump |
@@ -39,8 +40,10 @@ mod program;
 pub mod reference;
 pub mod setpoints;
 mod solver;
+mod turns;
 pub mod verify;
 
 pub use options::{Options, Planned, Setup, Singularity, Summary};
 pub use plan::plan;
 pub use program::{Action, Curves, MAX_JOINTS, RobotProgram, Step, Target, Tool, Word, WorkFrame, Zone};
+pub use turns::Turns;

@@ -6,7 +6,7 @@
 //! count from there, and at the zero itself there is none.
 
 use super::{Correction, Corrector, halved};
-use crate::words::{Asked, Words, frame, rotary, slid, started, tool};
+use crate::words::{Asked, Slides, Words, frame, rotary, slid, started, tool};
 use gr_ir::{Axes, Builder, FeedMode, Op, Pose, Program, Source, State, geometry};
 use gr_machine::math::{Frame, V3, add, rotate, sub, transpose};
 use gr_machine::{Kinematics, KinematicsError, Machine};
@@ -143,7 +143,7 @@ impl Run<'_> {
     fn correction(&self, axes: &Axes, state: &State) -> Result<(V3, f64), KinematicsError> {
         let asked = Asked::new(self.machine, axes, state);
         match &self.words {
-            Words::Joints { sliding, turning } => self.by_joints(&asked, sliding, turning),
+            Words::Joints(Slides { sliding, turning }) => self.by_joints(&asked, sliding, turning),
             Words::Point => self.by_point(&asked),
         }
     }

@@ -5,7 +5,7 @@ use super::{Look, Reach, telling};
 use crate::error::{Budget, Errors, Sensitivity};
 use crate::map::{Probe, limits};
 use crate::report::turns_apart;
-use crate::words::{Asked, Words, put_down, slid, started};
+use crate::words::{Asked, Named, Slides, Words, put_down, started};
 use gr_ir::{Axes, Program, Source, State, geometry};
 use gr_machine::math::{Frame, V3, add, dot, norm, scale, sub};
 use gr_machine::{Kind, Kinematics, Machine};
@@ -17,6 +17,8 @@ const APART: f64 = 5.0;
 const SAME: f64 = 0.5;
 /// Chords of a curve are this near to it, mm.
 const CHORD: f64 = 0.05;
+/// Slides go with a coordinate by less than this: not at all.
+const LEVEL: f64 = 1e-9;
 /// A slide may be beyond its limit by rounding, mm.
 const ROUNDING: f64 = 1e-9;
 
@@ -34,14 +36,34 @@ struct Stop {
     rotary: [f64; 3],
     /// From the part's origin in the directions of the base, mm.
     point: V3,
+    /// Coordinates that the program has named: else the machine stands where it happens to.
+    said: [bool; 3],
+    /// Of [`Mill::zeros`].
+    zero: usize,
     source: Source,
     cuts: bool,
+}
+
+impl Stop {
+    fn tip(&self, at: V3) -> V3 {
+        add(self.point, at)
+    }
+}
+
+/// What the control works with where the part was touched: errors count from there.
+#[derive(Clone, Copy, PartialEq)]
+struct Zero {
+    tool: usize,
+    rotary: [f64; 3],
+    point: V3,
 }
 
 /// One tool with the rotary axes at one place: the slides are `rows · (origin + point) + base`.
 struct Posed {
     rows: [V3; 3],
     base: V3,
+    /// Slides that depend on no coordinate that the program has not named yet.
+    counts: [bool; 3],
     /// Least and greatest `row · point` of each slide.
     range: [(f64, f64); 3],
 }
@@ -50,9 +72,9 @@ struct Posed {
 pub struct Mill<'a> {
     machine: &'a Machine,
     kinematics: Box<dyn Kinematics>,
-    sliding: [usize; 3],
-    turning: Vec<(usize, usize)>,
+    slides: Slides,
     tools: Vec<Frame>,
+    zeros: Vec<Zero>,
     /// Of cuts: errors of rapids don't count.
     stops: Vec<Stop>,
     /// Least and greatest coordinates of all points and of the origin.
@@ -61,7 +83,9 @@ pub struct Mill<'a> {
     faces: Vec<Face>,
     room: Option<[(f64, f64); 3]>,
     /// Rotary axes beyond their limits, wherever the part is: each with the first place and its value.
-    pub turned: Vec<(Source, usize, f64)>,
+    pub beyond: Vec<(Source, usize, f64)>,
+    /// Slides that the program needs more of than there is, wherever the part is: how much it needs and how much there is, mm.
+    pub short: Vec<(usize, f64, f64)>,
 }
 
 impl<'a> Mill<'a> {
@@ -71,7 +95,7 @@ impl<'a> Mill<'a> {
         let mut posed: Vec<Posed> = Vec::new();
         let (mut poses, mut known) = (HashMap::new(), HashSet::new());
         out.walk(program, rapids, &mut |out, stop| {
-            let key = (stop.tool, stop.rotary.map(f64::to_bits));
+            let key = (stop.tool, stop.rotary.map(f64::to_bits), stop.said);
             let n = *poses.entry(key).or_insert_with(|| {
                 posed.push(out.posed(&stop));
                 posed.len() - 1
@@ -80,6 +104,7 @@ impl<'a> Mill<'a> {
             (0..3).for_each(|i| out.span[i] = (out.span[i].0.min(stop.point[i]), out.span[i].1.max(stop.point[i])));
             let near = (
                 stop.tool,
+                stop.zero,
                 stop.point.map(|v| (v / SAME).round() as i64),
                 stop.rotary.map(|v| (v / 1.7e-4).round() as i64),
             );
@@ -90,12 +115,17 @@ impl<'a> Mill<'a> {
         if posed.is_empty() {
             // A program without any move: its origin.
             out.tools.push(machine.tool_of_length(0.0));
-            let stop = Stop { tool: 0, rotary: [0.0; 3], point: [0.0; 3], source: Source::default(), cuts: false };
+            let (rotary, point, source) = ([0.0; 3], [0.0; 3], Source::default());
+            let stop = Stop { tool: 0, rotary, point, said: [true; 3], zero: 0, source, cuts: false };
             let mut at_origin = out.posed(&stop);
             at_origin.take(stop.point);
             posed.push(at_origin);
         }
         out.few = telling(out.stops.len(), |i| out.stops[i].point);
+        // Errors grow away from the zero: those far from it tell most.
+        let (stops, zeros) = (&out.stops, &out.zeros);
+        let far = |i: &usize| norm(sub(stops[*i].point, zeros[stops[*i].zero].point));
+        out.few.sort_by(|a, b| far(b).total_cmp(&far(a)));
         out.faces = out.bounded(&posed);
         out.room = out.box_of_faces();
         Some(out)
@@ -108,7 +138,8 @@ impl<'a> Mill<'a> {
         look.walk(program, true, &mut |out, stop| {
             let Some(joints) = out.joints(&stop, at) else { return };
             for (joint, value) in out.machine.outside(&joints) {
-                if found.iter().all(|f| f.1 != joint) {
+                let unsaid = (0..3).any(|i| out.slides.sliding[i] == joint && !stop.said[i]);
+                if !unsaid && found.iter().all(|f| f.1 != joint) {
                     found.push((stop.source, joint, value));
                 }
             }
@@ -120,19 +151,20 @@ impl<'a> Mill<'a> {
         if machine.kind == Kind::Robot {
             return None;
         }
-        let Ok(Words::Joints { sliding, turning }) = Words::of(machine) else { return None };
+        let Ok(Words::Joints(slides)) = Words::of(machine) else { return None };
         Some(Mill {
             machine,
             kinematics: machine.kinematics(),
-            sliding,
-            turning,
+            slides,
             tools: Vec::new(),
+            zeros: Vec::new(),
             stops: Vec::new(),
             span: [(0.0, 0.0); 3],
             few: Vec::new(),
             faces: Vec::new(),
             room: None,
-            turned: Vec::new(),
+            beyond: Vec::new(),
+            short: Vec::new(),
         })
     }
 
@@ -140,41 +172,49 @@ impl<'a> Mill<'a> {
     fn walk(&mut self, program: &Program, rapids: bool, take: &mut dyn FnMut(&mut Mill<'a>, Stop)) {
         let put = put_down(self.machine, Frame { position: [0.0; 3], ..self.machine.cell.part_in_base() });
         let mut cursor = program.cursor();
+        let mut named = Named::default();
         while let Some(view) = cursor.next() {
-            if !view.op.feeds() && !(rapids && view.op.moves()) {
+            let said = named.step(&view);
+            if !view.op.cuts() && !(rapids && view.op.moves()) {
                 continue;
             }
-            let mut at = |axes: &Axes, state: &State, cuts: bool| {
-                let asked = Asked::new(&put, axes, state);
-                let tool = self.tools.iter().position(|t| *t == asked.tool).unwrap_or_else(|| {
-                    self.tools.push(asked.tool);
-                    self.tools.len() - 1
-                });
-                take(self, Stop { tool, rotary: asked.rotary, point: asked.tip, source: view.source, cuts });
+            let mut at = |axes: &Axes, cuts: bool| {
+                let stop = Stop { source: view.source, cuts, said, ..self.stop(&put, axes, view.state) };
+                take(self, stop);
             };
-            if !view.op.feeds() {
-                at(&view.end.axes, view.state, false);
+            if !view.op.cuts() {
+                at(&view.end.axes, false);
                 continue;
             }
             let mut from = view.start.axes;
-            at(&from, view.state, true);
+            at(&from, true);
             geometry::flatten(&view.op, view.start, view.end, CHORD, |to| {
                 let way: V3 = [0, 1, 2].map(|i| to[i] - from[i]);
                 let count = ((norm(way) / APART).ceil().clamp(1.0, 1e5) as usize).max(turns_apart(&from, to));
                 for i in 1..=count {
                     let t = i as f64 / count as f64;
-                    at(&std::array::from_fn(|k| from[k] + (to[k] - from[k]) * t), view.state, true);
+                    at(&std::array::from_fn(|k| from[k] + (to[k] - from[k]) * t), true);
                 }
                 from = *to;
             });
         }
     }
 
+    /// A place that the program says.
+    fn stop(&mut self, put: &Machine, axes: &Axes, state: &State) -> Stop {
+        let asked = Asked::new(put, axes, state);
+        let tool = place_of(&mut self.tools, asked.tool);
+        let zero = Asked::new(put, &[0.0; 9], state);
+        let zero = Zero { tool: place_of(&mut self.tools, zero.tool), rotary: zero.rotary, point: zero.tip };
+        let zero = place_of(&mut self.zeros, zero);
+        Stop { tool, rotary: asked.rotary, point: asked.tip, said: [true; 3], zero, source: Source::default(), cuts: true }
+    }
+
     /// How the slides go with the tool point while the rotary axes stand; notes rotary axes beyond their limits.
     fn posed(&mut self, stop: &Stop) -> Posed {
         const FAR: f64 = 100.0;
         let slides =
-            |tip: V3| self.slides(&Asked { tip, tool: self.tools[stop.tool], rotary: stop.rotary }).unwrap_or_default();
+            |tip: V3| self.slid(&Asked { tip, tool: self.tools[stop.tool], rotary: stop.rotary }).unwrap_or_default();
         let base = slides([0.0; 3]);
         let columns = [0, 1, 2].map(|i| {
             let mut tip = [0.0; 3];
@@ -185,52 +225,72 @@ impl<'a> Mill<'a> {
         let begun = started(
             self.machine,
             &Asked { tip: [0.0; 3], tool: Frame::IDENTITY, rotary: stop.rotary },
-            &self.sliding,
-            &self.turning,
+            &self.slides.sliding,
+            &self.slides.turning,
         );
-        for (joint, _) in &self.turning {
+        for (joint, _) in &self.slides.turning {
             let value = begun[*joint];
-            if !self.machine.joints[*joint].allows(value) && self.turned.iter().all(|t| t.1 != *joint) {
-                self.turned.push((stop.source, *joint, value));
+            if !self.machine.joints[*joint].allows(value) && self.beyond.iter().all(|t| t.1 != *joint) {
+                self.beyond.push((stop.source, *joint, value));
             }
         }
-        Posed { rows, base, range: [(f64::INFINITY, f64::NEG_INFINITY); 3] }
+        let counts = rows.map(|row| (0..3).all(|i| stop.said[i] || row[i].abs() < LEVEL));
+        let range = [(f64::INFINITY, f64::NEG_INFINITY); 3];
+        Posed { rows, base, counts, range }
     }
 
-    fn slides(&self, asked: &Asked) -> Option<V3> {
-        let begun = started(self.machine, asked, &self.sliding, &self.turning);
-        let joints = slid(&*self.kinematics, &begun, &self.sliding, asked).ok()?;
-        Some(self.sliding.map(|j| joints[j]))
+    fn slid(&self, asked: &Asked) -> Option<V3> {
+        let joints = self.slides.stand(self.machine, &*self.kinematics, asked)?.joints;
+        Some(self.slides.sliding.map(|j| joints[j]))
+    }
+
+    fn asked(&self, stop: &Stop, at: V3) -> Asked {
+        Asked { tip: stop.tip(at), tool: self.tools[stop.tool], rotary: stop.rotary }
     }
 
     fn joints(&self, stop: &Stop, at: V3) -> Option<Vec<f64>> {
-        let asked = Asked { tip: add(at, stop.point), tool: self.tools[stop.tool], rotary: stop.rotary };
-        let begun = started(self.machine, &asked, &self.sliding, &self.turning);
-        slid(&*self.kinematics, &begun, &self.sliding, &asked).ok()
+        self.slides.stand(self.machine, &*self.kinematics, &self.asked(stop, at)).map(|s| s.joints)
     }
 
-    /// The faces of the space where every slide is within its limits.
-    fn bounded(&self, posed: &[Posed]) -> Vec<Face> {
+    /// The faces of the space where every slide is within its limits; notes slides that are too short.
+    fn bounded(&mut self, posed: &[Posed]) -> Vec<Face> {
         let mut faces: BTreeMap<[i64; 3], Face> = BTreeMap::new();
         let mut add_face = |normal: V3, far: f64| {
             let face = faces.entry(normal.map(|v| (v * 1e9).round() as i64)).or_insert(Face { normal, far });
             face.far = face.far.min(far);
         };
         for p in posed {
-            for i in 0..3 {
-                let size = norm(p.rows[i]);
-                if size < 1e-9 {
+            for i in (0..3).filter(|i| p.counts[*i]) {
+                let row = p.rows[i];
+                let (low, high) = limits(&self.machine.joints[self.slides.sliding[i]]);
+                let (least, most) = (p.base[i] + p.range[i].0, p.base[i] + p.range[i].1);
+                let size = norm(row);
+                if size < LEVEL {
                     continue;
                 }
-                let (low, high) = limits(&self.machine.joints[self.sliding[i]]);
-                let normal = scale(p.rows[i], 1.0 / size);
-                add_face(normal, (high - p.base[i] - p.range[i].1) / size);
-                add_face(scale(normal, -1.0), (p.base[i] + p.range[i].0 - low) / size);
+                let normal = scale(row, 1.0 / size);
+                add_face(normal, (high - most) / size);
+                add_face(scale(normal, -1.0), (least - low) / size);
             }
         }
+        self.short = (0..3).filter_map(|i| self.too_short(i, &faces)).collect();
         let mut out: Vec<Face> = faces.into_values().collect();
         out.sort_by(|a, b| a.far.total_cmp(&b.far));
         out
+    }
+
+    /// Where a slide alone leaves no room for the part: how much of it is needed and how much there is.
+    fn too_short(&self, i: usize, faces: &BTreeMap<[i64; 3], Face>) -> Option<(usize, f64, f64)> {
+        let joint = self.slides.sliding[i];
+        let (low, high) = limits(&self.machine.joints[joint]);
+        let one = 1_000_000_000;
+        let far = |sign: i64| {
+            let mut normal = [0; 3];
+            normal[i] = sign * one;
+            faces.get(&normal).map(|f| f.far)
+        };
+        let room = far(1)? + far(-1)?;
+        (room < -ROUNDING).then_some((joint, high - low - room, high - low))
     }
 
     /// A box about the space within the faces: a face bounds each coordinate by the most that the others can make of it.
@@ -308,13 +368,19 @@ impl Reach for Mill<'_> {
             Look::Some => self.few.len(),
             Look::All => self.stops.len(),
         };
+        let zero = |z: &Zero| {
+            let tip = add(at, z.point);
+            self.slides.sensitivity(self.machine, &*self.kinematics, &Asked { tip, tool: self.tools[z.tool], rotary: z.rotary })
+        };
+        let zeros: Vec<Option<Sensitivity>> = self.zeros.iter().map(zero).collect();
         let mut out = 0.0f64;
         for n in 0..count {
             let stop = if look == Look::All { &self.stops[n] } else { &self.stops[self.few[n]] };
-            let joints = self.joints(stop, at)?;
-            let real = self.kinematics.forward_frame(&joints).ok()?;
-            let lever = sub(real.then(&Frame::shift(self.tools[stop.tool].position)).position, real.position);
-            let s = Sensitivity::new(self.machine, &joints, lever).ok()?;
+            let s = self.slides.sensitivity(self.machine, &*self.kinematics, &self.asked(stop, at))?;
+            let s = match &zeros[stop.zero] {
+                Some(zero) => s.since(zero),
+                None => s,
+            };
             out = out.max(Errors::new(&s, budget, None).sum());
             if out > most {
                 return None;
@@ -322,4 +388,12 @@ impl Reach for Mill<'_> {
         }
         Some(out)
     }
+}
+
+/// Where a value is in a list; put there when it is new.
+fn place_of<T: PartialEq>(list: &mut Vec<T>, value: T) -> usize {
+    list.iter().position(|v| *v == value).unwrap_or_else(|| {
+        list.push(value);
+        list.len() - 1
+    })
 }

@@ -2,13 +2,14 @@
 //! be chosen. Arms are planned first; see `report`.
 
 use super::{Operations, Report, Spot, Walk, pieces};
-use crate::error::Budget;
+use crate::error::{Budget, Sensitivity};
 use crate::material::Material;
-use crate::words::{Asked, Words, slid, started};
+use crate::words::{Asked, Slides, Words, ZeroKey};
 use gr_ir::measure::{Rates, measure};
 use gr_ir::{Axes, Program, State, View, geometry};
-use gr_machine::math::{Frame, V3, norm, rotate, scale, sub};
-use gr_machine::{Kind, Kinematics, Machine};
+use gr_machine::math::{V3, dot, norm, rotate, scale};
+use gr_machine::{Kind, Machine};
+use std::rc::Rc;
 
 /// Draws up a report by the words of a program; none on machines whose joints are not its words.
 pub fn report_of_words(
@@ -22,9 +23,9 @@ pub fn report_of_words(
     if machine.kind == Kind::Robot {
         return None;
     }
-    let Ok(Words::Joints { sliding, turning }) = Words::of(machine) else { return None };
+    let Ok(Words::Joints(slides)) = Words::of(machine) else { return None };
     let kinematics = machine.kinematics();
-    let mut mill = Mill { walk: Walk::new(machine, &*kinematics, operations, budget, material), sliding, turning };
+    let mut mill = Mill { walk: Walk::new(machine, &*kinematics, operations, budget, material), slides, zero: None, first_zero: None };
     let count = program.len();
     let mut cursor = program.cursor();
     let mut n = 0;
@@ -33,17 +34,20 @@ pub fn report_of_words(
             progress(n, count);
         }
         n += 1;
-        if view.op.feeds() {
+        if view.op.cuts() {
             mill.cut(&view);
         }
     }
-    Some(mill.walk.finish())
+    let touched = mill.first_zero;
+    Some(Report { touched, ..mill.walk.finish() })
 }
 
 struct Mill<'a> {
     walk: Walk<'a>,
-    sliding: [usize; 3],
-    turning: Vec<(usize, usize)>,
+    slides: Slides,
+    /// What moves the tool point at the program's zero, which was touched on this machine.
+    zero: Option<(ZeroKey, Rc<Sensitivity>)>,
+    first_zero: Option<V3>,
 }
 
 /// Chords of a curve are this near to it, mm: the places that are looked at lie on them.
@@ -59,6 +63,7 @@ impl Mill<'_> {
         let speed = if seconds > 0.0 { length / seconds } else { 0.0 };
         let mut from = view.start.axes;
         let mut since = f64::INFINITY;
+        let mut last: V3 = [0.0; 3];
         geometry::flatten(&view.op, view.start, view.end, CHORD, |to| {
             let way: V3 = [0, 1, 2].map(|i| to[i] - from[i]);
             let turned = (3..6).map(|i| (to[i] - from[i]).abs()).fold(0.0, f64::max);
@@ -66,10 +71,12 @@ impl Mill<'_> {
             self.walk.turning = !(norm(way) > 0.0) && turned > 0.0;
             let feed = if norm(way) > 0.0 { scale(way, 1.0 / norm(way)) } else { [0.0; 3] };
             since += norm(way);
-            // Of the many chords of a curve only some are looked at, and always its end.
-            if since >= super::APART || count > 1 || *to == view.end.axes {
+            // Of the many chords of a curve only some are looked at, and always its ends.
+            let bends = dot(last, feed) < libm::cos(super::BEND);
+            if since >= super::APART || bends || count > 1 || *to == view.end.axes {
                 since = 0.0;
-                for i in 1..=count {
+                last = feed;
+                for i in 0..=count {
                     let t = i as f64 / count as f64;
                     let axes = std::array::from_fn(|k| from[k] + (to[k] - from[k]) * t);
                     self.look(&axes, view.state, feed, speed, view);
@@ -82,20 +89,31 @@ impl Mill<'_> {
     fn look(&mut self, axes: &Axes, state: &State, feed: V3, speed: f64, view: &View<'_, '_>) {
         let machine = self.walk.machine;
         let asked = Asked::new(machine, axes, state);
-        let Some(place) = self.walk.place(view.source, asked.tip, asked.rotary) else { return };
-        let begun = started(machine, &asked, &self.sliding, &self.turning);
-        let kinematics: &dyn Kinematics = self.walk.kinematics;
-        let Ok(joints) = slid(kinematics, &begun, &self.sliding, &asked) else { return };
-        let Ok(real) = kinematics.forward_frame(&joints) else { return };
-        for (joint, value) in machine.outside(&joints) {
+        let feed = rotate(&crate::words::frame(machine, state).turn, feed);
+        let Some(place) = self.walk.place(view.source, asked.tip, (feed, speed), asked.rotary) else { return };
+        let Some(stand) = self.slides.stand(machine, self.walk.kinematics, &asked) else { return };
+        for (joint, value) in machine.outside(&stand.joints) {
             if self.walk.outside.iter().all(|(_, known, _)| *known != joint) {
                 self.walk.outside.push((view.source, joint, value));
             }
         }
-        let lever = sub(real.then(&Frame::shift(asked.tool.position)).position, real.position);
-        let feed = rotate(&crate::words::frame(machine, state).turn, feed);
-        let axis = real.turn.map(|r| r[2]);
-        self.walk.record(&Spot { place, source: view.source, joints, point: asked.tip, lever, feed, axis, speed, turns: self.walk.turning, rotary: asked.rotary });
+        let zero = self.at_zero(state);
+        let (source, turns, rotary, point) = (view.source, self.walk.turning, asked.rotary, asked.tip);
+        let (axis, lever) = (stand.axis, stand.lever);
+        self.walk.record(&Spot { place, source, joints: stand.joints, point, lever, feed, zero, axis, speed, turns, rotary });
+    }
+
+    /// What moves the tool point at the program's zero: the part was touched there, so errors count from there.
+    fn at_zero(&mut self, state: &State) -> Option<Rc<Sensitivity>> {
+        let machine = self.walk.machine;
+        let asked = Asked::new(machine, &[0.0; 9], state);
+        let key = asked.key();
+        self.first_zero.get_or_insert(asked.tip);
+        if self.zero.as_ref().is_none_or(|(known, _)| *known != key) {
+            let s = self.slides.sensitivity(machine, self.walk.kinematics, &asked)?;
+            self.zero = Some((key, Rc::new(s)));
+        }
+        self.zero.as_ref().map(|(_, s)| s.clone())
     }
 }
 

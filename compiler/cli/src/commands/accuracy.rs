@@ -82,9 +82,9 @@ pub fn run(global: &Global, args: &AccuracyArgs) -> Exit {
             return if checked.unreadable { Exit::Io } else { Exit::Findings };
         }
     };
-    let result = predict(args, &unit, &motion, &machine, &budget, part, &progress).and_then(|(text, found, height)| {
+    let result = predict(args, &unit, &motion, &machine, &budget, part, &progress).and_then(|(text, found, of)| {
         let Some(goal) = &args.map else { return Ok(((text, Vec::new()), found)) };
-        match super::map::beside(global, &machine, &budget, height, goal) {
+        match super::map::beside(global, &machine, &budget, &of, goal) {
             Ok(files) => Ok(((text, files), found)),
             Err((what, why)) => Err(vec![Diagnostic::new(code::ACCURACY_BAD_OPTION, FileId(0), Span::default(), &[what, why])]),
         }
@@ -162,6 +162,14 @@ fn place(motion: &Motion, source: Source) -> (FileId, Span) {
     texts.place(source)
 }
 
+/// What the map beside a report is of.
+pub struct Beside {
+    /// Its height in the base, mm.
+    pub height: f64,
+    /// Where the part was touched, in the base, mm.
+    pub zero: Option<[f64; 3]>,
+}
+
 fn predict(
     args: &AccuracyArgs,
     unit: &Unit,
@@ -170,7 +178,7 @@ fn predict(
     budget: &Budget,
     part: Option<Frame>,
     progress: &Progress,
-) -> Result<(String, Vec<Diagnostic>, f64), Vec<Diagnostic>> {
+) -> Result<(String, Vec<Diagnostic>, Beside), Vec<Diagnostic>> {
     let process = unit.exchange.then(|| crate::exchange::process(unit).ok().map(|(p, _, _)| p)).flatten();
     let mut operations = Operations::new(&motion.program);
     let fits = cutting(&mut operations, args, unit, motion, process.as_ref());
@@ -223,6 +231,10 @@ fn predict(
         }
     };
     // Without a place of the part nobody knows where its zero was touched.
+    let strange = crate::robot::missing_axes(&motion.program, machine, &texts);
+    if !strange.is_empty() {
+        return Err(strange);
+    }
     for (source, joint, value) in report.outside.iter().filter(|_| args.part.is_some()) {
         let (file, span) = place(motion, *source);
         found.extend(beyond(machine, *joint, *value, file, span));
@@ -239,13 +251,16 @@ fn predict(
             found.push(Diagnostic::new(code::ACCURACY_NO_DATA, file, span, &["the error by the measured deviations".to_string(), why]));
         }
     }
+    // Down the program.
+    found.sort_by_key(|d| d.labels.first().map(|l| (l.file.0, l.span.start)));
     let text = match args.format {
         TableFormat::Text => text(&report, motion, machine, material, budget, args),
         TableFormat::Json => format!("{:#}\n", as_json(&report, motion, machine, material, budget, args)),
         TableFormat::Csv => csv(&report, motion),
     };
     let worst = report.rows.iter().filter_map(|r| r.worst.as_ref()).max_by(|a, b| a.errors.sum().total_cmp(&b.errors.sum()));
-    Ok((text, found, worst.map_or(0.0, |w| (w.point[2] * 10.0).round() / 10.0 + 0.0)))
+    let height = worst.map_or(0.0, |w| (w.point[2] * 10.0).round() / 10.0 + 0.0);
+    Ok((text, found, Beside { height, zero: report.touched }))
 }
 
 /// A joint beyond its limit.
@@ -402,7 +417,8 @@ fn lawless(found: &mut Vec<Diagnostic>, row: &Row, machine: &Machine, motion: &M
     for (source, why) in &row.unforced {
         let why = match why {
             Unforced::Axial => "the tool is fed along its axis, and the force law is that of milling across it (a drill is known by its cycle: G73 G81 G82 G83)",
-            Unforced::NoLaw => "the force law is that of milling and drilling, not of tapping, boring, reaming and countersinking",
+            Unforced::NoLaw => "the force law is that of milling and drilling, not of tapping, threading, boring, reaming and countersinking",
+            Unforced::Across => "a drill is fed another way than along its axis, and the law of its thrust is that along it",
             Unforced::Turning => "only rotary axes move: the tool turns about its point, which stays where it is on the part, and no force law is about that",
             Unforced::TooWide => "the width of cut is more than the diameter of the tool",
             Unforced::NoSpeed => "no turns per minute are known: no S, a spindle that is stopped, or a surface speed",
@@ -526,7 +542,7 @@ fn of_step(step: &Workingstep) -> CutData {
     match &step.operation.kind {
         OperationKind::Mill(m) => {
             cut.depth = m.axial;
-            cut.width = m.radial.or(cut.diameter);
+            cut.width = m.radial;
         }
         OperationKind::Drill(d) => {
             cut.lips = cut.teeth;
@@ -549,6 +565,9 @@ fn work_of(step: &Workingstep) -> Work {
 
 const RULES: &str = "sum = longest kinematic + longest geometric + deflection; rss = root of the squares of the typical ones and the deflection";
 
+/// How errors by the geometry count on a machine tool.
+const TOUCHED: &str = "counted from the program's zero, which is touched on this machine";
+
 fn line_of(motion: &Motion, source: Source) -> String {
     let name = motion.sources.get(source.file).map_or("", |f| &f.name);
     if source.file == FileId(0) { format!("{}", source.line + 1) } else { format!("{name}:{}", source.line + 1) }
@@ -561,6 +580,9 @@ fn text(report: &Report, motion: &Motion, machine: &Machine, material: Option<&M
     }
     if let Some(text) = &args.deviations {
         let _ = writeln!(out, "geometry: by the deviations {text}");
+    }
+    if report.touched.is_some() && budget.tells_geometry() {
+        let _ = writeln!(out, "geometry: {TOUCHED}");
     }
     if let (Some(s), Some(m)) = (&machine.cell.stiffness, material) {
         let _ = writeln!(out, "stiffness: {}\nmaterial: {}, {}", s.source, m.title, m.source);
@@ -668,6 +690,7 @@ fn as_json(
         "machine": machine.id, "unit": "mm", "rules": RULES, "doubt": DOUBT,
         "accuracy_source": machine.cell.accuracy.as_ref().map(|a| a.source.clone()),
         "stiffness_source": machine.cell.stiffness.as_ref().map(|s| s.source.clone()),
+        "geometry_from_zero": report.touched.is_some(),
         "material": material.map(|m| m.id.clone()), "deviations": args.deviations, "taken_as_exact": budget.unsaid, "operations": rows,
     })
 }

@@ -8,10 +8,11 @@ use gr_accuracy::map::{self, DOUBT, Map, Plane, Probe, Quantity, Request};
 use gr_accuracy::outline::outline;
 use gr_accuracy::picture::Picture;
 use gr_accuracy::{Budget, BudgetOptions, closed_form};
+use gr_machine::math::{Frame, euler, product};
 use gr_machine::{Chain, JointKind, Machine, ParameterKind};
 use gr_text::code;
 
-use super::accuracy::{misfit, referenced, soft, triple, unsaid};
+use super::accuracy::{Beside, misfit, referenced, soft, triple, unsaid};
 use crate::exit::Exit;
 use crate::options::{Global, MapArgs};
 use crate::progress::Progress;
@@ -78,7 +79,8 @@ type Refused = (String, String);
 fn wrapped(text: &str) -> Vec<String> {
     const LONG: usize = 72;
     let mut out = vec![String::new()];
-    for word in text.split_inclusive([' ', ',']) {
+    // The letters of pictures have no such quotes.
+    for word in text.replace('`', "").split_inclusive([' ', ',']) {
         let line = out.len() - 1;
         if !out[line].is_empty() && out[line].chars().count() + word.trim_end().chars().count() > LONG {
             out.push(String::new());
@@ -156,7 +158,7 @@ fn area(global: &Global, args: &MapArgs, machine: &Machine, plane: Plane, budget
     heeds("--force", args.force.is_some(), by_force, "deflections and the total")?;
     heeds("--it", args.grade.is_some(), by_grade, "errors by the geometry and the total")?;
     graded(args.grade, args.deviations.as_deref())?;
-    let probe = Probe::downward(machine);
+    let probe = probe(machine, args.tool_turn.as_deref())?.touched(zero(machine, args)?);
     let size = size(&probe, machine, args, 400)?;
     // The publication counts nodes on the border too.
     let window = args.reference.map(|_| {
@@ -165,7 +167,8 @@ fn area(global: &Global, args: &MapArgs, machine: &Machine, plane: Plane, budget
     });
     let request = Request { quantity, plane, size, window, force, signs };
     // Of the volume.
-    let (layers, nodes) = if closed_form(machine) { (68, 120) } else { (16, 24) };
+    let quick = closed_form(machine) || matches!(machine.chain, Chain::FiveAxis(_));
+    let (layers, nodes) = if quick { (68, 120) } else { (16, 24) };
     let progress = Progress::new(global.quiet, format!("map of {}", machine.id));
     // A search of its own on some machines, which the estimate must not count for each place.
     probe.extent();
@@ -183,7 +186,15 @@ fn area(global: &Global, args: &MapArgs, machine: &Machine, plane: Plane, budget
     });
     let mut left_out = left_out(quantity, machine, budget, force);
     left_out.extend(limitless(machine));
-    if map.lost > 0 {
+    let infinite = quantity == Quantity::Condition && map.lost > 0;
+    let singular = match map.summary() {
+        None => infinite,
+        Some(s) => quantity == Quantity::Singularity && s.greatest.0 == 0.0,
+    };
+    if infinite && !singular {
+        left_out.push([format!("the condition number at {} places within reach", map.lost), "they are singular: it has no finite value there".to_string()]);
+    }
+    if map.lost > 0 && !infinite {
         let why = "a member of `[stiffness]` has no length left there: look at its `shorter_by` or `between`".to_string();
         left_out.push([format!("the deflection at {} places within reach", map.lost), why]);
     }
@@ -198,13 +209,26 @@ fn area(global: &Global, args: &MapArgs, machine: &Machine, plane: Plane, budget
     }
     let title = format!("{}: {what}, {} = {} mm", machine.id, ["X", "Y", "Z"][plane.axis], plane.at);
     let mut text = told(&map, machine, &what);
-    if quantity == Quantity::Workspace {
+    let flat = probe.extent().iter().any(|(low, high)| high - low < 1e-6);
+    if quantity == Quantity::Workspace && !flat {
         let tell = |done: usize, of: usize| progress.tell(|| format!("volume of {}: layer {done} of {of}", machine.id));
         let volume = map::volume(&probe, layers, nodes, &tell) / 1e6;
         let _ = writeln!(text, "volume {volume:.1} dm³ (by {layers} layers of {nodes} × {nodes} nodes)");
     }
     drop(progress);
-    let mut notes = Vec::new();
+    let mut notes: Vec<String> = stands(&probe, args.tool_turn.as_deref());
+    if geometry && probe.counts_from_zero() {
+        let [x, y, z] = zero(machine, args)?;
+        notes.push(format!("geometry: counted from X {x} Y {y} Z {z} mm in the base, as if the part were touched there (`--zero`)"));
+    }
+    if singular {
+        let count = if infinite { map.lost } else { map.summary().map_or(0, |s| s.nodes) };
+        notes.push(format!("singular at all {count} nodes within reach: the condition number has no finite value"));
+        if probe.leans() && args.tool_turn.is_none() {
+            notes.push("so it is by build: with the tool upright an axis turns it about itself; `--tool-turn` leans it".to_string());
+        }
+    }
+    let held = notes.len();
     if map.elastic && by_force {
         notes.push(format!("force X {} Y {} Z {} N", force[0], force[1], force[2]));
     }
@@ -220,15 +244,67 @@ fn area(global: &Global, args: &MapArgs, machine: &Machine, plane: Plane, budget
     notes.iter().for_each(|n| text += &format!("{n}\n"));
     let without: Vec<String> = left_out.iter().map(without).collect();
     notes.extend(without.iter().cloned());
-    if map.summary().is_none() {
-        let (low, high) = probe.extent()[plane.axis];
-        let axis = ["X", "Y", "Z"][plane.axis];
-        let _ = writeln!(text, "nothing of this plane is within reach; the tool gets to {axis} {low:.1} to {high:.1} mm at most");
+    if map.summary().is_none() && !infinite {
+        let _ = writeln!(text, "nothing of this plane is within reach; {}", reach_along(&probe, plane.axis));
     }
     // Lines of a picture are short.
     let lines: Vec<String> = notes.iter().flat_map(|n| n.split("; ")).flat_map(wrapped).collect();
     let picture = Picture::map(&map, &title, &lines);
+    let without: Vec<String> = notes[..held].iter().cloned().chain(without).collect();
     Ok(Made { text, files: files(&args.output, &picture, || map.csv(&without))?, left_out })
+}
+
+/// The machine with its tool turned as asked: straight down on arms, upright on mills, as at the start on planar arms.
+pub fn probe<'m>(machine: &'m Machine, turn: Option<&str>) -> Result<Probe<'m>, Refused> {
+    let probe = Probe::downward(machine);
+    let Some(text) = turn else { return Ok(probe) };
+    let why = |why: &str| Err(("--tool-turn".to_string(), why.to_string()));
+    let Some(words) = triple(text).filter(|w| w.iter().all(|v| v.abs() <= 360.0)) else {
+        return why("three angles in degrees are wanted, A,B,C: -30,0,45");
+    };
+    if !probe.turns_as_asked() {
+        return why(&format!("{} has no joint that turns its tool as one likes", machine.id));
+    }
+    let turn = product(&euler(words.map(f64::to_radians)), &gr_robot::Turns::new(machine).still());
+    Ok(probe.held(Frame::IDENTITY, turn))
+}
+
+/// How the tool stands in a map or a rectangle, where the machine can turn it, and which of its ways to stand an arm takes.
+pub fn stands(probe: &Probe<'_>, turn: Option<&str>) -> Vec<String> {
+    if !probe.turns_as_asked() {
+        return Vec::new();
+    }
+    let held = match turn {
+        Some(text) => format!("tool turned by A,B,C {text}°"),
+        None if probe.leans() => "tool upright".to_string(),
+        None => match probe.planar_angle() {
+            Some(angle) => format!("tool turned as at the start: C {:.1}°", angle.to_degrees()),
+            None => "tool straight down".to_string(),
+        },
+    };
+    let mut out = vec![format!("{held}, at every place (`--tool-turn`)")];
+    if !probe.leans() {
+        out.push("where the arm can stand in several ways: the one nearest to its start".to_string());
+    }
+    out
+}
+
+/// The zero of a machine tool that errors by the geometry count from: the base's where none is given.
+fn zero(machine: &Machine, args: &MapArgs) -> Result<[f64; 3], Refused> {
+    let Some(text) = &args.zero else { return Ok([0.0; 3]) };
+    if !Probe::downward(machine).touched([0.0; 3]).counts_from_zero() {
+        return Err(("--zero".to_string(), format!("a part is touched on machine tools; {} is none", machine.id)));
+    }
+    triple(text).ok_or_else(|| ("--zero".to_string(), "three numbers are wanted, such as 100,50,0".to_string()))
+}
+
+/// How far the tool gets along an axis.
+pub fn reach_along(probe: &Probe<'_>, axis: usize) -> String {
+    let name = ["X", "Y", "Z"][axis];
+    match probe.span(axis) {
+        Some((low, high, apart)) => format!("the tool gets at least to {name} {low:.0} to {high:.0} mm (looked at every {apart:.0} mm)"),
+        None => "no place that was looked at is".to_string(),
+    }
 }
 
 /// A slide without limits reaches as far as one likes: what is drawn is only what was looked at.
@@ -383,7 +459,7 @@ fn bars(global: &Global, machine: &Machine, plane: Plane, args: &MapArgs) -> Res
     if args.signs.is_some() || args.force.is_some() || args.grade.is_some() || args.deviations.is_some() {
         return Err(("--quantity sensitivity".into(), "it goes by the geometry alone: no `--signs`, `--force`, `--deviations` or `--it`".into()));
     }
-    let probe = Probe::downward(machine);
+    let probe = probe(machine, args.tool_turn.as_deref())?.touched(zero(machine, args)?);
     let size = size(&probe, machine, args, 120)?;
     let progress = Progress::new(global.quiet, format!("sensitivities of {}", machine.id));
     probe.extent();
@@ -411,9 +487,8 @@ fn bars(global: &Global, machine: &Machine, plane: Plane, args: &MapArgs) -> Res
                     list.into_iter().zip(angles).map(one).collect()
                 }
                 None => {
-                    let (low, high) = probe.extent()[plane.axis];
-                    let axis = ["X", "Y", "Z"][plane.axis];
-                    return Err((format!("--plane {}", args.plane), format!("nothing of this plane is within reach; the tool gets to {axis} {low:.1} to {high:.1} mm at most")));
+                    let why = format!("nothing of this plane is within reach; {}", reach_along(&probe, plane.axis));
+                    return Err((format!("--plane {}", args.plane), why));
                 }
             },
         ),
@@ -433,6 +508,11 @@ fn bars(global: &Global, machine: &Machine, plane: Plane, args: &MapArgs) -> Res
     let rows: Vec<(String, f64)> = all.iter().map(|b| (b.0.clone(), last(b))).collect();
     let title = format!("{}: mean sensitivity, {} = {} mm", machine.id, ["X", "Y", "Z"][plane.axis], plane.at);
     let unit = if columns.len() == 2 { "arm, mm per mm" } else { "tool point, mm per mm or mrad" };
+    stands(&probe, args.tool_turn.as_deref()).iter().for_each(|n| text += &format!("{n}\n"));
+    if probe.counts_from_zero() {
+        let [x, y, z] = zero(machine, args)?;
+        text += &format!("counted from X {x} Y {y} Z {z} mm in the base, as if the part were touched there (`--zero`)\n");
+    }
     let picture = Picture::bars(&rows, &title, unit);
     let csv = || {
         let mut out = format!("parameter,{}\n", columns.join(",").to_lowercase());
@@ -446,7 +526,7 @@ fn bars(global: &Global, machine: &Machine, plane: Plane, args: &MapArgs) -> Res
 }
 
 /// The map that belongs to a report: errors by joints and geometry, those that are known, at a height.
-pub fn beside(global: &Global, machine: &Machine, budget: &Budget, height: f64, goal: &PathBuf) -> Result<Vec<(PathBuf, Vec<u8>)>, Refused> {
+pub fn beside(global: &Global, machine: &Machine, budget: &Budget, of: &Beside, goal: &PathBuf) -> Result<Vec<(PathBuf, Vec<u8>)>, Refused> {
     let length = gr_accuracy::map::Part::Length;
     let (quantity, what) = match (budget.joints.is_some(), budget.tells_geometry()) {
         (true, true) => (Quantity::Total, "sum of the longest errors of joints and geometry".to_string()),
@@ -454,8 +534,9 @@ pub fn beside(global: &Global, machine: &Machine, budget: &Budget, height: f64, 
         (true, false) => (Quantity::Kinematic(length), Quantity::Kinematic(length).words()),
         _ => return Err(("--map".into(), format!("the file of {} says nothing of its errors: there is nothing to draw", machine.id))),
     };
+    let height = of.height;
     let plane = Plane { axis: 2, at: height };
-    let probe = Probe::downward(machine);
+    let probe = Probe::downward(machine).touched(of.zero.unwrap_or_default());
     let request = Request { quantity, plane, size: (400, 400), window: None, force: [0.0; 3], signs: None };
     let progress = Progress::new(global.quiet, format!("map of {}", machine.id));
     probe.extent();
@@ -474,6 +555,10 @@ pub fn beside(global: &Global, machine: &Machine, budget: &Budget, height: f64, 
     let title = format!("{}: {what}, Z = {height} mm", machine.id);
     let mut notes: Vec<String> = unsaid(machine, budget).iter().map(without).collect();
     notes.push("left out: the deflection".to_string());
+    notes.extend(stands(&probe, None));
+    if probe.counts_from_zero() {
+        notes.push("geometry: counted from the program's zero, which is touched on this machine".to_string());
+    }
     if budget.known.is_some() {
         notes.push("geometry: by deviations that are given".to_string());
     }

@@ -3,12 +3,13 @@
 use std::path::Path;
 
 use gr_accuracy::map::Probe;
-use gr_accuracy::place::{Aim, Arm, Found, Mill, Part, Reach, Rectangle, place, rectangle};
+use gr_accuracy::place::{Aim, Arm, Found, Mill, Part, Reach, Rectangle, around, place, rectangle};
 use gr_accuracy::report::{Operations, report, report_of_words};
 use gr_accuracy::{Budget, BudgetOptions, closed_form, put_down};
-use gr_ir::{Sources as _, geometry};
+use gr_ir::{Pose, Sources as _, geometry};
 use gr_machine::{Chain, Machine};
-use gr_machine::math::{Frame, V3, add, norm, rotate, scale, sub};
+use gr_machine::math::{Frame, M3, V3, add, norm, product, rotate, rotation_vector, scale, sub, transpose};
+use gr_robot::Turns;
 use gr_text::{Diagnostic, FileId, Severity, Span, code};
 use serde_json::json;
 
@@ -25,6 +26,8 @@ use crate::sources::Sources;
 const APART: f64 = 5.0;
 /// Points nearer to each other than this are one, mm.
 const SAME: f64 = 0.5;
+/// A tool that turns is looked at this often, rad.
+const TURN: f64 = std::f64::consts::PI / 90.0;
 
 pub fn run(global: &Global, args: &PlaceArgs) -> Exit {
     let mut renderer = global.renderer(true);
@@ -48,8 +51,16 @@ pub fn run(global: &Global, args: &PlaceArgs) -> Exit {
     }
     let budget = Budget::new(&machine, BudgetOptions { grade: None, usp2009: args.reference.is_some() });
     let Some(file) = &args.file else {
+        if args.aim != PlaceAim::Margin {
+            let why = "a rectangle of stock is looked for by its size alone; it needs a program".to_string();
+            return super::refuse(global, &name, code::ACCURACY_BAD_OPTION, &["--aim error".to_string(), why]);
+        }
         return largest(global, args, &machine);
     };
+    if args.tool_turn.is_some() {
+        let why = "the program says itself how the tool is turned".to_string();
+        return super::refuse(global, &name, code::ACCURACY_BAD_OPTION, &["--tool-turn".to_string(), why]);
+    }
     let progress = Progress::new(global.quiet, format!("placing {}", file.display()));
     let made = load(file, &station).and_then(|unit| motion(&unit, Some(&machine)).map(|(m, _)| m));
     let motion = match made {
@@ -76,6 +87,8 @@ pub fn run(global: &Global, args: &PlaceArgs) -> Exit {
         told.extend(super::map::measured(&machine).map(top));
     }
     told.extend(super::map::limitless(&machine).map(top));
+    let say = |code, args: &[String]| Diagnostic::new(code, FileId(0), Span::default(), args);
+    tool_points(&mut told, &mut machine.clone(), &motion.program, &say);
     let found = match found {
         Ok(found) => Some(found),
         Err(faults) => {
@@ -135,16 +148,24 @@ impl Wish<'_> {
         };
         let nowhere = || Diagnostic::new(code::PLACE_DOES_NOT_FIT, FileId(0), Span::default(), std::slice::from_ref(&self.machine.id));
         if let Some(mill) = Mill::new(self.machine, program, true) {
-            let turned: Vec<Diagnostic> = mill.turned.iter().filter_map(limits).collect();
-            if !turned.is_empty() {
-                return Err(turned);
+            let strange = crate::robot::missing_axes(program, self.machine, &texts).into_iter();
+            let beyond: Vec<Diagnostic> = strange.chain(mill.beyond.iter().filter_map(limits)).collect();
+            if !beyond.is_empty() {
+                return Err(beyond);
             }
+            let short = |mut finding: Diagnostic, mill: &Mill<'_>| {
+                for (joint, needs, has) in &mill.short {
+                    let name = &self.machine.joints[*joint].name;
+                    finding.notes.push(format!("joint {name}: the program goes over {needs:.1} mm, the joint over {has:.1} mm"));
+                }
+                finding
+            };
             return self.best(&mill, 1, &mut |_| true).map_err(|_| {
                 // Where rapids are out of reach everywhere: which, when the cuts fit.
                 let Some(cuts) = Mill::new(self.machine, program, false) else { return vec![nowhere()] };
-                let Ok(found) = self.best(&cuts, 1, &mut |_| true) else { return vec![nowhere()] };
+                let Ok(found) = self.best(&cuts, 1, &mut |_| true) else { return vec![short(nowhere(), &cuts)] };
                 let mut out: Vec<Diagnostic> = mill.outside(program, found.position).iter().filter_map(limits).collect();
-                out.push(near(nowhere(), found.position, "its cuts fit"));
+                out.push(short(near(nowhere(), found.position, "its cuts fit"), &mill));
                 out
             });
         }
@@ -160,19 +181,55 @@ impl Wish<'_> {
             }
             whole
         };
-        match self.best(&self.arm(true), tries, &mut planned) {
-            Ok(found) => Ok(found),
+        let Some(whole) = self.arm(true) else {
+            // A rotary word that the machine file doesn't read: at its line.
+            return Err(refused(self.motion, self.machine, self.machine.cell.part_in_base().position));
+        };
+        match self.best(&whole, tries, &mut planned) {
+            Ok(found) => Ok(Found { margin: self.kept(found), ..found }),
             Err(Some(at)) => {
                 faults.push(near(nowhere(), at, &format!("the best of {number} places that were planned")));
                 Err(faults)
             }
             Err(None) => {
-                let Ok(found) = self.best(&self.arm(false), 1, &mut |_| true) else { return Err(vec![nowhere()]) };
-                let mut out = refused(self.motion, self.machine, found.position);
-                out.push(near(nowhere(), found.position, "its cuts fit"));
+                let cuts = self.arm(false).and_then(|cuts| self.best(&cuts, 1, &mut |_| true).ok());
+                let (at, what) = match cuts {
+                    Some(found) => (found.position, "its cuts fit".to_string()),
+                    None => {
+                        let (at, count, of) = whole.nearest();
+                        (at, format!("{count} of {of} points of the path are within reach"))
+                    }
+                };
+                let mut out = refused(self.motion, self.machine, at);
+                out.truncate(FAULTS);
+                out.push(near(too_long(nowhere(), &whole), at, &what));
                 Err(out)
             }
         }
+    }
+
+    /// How far the part may be moved so that the program can still be planned at the places that are tried about the one found:
+    /// all its points within reach is not all, since the arm must come from each to the next.
+    fn kept(&self, found: Found) -> f64 {
+        let mut left = (MOVES / self.motion.program.len().max(1)).clamp(0, 600);
+        let mut margin = found.margin;
+        let mut ways: Vec<usize> = (0..around(1.0).count()).collect();
+        'smaller: while margin >= 0.1 {
+            for k in 0..ways.len() {
+                let Some(by) = around(margin).nth(ways[k]).filter(|_| left > 0) else { return margin };
+                left -= 1;
+                self.progress.tell(|| format!("planning about the place, {margin:.1} mm away at most"));
+                if !refused(self.motion, self.machine, add(found.position, by)).is_empty() {
+                    // The way that fails first next time.
+                    let way = ways.remove(k);
+                    ways.insert(0, way);
+                    margin = (margin * 0.9 * 10.0).floor() / 10.0;
+                    continue 'smaller;
+                }
+            }
+            return margin;
+        }
+        0.0
     }
 
     /// The largest error of the program there, as `accuracy` has it.
@@ -195,19 +252,31 @@ impl Wish<'_> {
         report.rows.iter().filter_map(|r| r.worst.as_ref()).map(|w| w.errors.sum()).reduce(f64::max)
     }
 
-    fn arm(&self, rapids: bool) -> Arm<'_> {
-        let parts = parts(&self.motion.program, self.machine, rapids);
+    fn arm(&self, rapids: bool) -> Option<Arm<'_>> {
+        let parts = parts(&self.motion.program, self.machine, rapids)?;
         if let Some(first) = parts.first().filter(|_| rapids && !self.quiet && !closed_form(self.machine)) {
             first.probe.extent();
             super::map::estimate(Arm::looks(&parts), |count| first.probe.sample_reach(count));
         }
-        Arm::new(parts, &|done, of| self.progress.tell(|| format!("reach: {done} of {of} layers")))
+        Some(Arm::new(parts, &|done, of| self.progress.tell(|| format!("reach: {done} of {of} layers"))))
     }
 
     fn best(&self, reach: &dyn Reach, tries: usize, allowed: &mut dyn FnMut(V3) -> bool) -> Result<Found, Option<V3>> {
         let tell = |done: usize, of: usize| self.progress.tell(|| format!("places: {done} of {of} parts of the grid"));
         place(reach, self.budget, self.aim, tries, allowed, &tell)
     }
+}
+
+/// So much of what stands in the way at the nearest place is told.
+const FAULTS: usize = 3;
+
+/// Where the path alone is longer than the reach.
+fn too_long(mut finding: Diagnostic, whole: &Arm<'_>) -> Diagnostic {
+    let (path, reach) = whole.sizes();
+    for i in (0..3).filter(|i| path[*i] > reach[*i] + 1e-6) {
+        finding.notes.push(format!("the path goes over {:.1} mm of {}, the reach over {:.1} mm", path[i], ["X", "Y", "Z"][i], reach[i]));
+    }
+    finding
 }
 
 /// A finding with the place that was nearest to what is wanted.
@@ -233,55 +302,96 @@ fn refused(motion: &Motion, machine: &Machine, at: V3) -> Vec<Diagnostic> {
     found.into_iter().filter(|d| d.severity == Severity::Error).collect()
 }
 
-/// What one tool does: its frame, points of its cuts, ends of its rapids.
-type Way = (Frame, Vec<V3>, Vec<V3>);
+/// What one tool does in one turn: points of its cuts, ends of its rapids.
+type Way = (Frame, M3, Vec<V3>, Vec<V3>);
 
-/// The path of each tool, from the part's origin in the directions of the base; of rapids their ends.
-fn parts<'m>(program: &gr_ir::Program, machine: &'m Machine, rapids: bool) -> Vec<Part<'m>> {
-    let turn = machine.cell.part_in_base().turn;
+/// Frames and turns to be looked up by.
+fn bits(tool: &Frame, turn: &M3) -> [u64; 21] {
+    let mut all = tool.turn.iter().flatten().chain(&tool.position).chain(turn.iter().flatten()).map(|v| (v + 0.0).to_bits());
+    std::array::from_fn(|_| all.next().unwrap_or_default())
+}
+
+/// The path of each tool in each turn that the program gives it, from the part's origin in the directions of the base; of rapids
+/// their ends. None where the machine file doesn't say what a rotary word means.
+fn parts<'m>(program: &gr_ir::Program, machine: &'m Machine, rapids: bool) -> Option<Vec<Part<'m>>> {
+    let part = machine.cell.part_in_base().turn;
+    let turns = Turns::new(machine);
     let mut out: Vec<Way> = Vec::new();
+    let mut numbers = std::collections::HashMap::new();
     let mut known = std::collections::HashSet::new();
+    let mut named = gr_accuracy::Named::default();
     let mut cursor = program.cursor();
     while let Some(view) = cursor.next() {
-        if !view.op.feeds() && !(rapids && view.op.moves()) {
+        let said = named.step(&view);
+        let cuts = view.op.feeds();
+        // As a build does: a rapid before all is named goes nowhere yet.
+        if !cuts && !(rapids && view.op.moves() && said == [true; 3]) {
             continue;
         }
         let tool = tool(machine, view.state);
-        let n = out.iter().position(|(t, ..)| *t == tool).unwrap_or_else(|| {
-            out.push((tool, Vec::new(), Vec::new()));
-            out.len() - 1
-        });
         let work = gr_accuracy::work_shift(view.state);
-        let cuts = view.op.feeds();
-        let mut push = |p: V3| {
-            let p = rotate(&turn, work.apply(p));
+        let frame = product(&part, &work.turn);
+        let mut push = |pose: &Pose| {
+            let turn = product(&frame, &turns.of(pose, view.state).ok()?);
+            let n = *numbers.entry(bits(&tool, &turn)).or_insert_with(|| {
+                out.push((tool, turn, Vec::new(), Vec::new()));
+                out.len() - 1
+            });
+            let p = rotate(&part, work.apply(pose.xyz()));
             if known.insert((n, cuts, p.map(|v| (v / SAME).round() as i64))) {
-                if cuts { out[n].1.push(p) } else { out[n].2.push(p) }
+                if cuts { out[n].2.push(p) } else { out[n].3.push(p) }
             }
+            Some(())
         };
-        if !view.op.feeds() {
-            push(view.end.xyz());
+        if !cuts {
+            push(view.end)?;
             continue;
         }
-        let mut from = view.start.xyz();
-        push(from);
-        geometry::flatten(&view.op, view.start, view.end, SAME / 10.0, |axes| {
-            let to = [axes[0], axes[1], axes[2]];
-            let way = sub(to, from);
-            let pieces = (norm(way) / APART).ceil().clamp(1.0, 1e5) as usize;
-            (1..=pieces).for_each(|i| push(add(from, scale(way, i as f64 / pieces as f64))));
-            from = to;
-        });
+        push(view.start)?;
+        for pose in along(&view, &turns) {
+            push(&pose)?;
+        }
     }
     if out.is_empty() {
-        out.push((Frame::IDENTITY, Vec::new(), vec![[0.0; 3]]));
+        out.push((Frame::IDENTITY, product(&part, &turns.still()), Vec::new(), vec![[0.0; 3]]));
     }
-    let part = |(tool, mut points, ends): Way| {
+    let part = |(tool, turn, mut points, ends): Way| {
         let cuts = points.len();
         points.extend(ends);
-        Part { probe: Probe::downward(machine).with_tool(tool, &turn), points, cuts }
+        Part { probe: Probe::new(machine).held(tool, turn), points, cuts }
     };
-    out.into_iter().map(part).collect()
+    Some(out.into_iter().map(part).collect())
+}
+
+/// Places of a cut behind its start, near enough to each other in place and turn.
+fn along(view: &gr_ir::View<'_, '_>, turns: &Turns<'_>) -> Vec<Pose> {
+    let turned = match (turns.of(view.start, view.state), turns.of(view.end, view.state)) {
+        (Ok(a), Ok(b)) => norm(rotation_vector(&product(&transpose(&a), &b))),
+        _ => 0.0,
+    };
+    let words = (3..6).map(|i| (view.end.axes[i] - view.start.axes[i]).abs()).fold(turned, f64::max);
+    let mut chords: Vec<gr_ir::Axes> = vec![view.start.axes];
+    geometry::flatten(&view.op, view.start, view.end, SAME / 10.0, |axes| chords.push(*axes));
+    let by_turn = ((words / TURN).ceil().clamp(1.0, 1e4) as usize).div_ceil((chords.len() - 1).max(1));
+    let mut out = Vec::new();
+    for (n, pair) in chords.windows(2).enumerate() {
+        let way = norm(sub([pair[1][0], pair[1][1], pair[1][2]], [pair[0][0], pair[0][1], pair[0][2]]));
+        let pieces = ((way / APART).ceil().clamp(1.0, 1e5) as usize).max(by_turn);
+        for i in 1..=pieces {
+            let t = i as f64 / pieces as f64;
+            let axes = std::array::from_fn(|k| pair[0][k] + (pair[1][k] - pair[0][k]) * t);
+            let tool_axis = between(view, (n as f64 + t) / (chords.len() - 1) as f64);
+            out.push(Pose { axes, tool_axis, spin: view.end.spin });
+        }
+    }
+    out
+}
+
+/// The tool's axis along a move, where the program states one.
+fn between(view: &gr_ir::View<'_, '_>, share: f64) -> Option<V3> {
+    let (Some(a), Some(b)) = (view.start.tool_axis, view.end.tool_axis) else { return view.end.tool_axis };
+    let v = add(scale(a, 1.0 - share), scale(b, share));
+    Some(if norm(v) > 1e-9 { scale(v, 1.0 / norm(v)) } else { b })
 }
 
 /// The tool point on the flange: the machine file's, else as long as the program's tool offset.
@@ -307,16 +417,22 @@ fn largest(global: &Global, args: &PlaceArgs, machine: &Machine) -> Exit {
     let (low, high) = (ends[0], *ends.last().unwrap_or(&ends[0]));
     let layers = ((high - low).abs() / 20.0).ceil() as usize;
     let heights: Vec<f64> = (0..=layers).map(|i| low + (high - low) * i as f64 / layers.max(1) as f64).collect();
-    let probe = Probe::downward(machine);
+    let probe = match super::map::probe(machine, args.tool_turn.as_deref()) {
+        Ok(probe) => probe,
+        Err((what, why)) => return super::refuse(global, Path::new("place"), code::ACCURACY_BAD_OPTION, &[what, why]),
+    };
+    let held = super::map::stands(&probe, args.tool_turn.as_deref());
     let Some(Rectangle { x: (x0, x1), middle, half }) = rectangle(&probe, &heights) else {
-        let (least, most) = probe.extent()[2];
-        let why = format!("no rectangle is within reach from there to there; the tool gets to Z {least:.1} to {most:.1} mm at most");
+        let why = format!("no rectangle is within reach from there to there; {}", super::map::reach_along(&probe, 2));
         return super::refuse(global, Path::new(&machine.id), code::ACCURACY_BAD_OPTION, &[format!("--heights {}", args.heights), why]);
     };
     let (y0, y1) = (middle - half, middle + half);
     super::print(&match args.format {
-        TableFormat::Json => format!("{:#}\n", json!({ "machine": machine.id, "heights": [low, high], "x": [x0, x1], "y": [y0, y1] })),
+        TableFormat::Json => format!("{:#}\n", json!({ "machine": machine.id, "heights": [low, high], "x": [x0, x1], "y": [y0, y1], "tool": held.first() })),
         TableFormat::Csv => format!("x from,x to,y from,y to,z from,z to\n{x0},{x1},{y0},{y1},{low},{high}\n"),
-        TableFormat::Text => format!("largest rectangle in reach of {} from Z {low} to {high} mm, symmetric about Y {middle}:\nX {x0} to {x1}, Y {y0} to {y1} mm\n", machine.id),
+        TableFormat::Text => {
+            let held = held.first().map_or(String::new(), |h| format!("{h}\n"));
+            format!("largest rectangle in reach of {} from Z {low} to {high} mm, symmetric about Y {middle}:\nX {x0} to {x1}, Y {y0} to {y1} mm\n{held}", machine.id)
+        }
     })
 }
