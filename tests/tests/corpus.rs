@@ -64,6 +64,38 @@ fn one_fault_programs() {
     must_agree("error corpus", &jobs);
 }
 
+/// Which values of the INI file the controller takes, and what a switch that is on does.
+#[test]
+fn values_of_the_ini_file() {
+    let programs = [
+        ("[EMCIO]\nTOOL_CHANGE_QUILL_UP", "g0 z-3\nt1 m6\nm2\n"),
+        ("[EMCIO]\nTOOL_CHANGE_AT_G30", "g0 x1 z-3\nt1 m6\nm2\n"),
+        ("[EMCIO]\nTOOL_CHANGE_WITH_SPINDLE_ON", "m3 s100\nt1 m6\nm2\n"),
+        ("[EMCIO]\nRANDOM_TOOLCHANGER", "t1 m6\ng43\nt2 m6\nm2\n"),
+        ("[RS274NGC]\nRETAIN_G43", "t1 m6 g43 h1\ng0 x1 z1\nt3 m6\ng0 x2\ng49\ng0 z2\ng43.1 z2\ng0 z3\nm3 s5 x2 z4\nm2\n"),
+        ("[RS274NGC]\nOWORD_NARGS", "o<a> sub\ng0 x#<n_args>\no<a> endsub\no<a> call [1] [2]\nm2\n"),
+        ("[RS274NGC]\nINI_VARS", "g0 x[exists[#<_ini[rs274ngc]ini_vars>]]\nm2\n"),
+        ("[RS274NGC]\nDISABLE_FANUC_STYLE_SUB", "m98 p1\nm2\no1\ng0 x1\nm99\n"),
+        ("[RS274NGC]\nDISABLE_G92_PERSISTENCE", "g92 x1\ng0 x3\nm2\n"),
+        ("[RS274NGC]\nORIENT_OFFSET", "m19 r10\nm2\n"),
+        ("[RS274NGC]\nCENTER_ARC_RADIUS_TOLERANCE_INCH", "g20 g0 x0 y0\ng2 x2.001 y0 i1 f10\nm2\n"),
+        ("[TRAJ]\nSPINDLES", "m3 s1\nm3 s2 $1\nm5\nm2\n"),
+        ("[AXIS_A]\nWRAPPED_ROTARY", "g0 a90\ng91 g0 a300\nm2\n"),
+        ("[AXIS_A]\nLOCKING_INDEXER_JOINT", "g0 a90\nm2\n"),
+    ];
+    let values = ["1", "0", "2", "01", "-1", "+1", "TRUE", "yes", "1 # x", "1.0", "0x1", ".001", "1e-3", "", "7 8"];
+    let mut jobs = Vec::new();
+    for (key, program) in programs {
+        // Without any of eight spindles the controller reads memory that is not its own.
+        for value in values.iter().filter(|v| !(key.ends_with("SPINDLES") && matches!(**v, "0" | "-1"))) {
+            let mut job = Job::new(program);
+            job.ini = Some(format!("{key} = {value}\n"));
+            jobs.push((format!("{key} = {value}").replace('\n', " "), job));
+        }
+    }
+    must_agree("values of INI files", &jobs);
+}
+
 #[test]
 fn regressions() {
     let jobs = jobs("regressions");

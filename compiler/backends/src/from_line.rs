@@ -61,6 +61,10 @@ pub fn from_line(
         notes.push(no_height(place, top));
         top
     });
+    if let Some(lowest) = lowest_crossing(program, &state).filter(|lowest| safe.max(pose.axes[2]) < lowest - SAME_HEIGHT) {
+        let heights = [safe.max(pose.axes[2]), lowest].map(|z| format!("{z:.3}"));
+        notes.push(Diagnostic::new(code::FROM_LINE_LOW_HEIGHT, place.0, place.1, &heights));
+    }
     let from = From { index: found.index, line, known: height_known(program, found.index, sources) };
     let restart = build(program, &from, &state, &pose, safe.max(pose.axes[2]), sources);
     Ok(Restart { program: restart, notes })
@@ -171,6 +175,24 @@ fn top(program: &Program, state: &State) -> f64 {
         }
     }
     if highest.is_finite() { highest - state.machine(&[0.0; 9])[2] } else { 0.0 }
+}
+
+/// Heights that differ by less, mm, are the same.
+const SAME_HEIGHT: f64 = 1e-6;
+
+/// How low the rapids of the program go sideways, in the work frame of a state.
+fn lowest_crossing(program: &Program, state: &State) -> Option<f64> {
+    let zero = state.machine(&[0.0; 9])[2];
+    let mut lowest: Option<f64> = None;
+    let mut cursor = program.cursor();
+    while let Some(view) = cursor.next() {
+        let [from, to] = [view.start, view.end].map(|p| view.state.machine(&p.axes));
+        if view.op == Op::Rapid && (from[0] != to[0] || from[1] != to[1]) {
+            let low = from[2].min(to[2]) - zero;
+            lowest = Some(lowest.map_or(low, |l| l.min(low)));
+        }
+    }
+    lowest
 }
 
 /// Where a program begins.

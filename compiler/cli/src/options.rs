@@ -233,7 +233,7 @@ pub struct BuildArgs {
     #[arg(long, value_name = "LINE", value_parser = clap::value_parser!(u32).range(1..))]
     pub from_line: Option<u32>,
     /// Height of the approach for --from-line, mm in the work frame [default: highest point of the program]
-    #[arg(long, value_name = "MM", requires = "from_line")]
+    #[arg(long, value_name = "MM", requires = "from_line", allow_negative_numbers = true)]
     pub safe_z: Option<f64>,
 }
 

@@ -94,6 +94,9 @@ fn tables_and_settings() {
     let machine = file("m.toml", &shipped("spec/machines/generic/mill3.toml").replace("[start]", "[cutting]\naxial_depth = 1.5\n\n[start]"));
     told("E0448", &[machine, file("a.p21", &plan(&[]))], "check --machine m.toml a.p21");
     told("E0829", &[part.clone(), file("a.ini", "[TRAJ]\nwhat is this\n")], "check -i a.ini a.ngc");
+    for line in ["[TRAJ]\nSPINDLES = 9", "[AXIS_X]\nMAX_LIMIT = 400 # mm", "[EMCIO]\nTOOL_CHANGE_AT_G30 = YES"] {
+        told("E0852", &[part.clone(), file("a.ini", &format!("{line}\n"))], "check -i a.ini a.ngc");
+    }
     let many: String = (1..=1100).map(|n| format!("T{n} P{n} Z1\n")).collect();
     told("E0837", &[part, file("a.tbl", &many)], "check --tools a.tbl a.ngc");
     let ini = file("a.ini", "[EMCIO]\nTOOL_TABLE = a.tbl\n[TRAJ]\nLINEAR_UNITS = mm\n");
@@ -175,6 +178,8 @@ fn what_a_written_program_cannot_carry() {
     told("E0605", &[file("a.ngc", "G21 G90\nG10 L2 P2 X10\nG55 G0 X1\nM2\n")], "build a.ngc --target rs274ngc -o a.nc");
     told("E0606", &[file("a.p21", &plan(&[]))], "build a.p21 --cutter-compensation control -o a.nc");
     told("E0614", &[file("a.ngc", PART)], "build a.ngc --target rs274ngc --from-line 4 -o a.nc");
+    let deep = "G21 G90 F100\nG0 X0 Y0 Z5\nX9\nG1 Z-3\nX5\nG0 Z5\nX20\nG1 Z-3\nX30\nM2\n";
+    told("E0615", &[file("a.ngc", deep)], "build a.ngc --target rs274ngc --from-line 8 --safe-z -1 -o a.nc");
 }
 
 #[test]

@@ -53,6 +53,12 @@ fn spiral_limits(units: Units) -> (f64, f64, &'static str) {
     }
 }
 
+/// What may stand behind a key of the INI file that is about the difference of radii.
+pub(crate) fn spiral_limits_of(key: &str) -> Option<std::ops::RangeInclusive<f64>> {
+    let mut limits = [Units::Inch, Units::Mm].into_iter().map(spiral_limits);
+    limits.find(|l| l.2 == key).map(|(least, most, _)| least..=most)
+}
+
 /// What the INI file says for it; `Err`: nothing that the controller takes.
 fn told_spiral(units: Units, ini: &Ini) -> Result<Option<f64>, &'static str> {
     let (least, most, key) = spiral_limits(units);

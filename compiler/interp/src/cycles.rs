@@ -296,7 +296,7 @@ impl<S: Sink> Interp<'_, S> {
 
     /// `$` makes a spindle the active one.
     pub(crate) fn choose_spindle(&mut self, number: f64, g: i32, text: Rs274) -> Res {
-        if number < 0.0 || number >= f64::from(self.spindle_count()) {
+        if number < 0.0 || number >= f64::from(self.config.spindles) {
             return Err(Fault::new(code::CYCLE_SPINDLE, text)
                 .at(b'$')
                 .arg(code_name(g))
@@ -314,11 +314,6 @@ impl<S: Sink> Interp<'_, S> {
     /// What is wrong then.
     pub(crate) fn too_many(&self) -> Box<Fault> {
         self.endless("this cycle makes more moves than the limit allows")
-    }
-
-    fn spindle_count(&self) -> i32 {
-        let told = self.setup.ini.number("traj", "spindles");
-        told.map_or(1, |n| n as i32).clamp(0, SPINDLES as i32)
     }
 
     fn bore_words(&mut self, hole: &mut Hole) {

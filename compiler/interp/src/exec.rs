@@ -21,6 +21,7 @@ impl<S: Sink> Interp<'_, S> {
     pub(crate) fn execute_block(&mut self) -> Res {
         let b = &self.block;
         let plain = b.g_mask & !(1 << 1) == 0 && b.m_count == 0 && b.remapped == 0 && self.comment.is_none();
+        let plain = plain && !self.config.retain_g43;
         if plain && !b.has_any_of(FST) {
             let motion = b.motion;
             return if motion == -1 { Ok(()) } else { self.convert_motion(motion) };

@@ -2,7 +2,7 @@
 //! coordinates (G68, G69), G80 that goes back to the motion before the cycle. Sources stand with the rows of the
 //! dialects.
 
-use gr_canon::{Call, Plane, Sink};
+use gr_canon::{Axes, Call, Plane, Sink};
 use gr_spec::{Dialect, Family, code, rs274};
 
 use crate::block::{Group, letters};
@@ -65,6 +65,11 @@ impl<S: Sink> Interp<'_, S> {
         if self.block.g(Group::NonModal) == 100 {
             return self.data_input();
         }
+        let arc = matches!(self.block.g(Group::Motion), 20 | 30) || self.block.g(Group::Motion) == -1 && matches!(self.m.motion, 20 | 30);
+        let b = &self.block;
+        if arc && b.has(b'p') && b.m_count == 0 && b.g(Group::NonModal) == -1 && self.has_axes() {
+            return Err(self.not_in_dialect("P with an arc", "write a block for each turn").at(b'p'));
+        }
         let dwell = self.block.g(Group::NonModal) == 40;
         if is_lathe(self.setup.dialect) && self.block.has_any_of(INCREMENT_MASK) && !dwell {
             self.increments()?;
@@ -109,13 +114,46 @@ impl<S: Sink> Interp<'_, S> {
         Ok(())
     }
 
+    /// G33, G32 of a lathe: F, which stays in force for later feeds, is the lead. Here it becomes the K of G33.
+    pub(crate) fn thread_words(&mut self) -> Res {
+        let name = if is_lathe(self.setup.dialect) { "G32" } else { "G33" };
+        if self.block.has(b'k') {
+            return Err(self.not_in_dialect(&format!("K with {name}"), "write the lead as F").at(b'k'));
+        }
+        if self.block.get(b'q').is_some_and(|q| q != 0.0) {
+            return Err(self.not_carried_out(rs274::SILENT, format!("{name} with a start angle Q")).at(b'q'));
+        }
+        let lead = self.block.get(b'f').unwrap_or(self.m.feed);
+        if lead <= 0.0 {
+            return Err(Fault::new(code::WORD_MISSING, rs274::RT_K_MISSING_G33).arg(name).arg('F').at(b'g'));
+        }
+        self.block.unset(b'f');
+        self.block.unset(b'q');
+        self.block.set(b'k', lead);
+        Ok(())
+    }
+
+    /// A Fanuc lead counts along the axis that goes furthest, LinuxCNC's K along the way. F is the feed from now on.
+    pub(crate) fn lead_along(&mut self, end: &Axes) -> f64 {
+        let lead = self.block.or_zero(b'k');
+        if self.m.feed != lead {
+            self.m.feed = lead;
+            self.emit_queued(Call::SetFeedRate(lead));
+        }
+        let way: [f64; 3] = std::array::from_fn(|i| (end[i] - self.m.current[i]).abs());
+        let longest = way.into_iter().fold(0.0, f64::max);
+        let length = libm::sqrt(way.iter().map(|d| d * d).sum());
+        // A way along one axis keeps its lead to the last bit.
+        if longest > 0.0 && way.iter().filter(|d| **d > 0.0).count() > 1 { lead * length / longest } else { lead }
+    }
+
     /// U V W H of a lathe: distances from where the axis is.
     fn increments(&mut self) -> Res {
         for (letter, axis) in INCREMENTS {
             let Some(by) = self.block.get(letter) else { continue };
             if self.block.has(axis) {
                 let both = format!("{} beside {}", upper(letter), upper(axis));
-                return Err(Fault::new(code::WORD_REPEATED, rs274::MULTIPLE_WORDS).arg(both).at(letter));
+                return Err(Fault::new(code::WORD_REPEATED, rs274::MULTIPLE_WORDS).arg(upper(letter)).arg(both).at(letter));
             }
             // A diameter, like X.
             let by = if letter == b'u' { by / 2.0 } else { by };

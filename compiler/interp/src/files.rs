@@ -6,6 +6,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use gr_canon::Version;
 use gr_text::{Diagnostic, FileId, Span, code};
 
 use crate::{Ini, Tool, ToolTable};
@@ -223,9 +224,12 @@ fn scan_int(text: &str) -> Option<(i32, &str)> {
     Some((value.clamp(i64::from(i32::MIN), i64::from(i32::MAX)) as i32, rest))
 }
 
-/// A number at the start of `text`, as C's `%lf` reads it (decimal ones).
+/// A number at the start of `text`, as C's `%lf` reads it: decimal, or hexadecimal behind `0x`.
 fn scan_real(text: &str) -> Option<(f64, &str)> {
     let text = text.trim_start();
+    if let Some(found) = scan_hexadecimal(text) {
+        return Some(found);
+    }
     let bytes = text.as_bytes();
     let digits = |from: usize| bytes[from.min(bytes.len())..].iter().take_while(|b| b.is_ascii_digit()).count();
     let mut end = usize::from(text.starts_with(['+', '-']));
@@ -250,6 +254,42 @@ fn scan_real(text: &str) -> Option<(f64, &str)> {
     number.parse().ok().map(|v| (v, rest))
 }
 
+/// `0x1A`, `-0x1.8`, `0x1p4`.
+fn scan_hexadecimal(text: &str) -> Option<(f64, &str)> {
+    let (sign, rest) = match text.as_bytes().first()? {
+        b'-' => (-1.0, &text[1..]),
+        b'+' => (1.0, &text[1..]),
+        _ => (1.0, text),
+    };
+    let digits = rest.strip_prefix("0x").or_else(|| rest.strip_prefix("0X"))?;
+    let (mut value, mut scale, mut end, mut seen, mut point) = (0.0, 1.0, 0, false, false);
+    for c in digits.chars() {
+        match c.to_digit(16) {
+            Some(d) if point => {
+                scale /= 16.0;
+                value += f64::from(d) * scale;
+            }
+            Some(d) => value = value * 16.0 + f64::from(d),
+            None if c == '.' && !point => point = true,
+            None => break,
+        }
+        seen |= c != '.';
+        end += 1;
+    }
+    if !seen {
+        return None;
+    }
+    let mut rest = &digits[end..];
+    if let Some(power) = rest.strip_prefix(['p', 'P']) {
+        let length = usize::from(power.starts_with(['+', '-'])) + power.trim_start_matches(['+', '-']).bytes().take_while(u8::is_ascii_digit).count();
+        if let Ok(by) = power[..length].parse::<i32>() {
+            value *= libm::exp2(f64::from(by));
+            rest = &power[length..];
+        }
+    }
+    Some((sign * value, rest))
+}
+
 // ---- INI -----------------------------------------------------------------------------------------------
 
 /// Gives the text of an included file.
@@ -268,6 +308,71 @@ pub fn read_ini(text: &str, file: FileId, folder: Option<&Path>, load: Option<Lo
     };
     reader.text(text, 0, None);
     (reader.ini, reader.found)
+}
+
+/// Words that switch something on in LinuxCNC 2.10; 2.9 passes over them.
+const ON: [&str; 3] = ["yes", "true", "on"];
+const OFF: [&str; 3] = ["no", "false", "off"];
+
+/// Switches that only 0 and 1 turn.
+const NARROW: [&str; 5] = ["RETAIN_G43", "OWORD_NARGS", "INI_VARS", "HAL_PIN_VARS", "NO_DOWNCASE_OWORD"];
+
+/// Keys whose value has to be an integer as a whole, in capitals; `?` in the section of an axis.
+const INTEGERS: [(&str, &str); 13] = [
+    ("EMCIO", "RANDOM_TOOLCHANGER"),
+    ("EMCIO", "TOOL_CHANGE_AT_G30"),
+    ("EMCIO", "TOOL_CHANGE_QUILL_UP"),
+    ("EMCIO", "TOOL_CHANGE_WITH_SPINDLE_ON"),
+    ("RS274NGC", "RETAIN_G43"),
+    ("RS274NGC", "OWORD_NARGS"),
+    ("RS274NGC", "INI_VARS"),
+    ("RS274NGC", "HAL_PIN_VARS"),
+    ("RS274NGC", "NO_DOWNCASE_OWORD"),
+    ("RS274NGC", "DISABLE_G92_PERSISTENCE"),
+    ("RS274NGC", "DISABLE_FANUC_STYLE_SUB"),
+    ("AXIS_?", "WRAPPED_ROTARY"),
+    ("TRAJ", "SPINDLES"),
+];
+
+/// Keys whose value has to be a number as a whole.
+const NUMBERS: [(&str, &str); 11] = [
+    ("RS274NGC", "ORIENT_OFFSET"),
+    ("RS274NGC", "PARAMETER_G73_PECK_CLEARANCE"),
+    ("RS274NGC", "PARAMETER_G83_PECK_CLEARANCE"),
+    ("RS274NGC", "CENTER_ARC_RADIUS_TOLERANCE_INCH"),
+    ("RS274NGC", "CENTER_ARC_RADIUS_TOLERANCE_MM"),
+    ("TRAJ", "MAX_LINEAR_VELOCITY"),
+    ("TRAJ", "MAX_VELOCITY"),
+    ("AXIS_?", "MIN_LIMIT"),
+    ("AXIS_?", "MAX_LIMIT"),
+    ("AXIS_?", "MAX_VELOCITY"),
+    ("AXIS_?", "MAX_ACCELERATION"),
+];
+
+/// What the controller would have to find where it finds this value; nothing where it takes it. A value that it does not
+/// take is as good as none: it says nothing and goes on with its own.
+fn wanted(section: &str, key: &str, value: &str) -> Option<&'static str> {
+    let section = if section.starts_with("axis_") { "AXIS_?" } else { section };
+    let is = |row: &(&str, &str)| row.0.eq_ignore_ascii_case(section) && row.1 == key;
+    let word = ON.iter().chain(&OFF).any(|w| value.eq_ignore_ascii_case(w));
+    if INTEGERS.iter().any(is) {
+        match value.parse::<i32>() {
+            Ok(n) if key == "SPINDLES" && !(1..=8).contains(&n) => Some("1 to 8 spindles are possible"),
+            Ok(n) if NARROW.contains(&key) && !(0..=1).contains(&n) => Some("it has to be 1 or 0"),
+            Ok(_) => None,
+            Err(_) if word && key != "SPINDLES" => Some("LinuxCNC 2.9 wants 1 or 0, words are read from 2.10 on"),
+            Err(_) => Some("it has to be a whole number, with nothing behind it"),
+        }
+    } else if NUMBERS.iter().any(is) {
+        let limits = crate::arc::spiral_limits_of(key);
+        match value.parse::<f64>() {
+            Ok(v) if limits.is_some_and(|l| !l.contains(&v)) => Some("it is too small or too large"),
+            Ok(v) if v.is_finite() => None,
+            _ => Some("it has to be a number, with nothing behind it"),
+        }
+    } else {
+        None
+    }
 }
 
 struct IniReader<'a> {
@@ -320,7 +425,18 @@ impl IniReader<'_> {
                         self.found.push(Diagnostic::new(code, self.file, blame.unwrap_or(span), &[what]));
                     }
                 }
-                self.ini.values.entry(key).or_default().push(value.trim().to_string());
+                let value = value.trim();
+                let values = self.ini.values.entry(key.clone()).or_default();
+                // The first value of a key is the one that counts.
+                if values.is_empty()
+                    && !value.is_empty()
+                    && let capitals = key.1.to_ascii_uppercase()
+                    && let Some(wanted) = wanted(&key.0, &capitals, value)
+                {
+                    let words = [value.to_string(), capitals, wanted.to_string()];
+                    self.found.push(Diagnostic::new(code::INI_VALUE, self.file, blame.unwrap_or(span), &words));
+                }
+                values.push(value.to_string());
             }
         } else {
             self.found.push(Diagnostic::new(code::INI_BAD_LINE, self.file, blame.unwrap_or(span), &[]));
@@ -355,13 +471,30 @@ impl Ini {
     pub fn get(&self, section: &str, key: &str) -> Option<&str> {
         self.all(section, key).first().map(String::as_str)
     }
-    /// All values of a key, in file order.
+    /// All values of a key, in file order. The search of the controller ends at an empty one.
     pub fn all(&self, section: &str, key: &str) -> &[String] {
-        self.values.get(&(section.to_ascii_lowercase(), key.to_ascii_lowercase())).map_or(&[], Vec::as_slice)
+        let told = self.values.get(&(section.to_ascii_lowercase(), key.to_ascii_lowercase())).map_or(&[][..], Vec::as_slice);
+        &told[..told.iter().position(String::is_empty).unwrap_or(told.len())]
     }
-    /// First value of a key as a number.
+    /// First value of a key as a number: the whole value has to be one, as for the controller.
     pub fn number(&self, section: &str, key: &str) -> Option<f64> {
-        scan_real(self.get(section, key)?).map(|(v, _)| v)
+        self.get(section, key)?.parse().ok()
+    }
+    /// First value of a key as an integer: the whole value has to be one.
+    pub fn integer(&self, section: &str, key: &str) -> Option<i32> {
+        self.get(section, key)?.parse().ok()
+    }
+    /// A switch: 0 is off, 1 is on, other integers too where the key is not one of [`NARROW`]; words switch from 2.10 on.
+    /// Nothing where the value is none that the controller takes.
+    pub fn switch(&self, section: &str, key: &str, version: Version) -> Option<bool> {
+        let is = |words: &[&str]| self.get(section, key).is_some_and(|v| words.iter().any(|w| v.eq_ignore_ascii_case(w)));
+        let narrow = NARROW.iter().any(|k| key.eq_ignore_ascii_case(k));
+        match self.integer(section, key) {
+            Some(n) if (0..=1).contains(&n) || !narrow => Some(n != 0),
+            None if version == Version::V2_10 && is(&ON) => Some(true),
+            None if version == Version::V2_10 && is(&OFF) => Some(false),
+            _ => None,
+        }
     }
     /// `[TRAJ] LINEAR_UNITS`, in any of the spellings that the controller knows.
     pub fn machine_units(&self) -> Option<gr_canon::Units> {
@@ -481,6 +614,16 @@ mod tests {
         assert_eq!(ini.machine_units(), Some(gr_canon::Units::Mm));
         assert_eq!(found.len(), 1);
         assert_eq!(&text[found[0].primary().1.range()], "nonsense");
+    }
+
+    #[test]
+    fn hexadecimal_numbers_as_c_reads_them() {
+        for (text, value, rest) in [("0x10", 16.0, ""), ("-0x1.8 D2", -1.5, " D2"), ("0x1p4;", 16.0, ";"), ("0xfg", 15.0, "g"), ("0x1p", 1.0, "p")] {
+            assert_eq!(scan_real(text), Some((value, rest)), "{text}");
+        }
+        assert_eq!(scan_real("0x"), Some((0.0, "x")));
+        let (table, _) = read_tools("T1 P1 Z0x10\n", FILE);
+        assert_eq!(table.rows[1].offset[2], 16.0);
     }
 
     #[test]

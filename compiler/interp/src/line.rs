@@ -58,6 +58,9 @@ impl<S: Sink> Interp<'_, S> {
         if fanuc && self.m.turned != 0 {
             self.turn_words()?;
         }
+        if fanuc && self.block.motion == 330 {
+            self.thread_words()?;
+        }
         self.check()?;
         self.note_remaps();
         if !self.settings.is_empty() {
@@ -138,6 +141,10 @@ impl<S: Sink> Interp<'_, S> {
             self.emit(Call::Finish);
             if let Some(skip) = &self.skip {
                 let name = self.symbols.name(skip.label.name).to_string();
+                // The call is what has to be mended. Told to go on, the run does so from here.
+                if let Some(from) = skip.from.filter(|_| !self.setup.keep_going) {
+                    self.place = from;
+                }
                 return Err(Fault::new(code::SUB_NOT_FOUND, rs274::RT_O_EOF_SUB).arg(name));
             }
             self.flow = Flow::End(End::Percent);

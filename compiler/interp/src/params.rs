@@ -205,7 +205,7 @@ impl<S: Sink> Interp<'_, S> {
         let text = ini.get(section, key)?.trim();
         // The whole text has to be the number, and the file may switch such parameters off.
         let plain = text.bytes().all(|b| matches!(b, b'0'..=b'9' | b'.' | b'+' | b'-' | b'e' | b'E'));
-        let on = ini.number("RS274NGC", "INI_VARS") != Some(0.0);
+        let on = ini.switch("RS274NGC", "INI_VARS", self.setup.version).unwrap_or(true);
         text.parse().ok().filter(|_| plain && on)
     }
 

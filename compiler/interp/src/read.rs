@@ -285,7 +285,7 @@ impl<S: Sink> Interp<'_, S> {
             b'@' | b'^' => self.block.set(letter, value),
             b'$' => {
                 if self.block.has(letter) {
-                    return Err(Fault::new(code::WORD_REPEATED, rs274::RT_MULTIPLE_SPINDLE).arg("$").at(letter));
+                    return Err(Fault::new(code::WORD_REPEATED, rs274::RT_MULTIPLE_SPINDLE).arg("$").arg("$").at(letter));
                 }
                 self.block.set(letter, f64::from(to_int(value)));
             }
@@ -325,9 +325,10 @@ impl<S: Sink> Interp<'_, S> {
             self.check_listed_g(n)?;
         }
         if is_lathe(self.setup.dialect) {
-            // G-code system A: turning and facing cycles, feed per minute and per revolution.
+            // G-code system A: turning and facing cycles, threading, feed per minute and per revolution.
             n = match n {
                 900 | 940 => return self.take_turning_cycle(n as i16),
+                320 => 330,
                 980 => 940,
                 990 => 950,
                 _ => n,
@@ -435,5 +436,5 @@ fn repeated(letter: u8) -> Box<Fault> {
         b'u' | b'v' | b'w' => upper(letter),
         _ => char::from(letter),
     };
-    Fault::new(code::WORD_REPEATED, rs274::MULTIPLE_WORDS).arg(shown).at(letter)
+    Fault::new(code::WORD_REPEATED, rs274::MULTIPLE_WORDS).arg(shown).arg(upper(letter)).at(letter)
 }

@@ -2,14 +2,14 @@
 
 use std::path::PathBuf;
 
-use gr_canon::{Sink, Units, Version};
+use gr_canon::{Sink, Units};
 use gr_spec::{code, rs274};
 use rustc_hash::FxHashMap;
 
 use crate::block::{Block, Group};
 use crate::params::coord_system;
 use crate::state::SavedModes;
-use crate::{Fault, Interp, Res, Setup};
+use crate::{Fault, Ini, Interp, Res, Setup};
 
 /// Steps of the execution of a block, in their order.
 pub(crate) mod step {
@@ -177,21 +177,19 @@ pub(crate) struct Config {
 impl Config {
     pub fn new(setup: &Setup) -> Config {
         let ini = &setup.ini;
-        let flag = |section: &str, key: &str| {
-            ini.get(section, key).is_some_and(|v| matches!(v.trim().to_ascii_lowercase().as_str(), "1" | "yes" | "true" | "on"))
-        };
+        let switch = |section: &str, key: &str| ini.switch(section, key, setup.version).unwrap_or(false);
         let mut c = Config {
-            spindles: ini.number("traj", "spindles").map_or(1, |n| (n as i32).clamp(0, crate::state::SPINDLES as i32)),
-            random: flag("emcio", "random_toolchanger"),
-            wrapped: ["axis_a", "axis_b", "axis_c"].map(|s| truth(ini.get(s, "wrapped_rotary"), setup.version)),
+            spindles: spindles(ini),
+            random: switch("emcio", "random_toolchanger"),
+            wrapped: ["axis_a", "axis_b", "axis_c"].map(|s| switch(s, "wrapped_rotary")),
             indexers: ["axis_a", "axis_b", "axis_c"].map(|s| ini.get(s, "locking_indexer_joint").map(leading_integer).filter(|n| *n != -1)),
-            change_at_g30: flag("emcio", "tool_change_at_g30"),
-            change_quill_up: flag("emcio", "tool_change_quill_up"),
-            change_with_spindle_on: flag("emcio", "tool_change_with_spindle_on"),
-            retain_g43: flag("rs274ngc", "retain_g43"),
-            n_args: flag("rs274ngc", "oword_nargs"),
-            no_g92_persistence: flag("rs274ngc", "disable_g92_persistence"),
-            no_fanuc_subs: flag("rs274ngc", "disable_fanuc_style_sub"),
+            change_at_g30: switch("emcio", "tool_change_at_g30"),
+            change_quill_up: switch("emcio", "tool_change_quill_up"),
+            change_with_spindle_on: switch("emcio", "tool_change_with_spindle_on"),
+            retain_g43: switch("rs274ngc", "retain_g43"),
+            n_args: switch("rs274ngc", "oword_nargs"),
+            no_g92_persistence: switch("rs274ngc", "disable_g92_persistence"),
+            no_fanuc_subs: switch("rs274ngc", "disable_fanuc_style_sub"),
             orient_offset: ini.number("rs274ngc", "orient_offset").unwrap_or(0.0),
             ..Config::default()
         };
@@ -241,11 +239,9 @@ fn leading_integer(text: &str) -> i32 {
     digits[..end].parse::<i32>().map_or(0, |n| sign * n)
 }
 
-/// A switch that 2.9 reads as a number alone.
-fn truth(value: Option<&str>, version: Version) -> bool {
-    let Some(value) = value.map(|v| v.trim().to_ascii_lowercase()) else { return false };
-    let word = version == Version::V2_10 && matches!(value.as_str(), "yes" | "true" | "on");
-    word || value.parse::<i32>().is_ok_and(|n| n != 0)
+/// How many spindles the machine has; the controller itself has room for eight.
+pub(crate) fn spindles(ini: &Ini) -> i32 {
+    ini.integer("traj", "spindles").unwrap_or(1).clamp(0, crate::state::SPINDLES as i32)
 }
 
 /// REMAP lines of an INI file: for each of those that go before `line` have been seen. What is wrong (true) or doubtful

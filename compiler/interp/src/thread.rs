@@ -114,7 +114,8 @@ impl<S: Sink> Interp<'_, S> {
         } else {
             self.spindle_for(g, rs274::THREAD_SPINDLE_NUMBER_G33, rs274::THREAD_SPINDLE_G33)?;
         }
-        self.emit(Call::StartSpeedFeedSynch(self.m.active_spindle, self.block.or_zero(b'k'), false));
+        let lead = if self.is_fanuc() { self.lead_along(&end) } else { self.block.or_zero(b'k') };
+        self.emit(Call::StartSpeedFeedSynch(self.m.active_spindle, lead, false));
         if tap {
             let scale = self.block.get(b'i').unwrap_or(1.0);
             let scale = if scale < 1.0 { 1.0 } else { scale };

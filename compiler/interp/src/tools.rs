@@ -349,16 +349,18 @@ impl<S: Sink> Interp<'_, S> {
         }
     }
 
-    /// [RS274NGC]RETAIN_G43: the length offset follows the tool.
+    /// [RS274NGC]RETAIN_G43: the length offset follows the tool. The controller goes by whether there is an offset, not by
+    /// what the block says: G49 and G43.1 are replaced as well, and the code then takes place as if the block had it.
     pub(crate) fn retain_length(&mut self) -> Res {
         let on = self.m.tool_offset.iter().any(|v| *v != 0.0);
         if !on || !self.block.once(step::RETAIN_G43) {
             return Ok(());
         }
-        let saved = (self.block.present, self.block.g(Group::ToolLength));
-        self.block.present = 0;
-        let done = self.convert_tool_length(if self.m.selected_pocket > 0 { 430 } else { 490 });
-        self.block.present = saved.0;
+        let code = if self.m.selected_pocket > 0 { 430 } else { 490 };
+        let present = std::mem::take(&mut self.block.present);
+        let done = self.convert_tool_length(code);
+        self.block.present = present;
+        self.block.set_g(Group::ToolLength as usize, code);
         done
     }
 }

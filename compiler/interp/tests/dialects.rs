@@ -444,3 +444,38 @@ fn words_before_m99() {
     assert!(outcome.findings.is_empty(), "{:?}", outcome.findings);
     assert_eq!(moves_of(&calls), ["rapid 1 0 0", "rapid 2 0 0", "rapid 2 3 0"]);
 }
+
+/// Threading of the manuals: F is the lead, along the axis that goes furthest, and the feed from then on.
+#[test]
+fn threads_by_their_lead() {
+    let sync = |dialect: &str, text: &str| {
+        let (calls, outcome) = run_in(dialect, text);
+        assert!(outcome.ok(), "{text}: {:?}", outcome.findings);
+        calls.into_iter().filter(|c| c.contains("SPEED_FEED") || c.contains("SET_FEED_RATE")).collect::<Vec<_>>()
+    };
+    let mill = sync("fanuc-mill", "G21 G90 M3 S100\nG0 Z5.\nG33 Z-5. F1.5\nM30\n");
+    assert!(mill.contains(&"START_SPEED_FEED_SYNC(1.500000,0)".into()), "{mill:?}");
+    // 3 in radius and 4 in Z: 5 along the way.
+    let lathe = sync("fanuc-turn", "G21 M3 S100\nG0 X20. Z0\nG32 X26. Z-4. F2.\nG32 W-4. Q0\nM30\n");
+    assert!(lathe.contains(&"START_SPEED_FEED_SYNC(2.500000,0)".into()), "{lathe:?}");
+    assert!(lathe.contains(&"START_SPEED_FEED_SYNC(2.000000,0)".into()), "{lathe:?}");
+    assert!(lathe.contains(&"SET_FEED_RATE(2.0000)".into()), "{lathe:?}");
+    for (dialect, block, expected) in [
+        ("fanuc-mill", "G33 Z-5. K1.5", code::SYNTAX_NOT_IN_DIALECT),
+        ("fanuc-mill", "G33 Z-5.", code::WORD_MISSING),
+        ("fanuc-mill", "G2 X0 Y0 I5. F100. P3", code::SYNTAX_NOT_IN_DIALECT),
+        ("fanuc-turn", "G32 Z-5. F1. Q90000", code::CODE_NOT_CARRIED_OUT),
+    ] {
+        let (_, outcome) = run_in(dialect, &format!("G21 M3 S100\n{block}\nM30\n"));
+        assert_eq!(outcome.findings[0].fault.code, expected, "{block}");
+    }
+}
+
+/// A subprogram that is nowhere is told at its call, wherever the file ends.
+#[test]
+fn a_missing_subprogram_is_told_at_its_call() {
+    for text in ["%\nO1\nG21\nM98 P21000\nM30\n%\n", "O1\nG21\nG0 X1.\nM98 P1000\nM30\n"] {
+        let (_, outcome) = run_in("fanuc-mill", text);
+        assert_eq!((outcome.findings.len(), outcome.findings[0].line), (1, 3), "{text}: {:?}", outcome.findings);
+    }
+}

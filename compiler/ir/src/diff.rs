@@ -302,13 +302,14 @@ fn next_item(cursor: &mut Cursor<'_>, tolerance: &Tolerance) -> (Item, Spot) {
 fn by_operation(a: &Program, b: &Program, tolerance: &Tolerance) -> Diff {
     let mut out = Diff::default();
     let (mut ca, mut cb) = (a.cursor(), b.cursor());
-    let mut last = None;
+    let mut told = Told::default();
     loop {
         let ((x, sa), (y, sb)) = (next_item(&mut ca, tolerance), next_item(&mut cb, tolerance));
         if matches!((&x, &y), (Item::End, Item::End)) {
+            told.end(&mut out, tolerance);
             return out;
         }
-        if !same_item(&mut out, &x, &y, sa, sb, &mut last, tolerance) {
+        if !same_item(&mut out, &x, &y, sa, sb, &mut told, tolerance) {
             out.note(usize::MAX, Aspect::Path, sa, sb, String::new());
             return out;
         }
@@ -322,7 +323,7 @@ fn same_item(
     y: &Item,
     sa: Spot,
     sb: Spot,
-    last: &mut Option<(Conditions, Conditions)>,
+    told: &mut Told,
     tolerance: &Tolerance,
 ) -> bool {
     match (x, y) {
@@ -336,7 +337,7 @@ fn same_item(
                 return false;
             }
             out.deviation = out.deviation.max(far);
-            compare_conditions(out, c, d, sa, sb, last, tolerance);
+            told.compare(out, (c, d), (sa, sb), tolerance);
             true
         }
         (Item::Event(p), Item::Event(q)) => {
@@ -359,35 +360,66 @@ fn turned(a: &Axes, b: &Axes) -> f64 {
     (3..6).map(|i| (a[i] - b[i]).abs()).fold(0.0, f64::max)
 }
 
-/// Notes differences in what holds during a move, once per change.
-fn compare_conditions(
-    out: &mut Diff,
-    c: &Conditions,
-    d: &Conditions,
-    a: Spot,
-    b: Spot,
-    last: &mut Option<(Conditions, Conditions)>,
-    tolerance: &Tolerance,
-) {
-    if c == d || *last == Some((*c, *d)) {
-        return;
+/// What has been told about the conditions of moves, so that each difference is noted once until it changes.
+#[derive(Default)]
+struct Told {
+    last: Option<(Conditions, Conditions)>,
+    tools: Option<(i32, i32)>,
+    spindles: Option<([Spindle; 8], [Spindle; 8])>,
+    coolant: Option<((bool, bool), (bool, bool))>,
+    /// A difference of rapids, which is told where nothing but rapids follows.
+    rapid: Option<(Conditions, Conditions, Spot, Spot)>,
+    cut: bool,
+}
+
+impl Told {
+    /// Notes differences in what holds during a move. A spindle may be switched before or behind a rapid: what counts is
+    /// what it does in cuts.
+    fn compare(&mut self, out: &mut Diff, (c, d): (&Conditions, &Conditions), at: (Spot, Spot), tolerance: &Tolerance) {
+        let cuts = c.class != Class::Rapid;
+        self.cut |= cuts;
+        if c == d || self.last == Some((*c, *d)) {
+            return;
+        }
+        self.last = Some((*c, *d));
+        let mut note = |aspect, message| out.note(tolerance.limit, aspect, at.0, at.1, message);
+        if changed(&mut self.tools, (c.tool, d.tool), c.tool != d.tool) {
+            note(Aspect::Tool, format!("works with tool {}, the other with tool {}", c.tool, d.tool));
+        }
+        if cuts && c.class != Class::Tap && (c.mode != d.mode || !close(c.feed, d.feed, tolerance.rate)) {
+            note(Aspect::Feed, format!("feeds {}, the other {}", feed_text(c), feed_text(d)));
+        }
+        if cuts {
+            self.compare_drive(out, (c, d), at, tolerance);
+        } else if self.rapid.is_none() {
+            self.rapid = Some((*c, *d, at.0, at.1));
+        }
     }
-    let before = last.replace((*c, *d));
-    let fresh = |f: &dyn Fn(&Conditions, &Conditions) -> bool| f(c, d) && !before.is_some_and(|(p, q)| f(&p, &q));
-    let mut note = |aspect, message| out.note(tolerance.limit, aspect, a, b, message);
-    if fresh(&|c, d| c.tool != d.tool) {
-        note(Aspect::Tool, format!("works with tool {}, the other with tool {}", c.tool, d.tool));
+
+    fn compare_drive(&mut self, out: &mut Diff, (c, d): (&Conditions, &Conditions), at: (Spot, Spot), tolerance: &Tolerance) {
+        let mut note = |aspect, message| out.note(tolerance.limit, aspect, at.0, at.1, message);
+        if changed(&mut self.spindles, (c.spindles, d.spindles), !same_spindles(c, d, tolerance.rate)) {
+            note(Aspect::Spindle, format!("spindle {}, the other {}", spindle_text(c), spindle_text(d)));
+        }
+        if changed(&mut self.coolant, (c.coolant, d.coolant), c.coolant != d.coolant) {
+            note(Aspect::Coolant, format!("coolant {}, the other {}", coolant_text(c), coolant_text(d)));
+        }
     }
-    let feeds = !matches!(c.class, Class::Rapid | Class::Tap);
-    if feeds && (c.mode != d.mode || !close(c.feed, d.feed, tolerance.rate)) {
-        note(Aspect::Feed, format!("feeds {}, the other {}", feed_text(c), feed_text(d)));
+
+    /// Behind the last move: programs of rapids alone are compared as they are.
+    fn end(&mut self, out: &mut Diff, tolerance: &Tolerance) {
+        if let Some((c, d, a, b)) = self.rapid.take().filter(|_| !self.cut) {
+            self.compare_drive(out, (&c, &d), (a, b), tolerance);
+        }
     }
-    if c.class != Class::Rapid && fresh(&|c, d| !same_spindles(c, d, tolerance.rate)) {
-        note(Aspect::Spindle, format!("spindle {}, the other {}", spindle_text(c), spindle_text(d)));
-    }
-    if c.class != Class::Rapid && fresh(&|c, d| c.coolant != d.coolant) {
-        note(Aspect::Coolant, format!("coolant {}, the other {}", coolant_text(c), coolant_text(d)));
-    }
+}
+
+/// Whether a difference is there and is not the one that was told last.
+fn changed<T: PartialEq>(told: &mut Option<T>, pair: T, differs: bool) -> bool {
+    let new = differs.then_some(pair);
+    let fresh = new.is_some() && *told != new;
+    *told = new;
+    fresh
 }
 
 fn same_spindles(c: &Conditions, d: &Conditions, rate: f64) -> bool {

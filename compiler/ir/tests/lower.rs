@@ -309,6 +309,31 @@ fn feeds_tools_and_events_are_told_apart() {
     }
 }
 
+/// A rapid in front of the cut must not swallow the difference; programs of rapids alone are compared too.
+#[test]
+fn spindles_and_coolant_behind_rapids_are_told_apart() {
+    let rapid = Call::StraightTraverse(at(1.0, 0.0, 0.0));
+    let cut = Call::StraightFeed(at(2.0, 0.0, 0.0));
+    for (ways, told) in [(vec![rapid.clone(), cut.clone(), cut.clone()], 1), (vec![rapid.clone()], 1), (vec![], 0)] {
+        let program = |spindle: Call, extra: Option<Call>| {
+            let start = [Call::SetFeedRate(100.0), Call::SetSpindleSpeed(0, 500.0), spindle];
+            lower(&start.into_iter().chain(extra).chain(ways.iter().cloned()).collect::<Vec<_>>())
+        };
+        let base = program(Call::StartSpindleClockwise(0), None);
+        let left = program(Call::StartSpindleCounterclockwise(0), None);
+        let wet = program(Call::StartSpindleClockwise(0), Some(Call::FloodOn));
+        for (other, aspect) in [(left, Aspect::Spindle), (wet, Aspect::Coolant)] {
+            let result = diff(&base, &other, &Tolerance::default());
+            assert_eq!((result.count, result.differs(aspect)), (told, told == 1), "{aspect:?} {result:?}");
+        }
+    }
+    // The spindle starts in front of the rapid or behind it: the cuts are the same.
+    let (on, feed) = (Call::StartSpindleClockwise(0), Call::SetFeedRate(100.0));
+    let early = lower(&[feed.clone(), on.clone(), rapid.clone(), cut.clone()]);
+    let late = lower(&[feed, rapid, on, cut]);
+    assert!(diff(&early, &late, &Tolerance::default()).is_empty());
+}
+
 #[test]
 fn a_million_moves_in_64_bytes_each() {
     let mut out = Lowering::new();

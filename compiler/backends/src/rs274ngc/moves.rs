@@ -254,7 +254,11 @@ impl Emitter<'_> {
         if words.len() == 1 {
             return;
         }
-        let (pitch, _) = self.w.length(per_rev, self.w.places.max(6));
+        // Fanuc's lead counts along the axis that goes furthest, LinuxCNC's along the way.
+        let way: [f64; 3] = std::array::from_fn(|i| (view.end.axes[i] - view.start.axes[i]).abs());
+        let length = libm::sqrt(way.iter().map(|d| d * d).sum());
+        let share = if self.linuxcnc() || length == 0.0 { 1.0 } else { way.into_iter().fold(0.0, f64::max) / length };
+        let (pitch, _) = self.w.length(per_rev * share, self.w.places.max(6));
         words.push(format!("{}{pitch}", if self.linuxcnc() { 'K' } else { 'F' }));
         if !self.linuxcnc() {
             self.feed.clear();

@@ -214,7 +214,9 @@ fn on_robot(global: &Global, args: &VerifyArgs, station: &Station, machine: &gr_
     super::print(&report.table())
 }
 
-/// One unit of the last decimal that is written; with straight pieces for arcs, their tolerance too.
+/// One unit of the last decimal that is written. With straight pieces for arcs, their tolerance too; with arcs, what
+/// rounding of both ends and the centre makes of them at most: half a unit in each coordinate moves the centre by 0.71
+/// units and each radius by 1.42, and a helix has its own half in depth.
 fn allowed(args: &VerifyArgs) -> f64 {
     let o = &args.options;
     let inch = o.units == Some(UnitArg::Inch);
@@ -222,6 +224,6 @@ fn allowed(args: &VerifyArgs) -> f64 {
     let decimals = o.decimals.unwrap_or(4 + usize::from(inch) - usize::from(fanuc)) as i32;
     let unit = 10_f64.powi(-decimals) * if inch { 25.4 } else { 1.0 };
     let pieces = o.arcs == Some(crate::emit::ArcsArg::Lines) || o.plane == Some(crate::emit::PlaneArg::Xy);
-    let curve = if pieces { o.arc_tolerance.unwrap_or(0.001) } else { 0.0 };
+    let curve = if pieces { o.arc_tolerance.unwrap_or(0.001) } else { 1.25 * unit };
     (unit + curve).max(1e-6)
 }

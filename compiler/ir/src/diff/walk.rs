@@ -2,7 +2,7 @@
 //! corner, the other must have a corner or pass within tolerance.
 
 use super::{
-    Aspect, Axes, Class, Conditions, Diff, Event, Op, Program, Spot, Tolerance, compare_conditions, distance, place, turned,
+    Aspect, Axes, Class, Conditions, Diff, Event, Op, Program, Spot, Told, Tolerance, distance, place, turned,
 };
 use crate::Cursor;
 use crate::geometry::flatten;
@@ -68,10 +68,13 @@ impl<'p> Chain<'p> {
 pub(super) fn by_shape<'p>(a: &'p Program, b: &'p Program, tolerance: &Tolerance) -> Diff {
     let mut out = Diff::default();
     let (mut p, mut q) = (Chain::new(a, tolerance), Chain::new(b, tolerance));
-    let mut last = None;
+    let mut told = Told::default();
     loop {
         match (p.head, q.head) {
-            (Piece::End, Piece::End) => return out,
+            (Piece::End, Piece::End) => {
+                told.end(&mut out, tolerance);
+                return out;
+            }
             (Piece::Event(x), Piece::Event(y)) => {
                 if !x.same(&y, tolerance.rate) {
                     let message = format!("{}, the other {}", x.text(), y.text());
@@ -81,12 +84,12 @@ pub(super) fn by_shape<'p>(a: &'p Program, b: &'p Program, tolerance: &Tolerance
                 q.pull(tolerance);
             }
             (Piece::Chord(c, to), Piece::Chord(d, other)) if c.class == d.class => {
-                compare_conditions(&mut out, &c, &d, p.spot, q.spot, &mut last, tolerance);
+                told.compare(&mut out, (&c, &d), (p.spot, q.spot), tolerance);
                 if let Err(gap) = side_by_side(&mut out, &mut p, &mut q, &to, &other, tolerance) {
                     let mut message = format!("goes to {}, the other to {}", point(&to), point(&other));
                     if point(&to) == point(&other) {
                         message += &format!(", {:.2e} mm apart", distance(&to, &other));
-                    } else if gap < NEAR {
+                    } else if gap < NEAR.max(100.0 * tolerance.length) {
                         // The two corners need not belong together.
                         message = format!("goes to {}, the other passes {gap:.2e} mm beside its way", point(&to));
                     }
