@@ -81,7 +81,7 @@ impl<S: Sink> Interp<'_, S> {
     pub(crate) fn check_listed_letter(&self, letter: u8) -> Res {
         match self.closed {
             Some(list) if self.setup.dialect.family == Family::Grbl && list.letters & bit(letter) == 0 => {
-                Err(self.not_in_dialect(&format!("the word {}", char::from(letter.to_ascii_uppercase())), OTHER_CODE).at(letter))
+                Err(self.not_in_dialect(&format!("word {}", char::from(letter.to_ascii_uppercase())), OTHER_CODE).at(letter))
             }
             _ => Ok(()),
         }

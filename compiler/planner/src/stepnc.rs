@@ -3,7 +3,7 @@
 //! coolant and override locks stand with each tool path. What the standard has no counterpart for is an error, or, where losses are allowed, left out and
 //! listed.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 
 use gr_ir::geometry::ArcShape;
@@ -100,6 +100,8 @@ struct Writer<'a> {
     elements: Vec<Element>,
     name: String,
     tools: BTreeMap<i32, usize>,
+    /// Tools that were told to be unknown.
+    unknown: BTreeSet<i32>,
     technologies: Vec<(Technology, usize)>,
     functions: BTreeMap<(bool, bool), usize>,
     workpiece: usize,
@@ -133,6 +135,7 @@ impl<'a> Writer<'a> {
             elements: Vec::new(),
             name: String::new(),
             tools: BTreeMap::new(),
+            unknown: BTreeSet::new(),
             technologies: Vec::new(),
             functions: BTreeMap::new(),
             workpiece: 0,
@@ -291,6 +294,12 @@ impl<'a> Writer<'a> {
         };
         if self.elements.last().is_some_and(|e| e.technology().tool != new.tool) {
             self.finish_step();
+        }
+        let described = self.options.tools.iter().any(|t| t.0 == new.tool && t.1 > 0.0);
+        if !described && self.unknown.insert(new.tool) {
+            let name = if new.tool > 0 { format!("tool {}", new.tool) } else { "the tool".to_string() };
+            let (file, span) = (self.place)(v.source);
+            self.out.push(Diagnostic::new(code::STEPNC_TOOL_UNKNOWN, file, span, &[name]));
         }
         new
     }

@@ -233,3 +233,24 @@ proptest! {
         }
     }
 }
+
+/// A tool without a diameter is told once, at its first move.
+#[test]
+fn an_unknown_tool_is_told() {
+    let mut b = Build::new();
+    b.feed(5.0);
+    b.to(Op::Rapid, 1.0, 1.0, 5.0);
+    b.to(Op::Linear, 1.0, 1.0, 0.0);
+    b.tool(2);
+    b.to(Op::Linear, 2.0, 1.0, 0.0);
+    b.to(Op::Linear, 3.0, 1.0, 0.0);
+    let program = b.0.finish();
+    let notes = |tools: Vec<(i32, f64, f64)>| {
+        let (_, notes) = write(&program, &Options { tools, ..Options::default() }).expect("it can be written");
+        notes.iter().map(|d| (d.code, d.message.split(" is not").next().unwrap_or_default().to_string())).collect::<Vec<_>>()
+    };
+    let told = |name: &str| (code::STEPNC_TOOL_UNKNOWN, name.to_string());
+    assert_eq!(notes(Vec::new()), [told("the tool"), told("tool 2")]);
+    assert_eq!(notes(vec![(0, 3.0, 0.0), (2, 0.0, 10.0)]), [told("tool 2")]);
+    assert_eq!(notes(vec![(0, 3.0, 0.0), (2, 6.0, 10.0)]), []);
+}

@@ -51,13 +51,14 @@ fn without_fields(snippet: &str) -> String {
 fn gcode_completion(view: &mut View, offset: u32) -> Answer<Vec<Completion>> {
     let Some((session, file, dialect)) = view.session() else { return Ok(Vec::new()) };
     let tables = (session.file(file)?, dialect);
-    let line = doc(&tables).line_at(offset).map_or(0, |l| l.line);
+    let here = doc(&tables).line_at(offset).map(|l| l.line);
+    let line = here.unwrap_or_else(|| doc(&tables).count().saturating_sub(1));
     let state = if dialect.family == gr_spec::Family::Ufmg2008 { None } else { session.state_at(file, line)? };
     view.release();
     let subs = other_subs(view, dialect);
     let setup = view.station.setup_for(dialect);
     let around = Around {
-        modal: state.as_ref().map(|s| &s.before),
+        modal: state.as_ref().map(|s| if here.is_some() { &s.before } else { &s.after }),
         setup: Some(&setup).filter(|_| dialect.family != gr_spec::Family::Ufmg2008),
         tools: Some((&setup.tools, setup.machine_units)),
         subs: &subs,

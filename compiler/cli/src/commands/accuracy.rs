@@ -45,7 +45,7 @@ pub fn run(global: &Global, args: &AccuracyArgs) -> Exit {
     };
     let Some(station) = station(&args.setup, &LintArgs::default(), Path::new("."), &mut sources, &mut renderer) else {
         renderer.finish(false);
-        return Exit::Findings;
+        return renderer.failed();
     };
     let Some(machine) = station.machine.clone() else {
         return refuse("accuracy", "it needs a machine: `--machine`, or `machine` in gcc-robot.toml");

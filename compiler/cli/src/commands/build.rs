@@ -112,9 +112,14 @@ impl<'a> Round<'a> {
             self.fail(Exit::Usage);
             return self.end(false);
         }
-        let found = station(&self.args.setup, &self.args.lints, from, &mut self.sources, &mut self.renderer);
+        let mut setup = self.args.setup.clone();
+        if self.args.options.reference == Some(crate::emit::Reference::Ufmg2008) {
+            // The reference mode chooses the dialect too.
+            setup.dialect.get_or_insert_with(|| "ufmg2008".into());
+        }
+        let found = station(&setup, &self.args.lints, from, &mut self.sources, &mut self.renderer);
         let Some(station) = found else {
-            self.fail(Exit::Findings);
+            self.fail(self.renderer.failed());
             return self.end(false);
         };
         self.files.extend(station.files.iter().cloned());

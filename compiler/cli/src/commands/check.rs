@@ -55,7 +55,7 @@ pub fn run(global: &Global, args: &CheckArgs) -> Exit {
     let mut sources = Sources::default();
     let Some(station) = station(&args.setup, &args.lints, Path::new("."), &mut sources, &mut renderer) else {
         renderer.finish(!global.quiet);
-        return Exit::Findings;
+        return renderer.failed();
     };
     let (files, mut exit) = match programs(&args.paths, &station, &mut sources, &mut renderer) {
         Some(found) => found,

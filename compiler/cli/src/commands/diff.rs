@@ -19,7 +19,7 @@ use crate::sources::Sources;
 
 pub fn run(global: &Global, args: &DiffArgs) -> Exit {
     let mut renderer = global.renderer(true);
-    let Some(mut station) = prepare(&args.setup, &mut renderer) else { return Exit::Findings };
+    let Some(mut station) = prepare(&args.setup, &mut renderer) else { return renderer.failed() };
     let progress = Progress::new(global.quiet, "comparing");
     let first = read(&args.a, &station);
     if let Some(name) = &args.second_dialect {
@@ -125,7 +125,7 @@ fn as_json(result: &Diff, a: &Sources, b: &Sources) -> String {
 /// Builds normalised G-code, reads it back and compares it with the source as motion.
 pub fn verify(global: &Global, args: &VerifyArgs) -> Exit {
     let mut renderer = global.renderer(true);
-    let Some(station) = prepare(&args.setup, &mut renderer) else { return Exit::Findings };
+    let Some(station) = prepare(&args.setup, &mut renderer) else { return renderer.failed() };
     if let Some(machine) = station.machine.as_ref().filter(|m| gr_robot::along::is_planned(m)) {
         return on_robot(global, args, &station, machine, &mut renderer);
     }

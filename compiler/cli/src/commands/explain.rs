@@ -80,9 +80,7 @@ fn diagnostic(code: Code) -> String {
     if let Some(fix) = d.fix {
         text.push_str(&format!("\nWhat to do: {}\n", open(fix)));
     }
-    if let Some(dialect) = d.dialect {
-        text.push_str(&format!("\nThe examples are for the dialect {dialect}.\n"));
-    }
+    text.push_str(&examples_are_for(d));
     for (title, program) in [("This raises it:", d.bad), ("This is right:", d.good)] {
         if let Some(program) = program {
             text.push_str(&format!("\n{title}\n\n{}\n", indented(program)));
@@ -91,9 +89,32 @@ fn diagnostic(code: Code) -> String {
     text
 }
 
+/// What to know before the examples are tried.
+fn examples_are_for(d: &gr_spec::DiagnosticDef) -> String {
+    let mut text = String::new();
+    match d.dialect {
+        Some("part21") => text.push_str("The examples are statements of the DATA section of a STEP-NC file, or whole files.\n"),
+        Some(dialect) => text.push_str(&format!("The examples are for --dialect {dialect}.\n")),
+        None => {}
+    }
+    match d.options {
+        Some("check") | None => {}
+        Some("machine check") => text.push_str("The examples are machine files, for `gcc-robot machine check`.\n"),
+        Some(options) => text.push_str(&format!("The examples are for `gcc-robot {options}`.\n")),
+    }
+    if let Some(tools) = d.tools {
+        text.push_str(&format!("The examples need this tool table (--tools):\n\n{}\n", indented(tools)));
+    }
+    let examples = [d.bad, d.good].into_iter().flatten();
+    if examples.clone().any(|e| e.contains(['\0', '\r'])) {
+        text.push_str("The byte 0 is shown as ␀, a carriage return as ␍.\n");
+    }
+    if text.is_empty() || examples.count() == 0 { String::new() } else { format!("\n{text}") }
+}
+
 fn indented(program: &str) -> String {
-    let lines: Vec<String> = program.lines().map(|l| format!("    {l}")).collect();
-    lines.join("\n")
+    let lines: Vec<String> = program.split('\n').map(|l| format!("    {}", l.replace('\0', "␀").replace('\r', "␍"))).collect();
+    lines.join("\n").trim_end().to_string()
 }
 
 fn code(def: &CodeDef, dialect: &Dialect) -> String {

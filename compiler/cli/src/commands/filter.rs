@@ -48,7 +48,7 @@ fn filter(args: &FilterArgs, renderer: &mut Renderer) -> Exit {
     }
     let from = args.file.parent().filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let mut sources = Sources::default();
-    let Some(mut station) = station(&setup, &LintArgs::default(), from, &mut sources, renderer) else { return Exit::Findings };
+    let Some(mut station) = station(&setup, &LintArgs::default(), from, &mut sources, renderer) else { return renderer.failed() };
     if args.write_tools.is_some() {
         station.tools = None;
     }

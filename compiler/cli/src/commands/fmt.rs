@@ -176,7 +176,7 @@ impl Work {
             Some(station) => Ok(Work { renderer, sources, station }),
             None => {
                 renderer.finish(false);
-                Err(Exit::Findings)
+                Err(renderer.failed())
             }
         }
     }

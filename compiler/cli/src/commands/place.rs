@@ -35,7 +35,7 @@ pub fn run(global: &Global, args: &PlaceArgs) -> Exit {
     let name = args.file.clone().unwrap_or_else(|| "place".into());
     let Some(station) = station(&args.setup, &LintArgs::default(), Path::new("."), &mut sources, &mut renderer) else {
         renderer.finish(false);
-        return Exit::Findings;
+        return renderer.failed();
     };
     let Some(machine) = station.machine.clone() else {
         let why = "it needs a machine: `--machine`, or `machine` in gcc-robot.toml".to_string();

@@ -22,7 +22,7 @@ pub fn run(global: &Global, args: &PreviewArgs) -> Exit {
     let mut sources = Sources::default();
     let Some(station) = station(&args.setup, &LintArgs::default(), Path::new("."), &mut sources, &mut renderer) else {
         renderer.finish(false);
-        return Exit::Findings;
+        return renderer.failed();
     };
     let progress = Progress::new(global.quiet, format!("drawing {}", args.file.display()));
     let unit = load(&args.file, &station);

@@ -75,7 +75,7 @@ pub fn run(global: &Global, args: &PreviewArgs) -> Exit {
     let mut sources = Sources::default();
     let Some(station) = station(&args.setup, &LintArgs::default(), Path::new("."), &mut sources, &mut renderer) else {
         renderer.finish(false);
-        return Exit::Findings;
+        return renderer.failed();
     };
     let listener = match TcpListener::bind((Ipv4Addr::LOCALHOST, 0)) {
         Ok(listener) => listener,

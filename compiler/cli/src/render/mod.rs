@@ -8,7 +8,9 @@ mod short;
 
 use std::io::Write;
 
-use gr_text::{Diagnostic, Severity};
+use gr_text::{Diagnostic, Severity, code};
+
+use crate::exit::Exit;
 
 use crate::sources::{Positions, Sources};
 
@@ -90,6 +92,8 @@ pub struct Renderer {
     collected: Option<Vec<Diagnostic>>,
     /// What was written so far.
     pub tally: Tally,
+    /// A file could not be read or written.
+    unreadable: bool,
 }
 
 impl Renderer {
@@ -104,7 +108,12 @@ impl Renderer {
             positions: Positions::default(),
             collected: None,
             tally: Tally::default(),
+            unreadable: false,
         }
+    }
+    /// How a run ends that could not begin.
+    pub fn failed(&self) -> Exit {
+        if self.unreadable { Exit::Io } else { Exit::Findings }
     }
     /// Writes nothing; [`Renderer::into_collected`] gives what was found.
     pub fn collecting() -> Renderer {
@@ -117,6 +126,7 @@ impl Renderer {
     /// One finding.
     pub fn show(&mut self, sources: &Sources, d: &Diagnostic) {
         self.tally.count(d.severity);
+        self.unreadable |= matches!(d.code, code::FILE_MISSING | code::FILE_UNREADABLE | code::FILE_DIRECTORY | code::FILE_TOO_BIG);
         if let Some(list) = &mut self.collected {
             list.push(d.clone());
             return;

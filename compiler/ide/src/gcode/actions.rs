@@ -467,8 +467,9 @@ pub fn convert_units(doc: Doc<'_>, line: &LineOf<'_>, before: Option<&Modal>) ->
     if doc.len() > 4_000_000 {
         return None;
     }
-    // Inverse time, tables and surface speed: numbers whose unit is another, or of another block.
-    let strange = |l: LineOf<'_>| [930, 100, 960].iter().any(|c| l.has_code(b'g', *c)) || l.has_code(b'm', 980) || l.has_code(b'g', 650) || l.has_code(b'g', 660);
+    // Inverse time, tables, surface speed, diameters: numbers whose unit is another, or of another block. Increments and
+    // feeds per revolution: a rounded value adds up, or is too coarse.
+    let strange = |l: LineOf<'_>| [930, 100, 960, 70, 910, 911, 950].iter().any(|c| l.has_code(b'g', *c)) || l.has_code(b'm', 980) || l.has_code(b'g', 650) || l.has_code(b'g', 660);
     if doc.lines(0..doc.count()).any(strange) {
         return None;
     }

@@ -99,11 +99,14 @@ impl<'a> Doc<'a> {
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
-    /// The line that holds a byte.
+    /// The line that holds a byte; none behind the last line break, where a line is only about to begin.
     pub fn line_at(&self, offset: u32) -> Option<LineOf<'a>> {
         let c = self.file.starts.partition_point(|s| *s <= offset).checked_sub(1)?;
         let c = c.min(self.file.chunks.len().checked_sub(1)?);
         let chunk = &self.file.chunks[c];
+        if offset >= self.len() && chunk.text.ends_with(['\n', '\r']) {
+            return None;
+        }
         let inside = offset - self.file.starts[c];
         let at = chunk.scan.lines.partition_point(|l| l.start <= inside).checked_sub(1)? as u32;
         Some(LineOf { chunk, base: self.file.starts[c], line: self.file.first_lines[c] + at, at })

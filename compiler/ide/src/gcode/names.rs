@@ -519,10 +519,21 @@ fn is_macro(k: Keyword) -> bool {
     matches!(k, Keyword::MacroIfGoto | Keyword::MacroIfThen | Keyword::MacroGoto | Keyword::MacroWhile | Keyword::MacroDo | Keyword::MacroEnd)
 }
 
-/// Labels that are edited together: those of the same branch, loop or subroutine in this file.
+/// Labels that are edited together: those of the same branch, loop or subroutine in this file that are spelled as the
+/// one at the cursor is.
 pub fn linked(doc: Doc<'_>, offset: u32) -> Vec<Span> {
+    let text = |s: Span| {
+        let line = doc.line_at(s.start)?;
+        let start = line.span().start;
+        line.text().get((s.start - start) as usize..(s.end - start) as usize)
+    };
     match name_at(doc, offset) {
-        Some((name @ (Name::Block(..) | Name::Sub(_)), _)) => occurrences(doc, &name, None).into_iter().map(|o| o.span).collect(),
+        Some((name @ (Name::Block(..) | Name::Sub(_)), _)) => {
+            let all: Vec<Span> = occurrences(doc, &name, None).into_iter().map(|o| o.span).collect();
+            // At the `o` before a number the editor has nothing of the name to change.
+            let here = all.iter().find(|s| s.start <= offset && offset <= s.end).and_then(|s| text(*s));
+            all.into_iter().filter(|s| here.is_some() && text(*s) == here).collect()
+        }
         _ => Vec::new(),
     }
 }
