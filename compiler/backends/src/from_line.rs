@@ -65,7 +65,7 @@ pub fn from_line(
         let heights = [safe.max(pose.axes[2]), lowest].map(|z| format!("{z:.3}"));
         notes.push(Diagnostic::new(code::FROM_LINE_LOW_HEIGHT, place.0, place.1, &heights));
     }
-    let from = From { index: found.index, line, known: height_known(program, found.index, sources) };
+    let from = From { index: found.index, line, known: known_axes(program, found.index, sources) };
     let restart = build(program, &from, &state, &pose, safe.max(pose.axes[2]), sources);
     Ok(Restart { program: restart, notes })
 }
@@ -120,10 +120,9 @@ fn compensated(program: &Program, index: usize, line: u32, sources: &dyn Sources
     let mut on = false;
     let mut last: Option<Source> = None;
     let mut look = |file: FileId, line: u32| {
-        let Some(text) = sources.line(file, line) else {
+        let Some(words) = Words::at(sources, file, line) else {
             return;
         };
-        let words = Words::of(text);
         if words.g(400) {
             on = false;
         } else if [410, 420, 411, 421].into_iter().any(|g| words.g(g)) {
@@ -199,19 +198,32 @@ fn lowest_crossing(program: &Program, state: &State) -> Option<f64> {
 struct From {
     index: usize,
     line: u32,
-    /// A block before has said how high the tool is.
-    known: bool,
+    /// Axes that a block before has brought to a place in the work frame.
+    known: [bool; 9],
 }
 
-/// Whether a block before an operation has said how high the tool is; else its height is only what a simulation begins
-/// with.
-fn height_known(program: &Program, index: usize, sources: &dyn Sources) -> bool {
-    program.steps().take(index).any(|s| s.op.moves() && says_height(&s.start, &s.end, s.source, sources))
+/// Axes whose place a program has said in its work frame before an operation. Of the others, and of those that G28, G30
+/// and G53 brought to a place of the machine, the numbers are only what a simulation takes them for.
+fn known_axes(program: &Program, index: usize, sources: &dyn Sources) -> [bool; 9] {
+    let mut known = [false; 9];
+    for s in program.steps().take(index).filter(|s| s.op.moves()) {
+        let words = Words::at(sources, s.source.file, s.source.line);
+        let fixed = words.is_some_and(|w| [280, 300, 530].into_iter().any(|g| w.g(g)));
+        let home = fixed && words.is_some_and(|w| !w.g(530) && !AXIS_LETTERS.iter().any(|l| w.has(*l)));
+        for (i, letter) in AXIS_LETTERS.iter().enumerate() {
+            if home || s.start.axes[i] != s.end.axes[i] || words.is_some_and(|w| w.has(*letter)) {
+                known[i] = !fixed;
+            }
+        }
+    }
+    known
 }
+
+const AXIS_LETTERS: [u8; 9] = *b"xyzabcuvw";
 
 fn says_height(start: &Pose, end: &Pose, source: Source, sources: &dyn Sources) -> bool {
     let home = [280, 300];
-    let words = || sources.line(source.file, source.line).map(Words::of);
+    let words = || Words::at(sources, source.file, source.line);
     start.axes[2] != end.axes[2] || words().is_some_and(|w| w.has(b'z') || home.into_iter().any(|g| w.g(g)))
 }
 
@@ -219,7 +231,8 @@ fn build(program: &Program, from: &From, state: &State, pose: &Pose, safe: f64, 
     let index = from.index;
     // A place that no program names, so that every axis of the approach moves and has its word.
     let used = axes_used(program);
-    let far = Pose::at(std::array::from_fn(|i| if i < 3 || used[i] { pose.axes[i] + 777.25 } else { pose.axes[i] }));
+    let approached: [bool; 9] = std::array::from_fn(|i| i == 2 || from.known[i] && (i < 3 || used[i]));
+    let far = Pose::at(std::array::from_fn(|i| if approached[i] { pose.axes[i] + 777.25 } else { pose.axes[i] }));
     let mut out = Builder::from_state(far, State::default());
     out.names_of(program);
     let source = Source { line: INSERTED, ..Source::default() };
@@ -238,12 +251,12 @@ fn build(program: &Program, from: &From, state: &State, pose: &Pose, safe: f64, 
     restore.modes(state);
     restore.spindles(state);
     restore.outputs(program, index);
-    let mut waiting = !from.known;
+    let mut waiting = !from.known[2];
     let mut goal = *pose;
     if waiting {
         goal.axes[2] = safe;
     }
-    restore.approach(program, state, &goal, safe);
+    restore.approach(program, index, state, &goal, approached, safe);
     let mut out = restore.out;
     let mut rest = program.cursor_at(index);
     while let Some(view) = rest.next() {
@@ -358,34 +371,69 @@ impl Restore {
     }
 
     /// Up, over the place, down: rapid to just above it, then at feed.
-    fn approach(&mut self, program: &Program, state: &State, goal: &Pose, safe: f64) {
-        let used = axes_used(program);
+    fn approach(&mut self, program: &Program, index: usize, state: &State, goal: &Pose, approached: [bool; 9], safe: f64) {
         let mut at = *self.out.pose();
         at.axes[2] = safe;
         self.out.push_to(Op::Rapid, &at, self.source);
         for (i, value) in goal.axes.iter().enumerate() {
-            if i != 2 && (i < 3 || used[i]) {
+            if i != 2 && approached[i] {
                 at.axes[i] = *value;
             }
         }
         self.out.push_to(Op::Rapid, &at, self.source);
         let height = goal.axes[2];
+        if height == safe {
+            return;
+        }
+        let down = |z: f64| {
+            let mut to = at;
+            to.axes[2] = z;
+            to
+        };
         let per_turn = state.feed_mode == gr_ir::FeedMode::PerRev;
         let turns = state.spindles.iter().any(|s| s.turn != Turn::Stop && s.speed != 0.0);
-        if state.feed > 0.0 && (state.feed_mode == gr_ir::FeedMode::PerTime || per_turn && turns) {
-            if height + CLEARANCE < safe {
-                at.axes[2] = height + CLEARANCE;
-                self.out.push_to(Op::Rapid, &at, self.source);
-            }
-            at.axes[2] = height;
-            if height != safe {
-                self.out.push_to(Op::Linear, &at, self.source);
-            }
-        } else if height != safe {
-            at.axes[2] = height;
-            self.out.push_to(Op::Rapid, &at, self.source);
+        let feeds = state.feed > 0.0 && (state.feed_mode == gr_ir::FeedMode::PerTime || per_turn && turns);
+        if !feeds && came_by_rapid(program, index) {
+            return self.out.push_to(Op::Rapid, &down(height), self.source);
+        }
+        if !feeds {
+            // No feed is in force, but this may be in the material: one that the program has elsewhere.
+            self.push(Op::FeedMode { spindle: state.feed_spindle, mode: gr_ir::FeedMode::PerTime });
+            self.push(Op::Feed { linear: feed_elsewhere(program, index), angular: state.feed_angular });
+        }
+        if height + CLEARANCE < safe {
+            self.out.push_to(Op::Rapid, &down(height + CLEARANCE), self.source);
+        }
+        self.out.push_to(Op::Linear, &down(height), self.source);
+        if !feeds {
+            self.push(Op::FeedMode { spindle: state.feed_spindle, mode: state.feed_mode });
+            self.push(Op::Feed { linear: state.feed, angular: state.feed_angular });
         }
     }
+}
+
+/// Feed of an approach in programs that never say one per minute, mm/s.
+const SLOW: f64 = 100.0 / 60.0;
+
+/// Whether the place before an operation was reached by a rapid: the program says then that nothing is there.
+fn came_by_rapid(program: &Program, index: usize) -> bool {
+    let moved = program.steps().take(index).filter(|s| s.op.moves() && s.start.axes != s.end.axes).last();
+    moved.is_some_and(|s| s.op == Op::Rapid)
+}
+
+/// The first feed per minute behind an operation, else the last before it.
+fn feed_elsewhere(program: &Program, index: usize) -> f64 {
+    let mut cursor = program.cursor();
+    let mut found = None;
+    while let Some(view) = cursor.next() {
+        if view.op.feeds() && view.state.feed_mode == gr_ir::FeedMode::PerTime && view.state.feed > 0.0 {
+            found = Some(view.state.feed);
+            if view.index >= index {
+                break;
+            }
+        }
+    }
+    found.unwrap_or(SLOW)
 }
 
 /// Which axes ever move.

@@ -1,6 +1,9 @@
 //! What words a source line holds. Motion is known from the IR alone; the text tells which words stood there,
 //! which matters where a number is only a simulation's: G53, G28, a word that happens to change nothing.
 
+use gr_ir::Sources;
+use gr_text::FileId;
+
 /// What stands in a line, as far as a look at its letters tells: expressions are skipped, not evaluated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Words {
@@ -13,7 +16,22 @@ pub struct Words {
 const CODES: [u32; 22] =
     [530, 280, 300, 281, 301, 400, 410, 420, 411, 421, 490, 520, 920, 921, 922, 923, 610, 611, 640, 430, 431, 432];
 
+/// Increments of a lathe, and the axis that each moves.
+const INCREMENTS: [(u8, u8); 4] = [(b'u', b'x'), (b'v', b'y'), (b'w', b'z'), (b'h', b'c')];
+
 impl Words {
+    /// Reads a line of a program, with increments as words of their axes.
+    pub fn at(sources: &dyn Sources, file: FileId, line: u32) -> Option<Words> {
+        let mut words = Words::of(sources.line(file, line)?);
+        if sources.increments() {
+            let said = words;
+            for (increment, axis) in INCREMENTS.into_iter().filter(|(i, _)| said.has(*i)) {
+                words.letters = words.letters & !bit(increment) | bit(axis);
+            }
+        }
+        Some(words)
+    }
+
     /// Reads a line.
     pub fn of(line: &str) -> Words {
         let mut words = Words::default();

@@ -414,6 +414,53 @@ fn a_restart_goes_down_to_no_height_that_nobody_named() {
     }
 }
 
+/// Without a feed in force the last piece of the way down is still fed, and what was in force is set again.
+#[test]
+fn a_restart_feeds_down_where_no_feed_is_in_force() {
+    for (mode, feed) in [("G95 F.1", ""), ("G93", " F2")] {
+        let text = format!("G21 G90 G94\nM3 S100\nG0 X0 Y0 Z5\n{mode}\nG1 Z-4{feed}\nG94\nG1 X10 F100\nX20\nG0 Z5\nX3\nG94\nG1 X4 F60\nM5\nM2\n");
+        let texts = Texts::new([(FileId(0), text.as_str())]);
+        let o = from_line::Options { safe_z: Some(25.0) };
+        let restart = from_line::from_line(&run(&text), FileId(0), 7, &o, &texts).expect("a start");
+        let mut down = Vec::new();
+        let mut cursor = restart.program.cursor();
+        while let Some(view) = cursor.next() {
+            if view.op.moves() && view.start.axes[2] > view.end.axes[2] && view.end.axes[2] < 25.0 {
+                down.push((view.op == gr_ir::Op::Rapid, view.end.axes[2], view.state.feed * 60.0));
+            }
+        }
+        assert_eq!(down.iter().map(|d| (d.0, d.1)).collect::<Vec<_>>(), [(true, -2.0), (false, -4.0)], "{mode}");
+        assert!((down[1].2 - 100.0).abs() < 1e-9, "{down:?}");
+        // At a height that the program itself went to by a rapid, one is enough.
+        let restart = from_line::from_line(&run(&text), FileId(0), 12, &o, &texts).expect("a start");
+        let written = emit(&restart.program, &options(Language::Linuxcnc), &texts).expect("written").text;
+        assert!(!written.contains("F100"), "{written}");
+    }
+}
+
+/// Places of the machine (G28, G30, G53) are numbers of the simulation: an approach goes to none of them.
+#[test]
+fn a_restart_goes_to_no_place_of_the_machine() {
+    let text = "G21 G90 G17 G40 G49\nG28 G91 Z0\nG90\nT1 M6\nG43 H1\nS3000 M3\nG0 X10 Y10\nG0 Z5\nG1 Z-1 F100\nX20\nG53 G0 Z-7\nM5\nT2 M6\nG28\nG0 X3\nG1 Z-1 F50\nM2\n";
+    let texts = Texts::new([(FileId(0), text)]);
+    let o = from_line::Options { safe_z: Some(100.0) };
+    let approach = |line: u32| {
+        let restart = from_line::from_line(&run(text), FileId(0), line, &o, &texts).expect("a start");
+        let written = emit(&restart.program, &options(Language::Linuxcnc), &texts).expect("written").text;
+        let ways = written.lines().skip_while(|l| !l.starts_with("G0")).filter(|l| l.contains(['X', 'Y', 'Z']));
+        ways.map(|l| l.trim_start_matches("G0 ")).collect::<Vec<_>>().join(" / ")
+    };
+    // Nobody has said anything: up, and then as the program goes on.
+    for line in [4, 6, 8] {
+        assert!(approach(line).starts_with("Z100 / X10 Y10 / Z5 / G1 Z-1"), "{line}: {}", approach(line));
+    }
+    // Behind G53 the height is the machine's again; X and Y are the program's.
+    assert!(approach(12).starts_with("Z100 / X20 Y10"), "{}", approach(12));
+    assert!(!approach(12).contains("Z-7"), "{}", approach(12));
+    // Behind a G28 of all axes nothing is known.
+    assert!(approach(15).starts_with("Z100 / X3"), "{}", approach(15));
+}
+
 /// A cycle whose moves are of a line of their own: nothing of ours writes one, but a motion file may.
 #[test]
 fn no_start_inside_a_cycle() {

@@ -683,29 +683,32 @@ fn line_numbers(text: &str) -> Result<(u32, u32), String> {
 
 /// Lines that motion comes from. Those of a STEP-NC file are places, not words of G-code.
 pub enum Lines<'a> {
-    /// Of G-code.
-    Code(Texts<'a>),
+    /// Of G-code; whether U V W are increments there.
+    Code(Texts<'a>, bool),
     /// Of STEP-NC.
     Instances(Texts<'a>),
 }
 
 impl gr_backends::Sources for Lines<'_> {
     fn place(&self, source: Source) -> (FileId, Span) {
-        let (Lines::Code(t) | Lines::Instances(t)) = self;
+        let (Lines::Code(t, _) | Lines::Instances(t)) = self;
         t.place(source)
     }
     fn line(&self, file: FileId, line: u32) -> Option<&str> {
         match self {
-            Lines::Code(t) => t.line(file, line),
+            Lines::Code(t, _) => t.line(file, line),
             Lines::Instances(_) => None,
         }
+    }
+    fn increments(&self) -> bool {
+        matches!(self, Lines::Code(_, true))
     }
 }
 
 /// The lines of a program.
 pub fn texts(motion: &Motion) -> Lines<'_> {
     let texts = Texts::new(motion.sources.iter().map(|(id, f)| (id, &*f.text)));
-    if motion.plan.is_some() { Lines::Instances(texts) } else { Lines::Code(texts) }
+    if motion.plan.is_some() { Lines::Instances(texts) } else { Lines::Code(texts, motion.increments) }
 }
 
 fn joints(motion: &Motion, goal: &Goal<'_>) -> Result<Made, String> {

@@ -130,6 +130,8 @@ pub struct Motion {
     pub plan: Option<Plan>,
     /// Setups of the job file.
     pub setups: Vec<gr_robot::Setup>,
+    /// U V W of the text are increments of X Y Z: a lathe's.
+    pub increments: bool,
 }
 
 /// Runs, lowers and checks a program.
@@ -143,7 +145,8 @@ pub fn motion(unit: &Unit, machine: Option<&gr_machine::Machine>) -> Result<(Mot
     }
     let motion = gr_driver::lower(&unit.name(), unit.text.clone(), &unit.setup, Some(&unit.rules()));
     let checked = if motion.clean { unit.told(Checked::nothing()) } else { unit.check()? };
-    Ok((plain(motion), checked))
+    let increments = unit.setup.dialect.id == "fanuc-turn";
+    Ok((Motion { increments, ..plain(motion) }, checked))
 }
 
 /// Motion of a text of our own making.
@@ -156,7 +159,7 @@ fn plain(motion: gr_driver::Motion) -> Motion {
     for (name, text) in motion.texts {
         sources.add(name, text);
     }
-    Motion { program: motion.program, sources, subs: motion.subs, found: Vec::new(), plan: None, setups: Vec::new() }
+    Motion { program: motion.program, sources, subs: motion.subs, found: Vec::new(), plan: None, setups: Vec::new(), increments: false }
 }
 
 /// Motion of a program for a machine, in whatever language it is.
@@ -177,5 +180,5 @@ fn ufmg(name: &str, text: &str, dialect: &'static gr_spec::Dialect, machine: Opt
     found.extend(more);
     let mut sources = Sources::default();
     sources.add(name, text);
-    Motion { program, sources, subs: Vec::new(), found, plan: None, setups: Vec::new() }
+    Motion { program, sources, subs: Vec::new(), found, plan: None, setups: Vec::new(), increments: false }
 }

@@ -301,7 +301,7 @@ pub fn subroutine_paths(setup: &Setup, name: &str) -> Vec<PathBuf> {
             _ => expanded,
         }
     };
-    let mut out = vec![PathBuf::from(&file)];
+    let mut out = vec![setup.base.as_deref().map_or_else(|| PathBuf::from(&file), |base| base.join(&file))];
     if let Some(dir) = ini.get("display", "program_prefix") {
         out.push(folder(dir).join(&file));
     }

@@ -18,6 +18,8 @@ pub struct Setup {
     pub params: BTreeMap<u32, f64>,
     /// INI file.
     pub ini: Ini,
+    /// Folder in which files of subroutines are looked for first; none = the folder the command runs in.
+    pub base: Option<std::path::PathBuf>,
     /// Skip lines that begin with `/`.
     pub block_delete: bool,
     /// Limits.
@@ -46,6 +48,7 @@ impl Default for Setup {
             tools: ToolTable::default(),
             params: BTreeMap::new(),
             ini: Ini::default(),
+            base: None,
             block_delete: false,
             budgets: Budgets::default(),
             user_m_codes: true,

@@ -160,6 +160,7 @@ struct Conditions {
     feed: f64,
     spindles: [Spindle; 8],
     coolant: (bool, bool),
+    work: u8,
 }
 
 impl Conditions {
@@ -179,7 +180,8 @@ impl Conditions {
             None => state.feed,
         };
         let coolant = (state.flood, state.mist);
-        Conditions { class, tool: state.tool, mode: state.feed_mode, feed, spindles: state.spindles, coolant }
+        let (tool, mode, spindles) = (state.tool, state.feed_mode, state.spindles);
+        Conditions { class, tool, mode, feed, spindles, coolant, work: state.work }
     }
 }
 
@@ -367,6 +369,7 @@ struct Told {
     tools: Option<(i32, i32)>,
     spindles: Option<([Spindle; 8], [Spindle; 8])>,
     coolant: Option<((bool, bool), (bool, bool))>,
+    works: Option<(u8, u8)>,
     /// A difference of rapids, which is told where nothing but rapids follows.
     rapid: Option<(Conditions, Conditions, Spot, Spot)>,
     cut: bool,
@@ -385,6 +388,9 @@ impl Told {
         let mut note = |aspect, message| out.note(tolerance.limit, aspect, at.0, at.1, message);
         if changed(&mut self.tools, (c.tool, d.tool), c.tool != d.tool) {
             note(Aspect::Tool, format!("works with tool {}, the other with tool {}", c.tool, d.tool));
+        }
+        if changed(&mut self.works, (c.work, d.work), c.work != d.work) {
+            note(Aspect::Event, format!("works in {}, the other in {}", system(c.work), system(d.work)));
         }
         if cuts && c.class != Class::Tap && (c.mode != d.mode || !close(c.feed, d.feed, tolerance.rate)) {
             note(Aspect::Feed, format!("feeds {}, the other {}", feed_text(c), feed_text(d)));
@@ -420,6 +426,14 @@ fn changed<T: PartialEq>(told: &mut Option<T>, pair: T, differs: bool) -> bool {
     let fresh = new.is_some() && *told != new;
     *told = new;
     fresh
+}
+
+/// `G54` … `G59.3`
+fn system(work: u8) -> String {
+    match work {
+        0..=6 => format!("G{}", 53 + work),
+        _ => format!("G59.{}", work - 6),
+    }
 }
 
 fn same_spindles(c: &Conditions, d: &Conditions, rate: f64) -> bool {

@@ -9,6 +9,10 @@ pub trait Sources {
     fn place(&self, source: Source) -> (FileId, Span);
     /// The text of a line (from 0); none where there is no such line or no text.
     fn line(&self, file: FileId, line: u32) -> Option<&str>;
+    /// Whether U V W H of the text are increments of X Y Z C (a lathe's G-code system A).
+    fn increments(&self) -> bool {
+        false
+    }
 }
 
 /// No text at hand.

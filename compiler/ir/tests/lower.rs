@@ -300,6 +300,7 @@ fn feeds_tools_and_events_are_told_apart() {
         (3, Call::FloodOn, Aspect::Coolant),
         (5, Call::Dwell(2.0), Aspect::Event),
         (4, Call::StraightTraverse(at(1.0, 0.0, 0.0)), Aspect::Path),
+        (3, Call::SetG5xOffset(2, at(0.0, 0.0, 0.0)), Aspect::Event),
     ];
     for (index, call, aspect) in cases {
         let mut other = base.clone();

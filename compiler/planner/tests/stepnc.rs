@@ -251,6 +251,6 @@ fn an_unknown_tool_is_told() {
     };
     let told = |name: &str| (code::STEPNC_TOOL_UNKNOWN, name.to_string());
     assert_eq!(notes(Vec::new()), [told("the tool"), told("tool 2")]);
-    assert_eq!(notes(vec![(0, 3.0, 0.0), (2, 0.0, 10.0)]), [told("tool 2")]);
-    assert_eq!(notes(vec![(0, 3.0, 0.0), (2, 6.0, 10.0)]), []);
+    assert_eq!(notes(vec![(2, 0.0, 10.0)]), [told("the tool"), told("tool 2")]);
+    assert_eq!(notes(vec![(2, 6.0, 10.0)]), [told("the tool")]);
 }

@@ -235,16 +235,17 @@ fn gcode_actions(view: &mut View, at: Span, rewrite: bool, ending: bool) -> Answ
     let (last, ends) = gcode::actions::end_line(doc);
     let end = if ending { session.state_at(file, last)?.map(|s| if ends { s.before } else { s.after }) } else { None };
     let ending = gcode::actions::missing_end(doc, end.as_ref());
-    if !rewrite {
+    if !rewrite || gcode::actions::skips_blocks(doc) {
         return Ok((Vec::new(), ending));
     }
     let line = doc.line_at(at.start).map_or(0, |l| l.line);
     let traced = super::look::trace_line(view, line, &[])?;
-    let contour = gcode::actions::compensated_lines(doc, line);
-    let contour = match contour {
-        Some(lines) => Some((lines.clone(), session.trace(file, lines, &[], super::MOST_BLOCKS)?)),
-        None => None,
+    let traced_lines = |lines: Option<std::ops::Range<u32>>| -> Answer<Option<(std::ops::Range<u32>, Vec<_>)>> {
+        let Some(lines) = lines else { return Ok(None) };
+        Ok(Some((lines.clone(), session.trace(file, lines, &[], super::MOST_BLOCKS)?)))
     };
+    let contour = traced_lines(gcode::actions::compensated_lines(doc, line))?;
+    let cycle = traced_lines(gcode::actions::cycle_lines(doc, line))?;
     let may_call = doc.line(line).is_some_and(|l| l.has_code(b'm', 980) || l.words().iter().any(|w| w.form == gr_gcode::Form::Control));
     let call = if may_call { names::calls(doc).into_iter().find(|c| c.line == line) } else { None };
     let behind = if call.is_some() { session.state_at(file, line + 1)?.map(|s| s.before) } else { None };
@@ -255,11 +256,13 @@ fn gcode_actions(view: &mut View, at: Span, rewrite: bool, ending: bool) -> Answ
     let once = |lines: std::ops::Range<u32>| !flows || motion.as_ref().is_some_and(|m| lines.clone().all(|l| runs_once(m, l)));
     let run = traced.as_ref().map(|t| (&t.before, &t.after, &t.program));
     let mut found = gcode::actions::actions(doc, at, Context { run, once: once(line..line + 1) });
-    if let Some((lines, traced)) = &contour
-        && once(lines.clone())
-    {
+    for (series, compensated) in [(&contour, true), (&cycle, false)] {
+        let Some((lines, traced)) = series.as_ref().filter(|(lines, _)| once(lines.clone())) else { continue };
         let ran: Vec<(u32, &gr_interp::Modal, &gr_interp::Modal, &Program)> = traced.iter().map(|t| (t.line, &t.before, &t.after, &t.program)).collect();
-        found.extend(gcode::actions::write_out_compensation(doc, lines.clone(), &ran));
+        found.extend(match compensated {
+            true => gcode::actions::write_out_compensation(doc, lines.clone(), &ran),
+            false => gcode::actions::write_out_cycle(doc, lines.clone(), &ran),
+        });
     }
     if let (Some(t), Some(call), Some(motion), Some(behind)) = (&traced, &call, &motion, &behind)
         && !leaves_values(doc, call)
@@ -316,7 +319,7 @@ fn expand_call(motion: &Motion, doc: gcode::Doc<'_>, call: &names::CallSite, bef
     let first = words.iter().find(|w| w.form != gr_gcode::Form::Comment && w.letter != b'n')?;
     let last = words.iter().rfind(|w| w.form != gr_gcode::Form::Comment)?;
     let span = Span::new(of.tight(first).start, of.tight(last).end);
-    let (text, code) = write_moves(&moves, before, after, false)?;
+    let (text, code) = write_moves(doc.dialect, &moves, before, after, false)?;
     let mut edits = vec![Edit { span, text }];
     edits.extend(gcode::actions::goes_on(doc, call.line, code, after)?);
     let title = format!("Write out this call of {}", names::label_text(&call.label));

@@ -84,12 +84,15 @@ fn other_subs(view: &View, dialect: &'static gr_spec::Dialect) -> Vec<(String, S
 }
 
 fn item(view: &View, n: usize, c: Completion) -> lsp::CompletionItem {
+    // Editors compare this with the text that is replaced, and that may begin with a bracket or a quote.
+    let quoted = c.insert.starts_with(|first: char| first.is_ascii_punctuation() && !c.label.starts_with(first));
+    let filter = if quoted { without_fields(&c.insert) } else { c.label.clone() };
     lsp::CompletionItem {
         kind: Some(completion_kind(c.kind)),
         detail: (!c.detail.is_empty()).then_some(c.detail),
         documentation: (!c.documentation.is_empty()).then(|| lsp::Documentation::MarkupContent(markdown(c.documentation))),
         sort_text: Some(format!("{}{n:05}", c.rank)),
-        filter_text: Some(c.label.clone()),
+        filter_text: Some(filter),
         insert_text_format: Some(if c.snippet { lsp::InsertTextFormat::SNIPPET } else { lsp::InsertTextFormat::PLAIN_TEXT }),
         text_edit: Some(lsp::CompletionTextEdit::Edit(lsp::TextEdit { range: view.range(c.replace), new_text: c.insert })),
         label: c.label,

@@ -133,7 +133,7 @@ impl<'a> Emitter<'a> {
         {
             return Some(w);
         }
-        let words = Words::of(self.sources.line(source.file, source.line)?);
+        let words = Words::at(self.sources, source.file, source.line)?;
         self.words_of = Some((source, words));
         Some(words)
     }
@@ -334,7 +334,7 @@ impl<'a> Emitter<'a> {
             (Stop::Optional, _) => self.w.block("M1"),
             // The end with pallet change is M30.
             (Stop::Pallet, Some(Op::End)) => {}
-            (Stop::Pallet, Some(Op::Stop(Stop::Program))) if self.options.language != Language::Grbl => {
+            (Stop::Pallet, Some(Op::Stop(Stop::Program))) if self.linuxcnc() => {
                 self.w.block("M60");
                 self.done_until = view.index + 2;
             }

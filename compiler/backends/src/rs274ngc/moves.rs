@@ -66,13 +66,18 @@ impl Emitter<'_> {
         }
         if out.is_empty() {
             // A move to where the axis is: one word keeps it in the program.
-            if let Some(i) = (0..9).find(|i| self.anchored[*i] && self.given(*i, source)) {
+            if let Some(i) = (0..9).find(|i| self.anchored[*i] && self.has_axis(*i) && self.given(*i, source)) {
                 let (text, said) = self.w.axis(i, end.axes[i]);
                 self.set(i, said);
                 out.push(format!("{}{text}", AXES[i]));
             }
         }
         out
+    }
+
+    /// grbl has words for three axes; where another would move, that is told.
+    fn has_axis(&self, axis: usize) -> bool {
+        axis < 3 || self.options.language != Language::Grbl
     }
 
     fn set(&mut self, axis: usize, said: f64) {
@@ -158,7 +163,7 @@ impl Emitter<'_> {
         for i in 0..9 {
             // Rotation leaves rounding dust in an axis that stands still.
             let moves = (goal[i] - from[i]).abs() > 1e-9;
-            if moves || forced.contains(&i) || (self.words(view.source).is_some() && self.given(i, view.source)) {
+            if moves || forced.contains(&i) || (self.has_axis(i) && self.words(view.source).is_some() && self.given(i, view.source)) {
                 let (text, said) = self.w.axis(i, goal[i]);
                 reached[i] = said;
                 words.push(format!("{}{text}", AXES[i]));
@@ -189,7 +194,7 @@ impl Emitter<'_> {
             let words = self.axis_words(view.start, view.end, view.source, &[]);
             return self.motion_block(0, &words, &[]);
         }
-        let named: Vec<usize> = (0..9).filter(|i| self.given(*i, view.source)).collect();
+        let named: Vec<usize> = (0..9).filter(|i| self.has_axis(*i) && self.given(*i, view.source)).collect();
         let all = self.options.language == Language::FanucMill && named.is_empty();
         let axes = if all { vec![0, 1, 2] } else { named };
         let through = if second.is_some() { view.end } else { view.start };
@@ -282,6 +287,10 @@ impl Emitter<'_> {
             if bottom[i] != view.start.axes[i] {
                 words.push(format!("{}{}", AXES[i], self.w.axis(i, bottom[i]).0));
             }
+        }
+        if words.len() == 1 {
+            // A tap that goes nowhere still has to name an axis.
+            words.push(format!("Z{}", self.w.axis(2, bottom[2]).0));
         }
         words.push(format!("K{}", self.w.length(sync.per_rev, self.w.places.max(6)).0));
         if scale != 1.0 && scale != 0.0 {

@@ -74,7 +74,9 @@ fn own_station(path: &Path, settings: &Settings) -> (crate::setup::Station, Sour
     let mut sources = Sources::default();
     let mut renderer = Renderer::collecting();
     let from = path.parent().unwrap_or(Path::new("."));
-    let station = assembled(&setup_args(settings), &lints, from, &mut sources, &mut renderer);
+    let mut station = assembled(&setup_args(settings), &lints, from, &mut sources, &mut renderer);
+    // Where the server was started says nothing about the program.
+    station.setup.base = Some(from.to_path_buf());
     (station, sources, renderer.into_collected())
 }
 

@@ -506,6 +506,86 @@ fn actions_for_cycles_compensation_units_and_ends() {
     c.shut_down();
 }
 
+/// A cycle with all blocks that go on with it; arcs whose plane or unit stands in their own block.
+#[test]
+fn actions_know_the_block_itself() {
+    let text = "G21 G90 G17 G98 F100 S1000 M3\nG0 X0 Y0 Z5\nG81 X5 Y5 Z-3 R2\nX15\n\nX25 Y10\nG80\nG1 X0 Y0 Z4\nG18 G3 X5 Z8 R9\nG20 G17 G3 X1 Y0 R2\nG1 A90\nM5\nM2\n";
+    let mut c = Client::new(&[("a.ngc", text)], json!({}));
+    let uri = c.open("a.ngc", None);
+    for at in ["G8|1", "X1|5", "X2|5"] {
+        insta::assert_snapshot!("cycle_series", act(&mut c, &uri, at, "Write out this G81 and the blocks"));
+    }
+    let arc = act(&mut c, &uri, "G3| X5", "Write the arc with its centre");
+    assert!(arc.contains("G18 G3 X5 Z8 I7.7545 K-4.5681\n"), "{arc}");
+    let inch = act(&mut c, &uri, "G3| X1 Y0", "Write the arc with its centre");
+    assert!(inch.contains("G20 G17 G3 X1 Y0 I"), "{inch}");
+    c.shut_down();
+}
+
+/// Rewritings that would do something else are not there: Fanuc's dwell in milliseconds, the motion that G80 goes back to,
+/// blocks that a switch of the machine skips.
+#[test]
+fn rewritings_keep_to_the_control() {
+    let titles = |text: &str, name: &str, settings: Value, at: &str| {
+        let mut c = Client::new(&[(name, text)], settings);
+        let uri = c.open(name, None);
+        let position = c.position(&uri, at);
+        let params = json!({ "textDocument": { "uri": uri }, "range": { "start": position, "end": position }, "context": { "diagnostics": [] } });
+        let found = c.request("textDocument/codeAction", params);
+        let found: Vec<(String, String)> = found.as_array().into_iter().flatten()
+            .filter(|a| a["title"].as_str().is_some_and(|t| t.starts_with("Write")))
+            .map(|a| (a["title"].as_str().unwrap_or_default().to_string(), c.edited(&uri, &a["edit"])))
+            .collect();
+        c.shut_down();
+        found
+    };
+    let fanuc = json!({ "dialect": "fanuc-mill" });
+    let head = "O1\nG21 G90 G17 G98 G94 F100.\nS500 M3\nG0 X0 Y0 Z5.\n";
+    let dwell = titles(&format!("{head}G82 X1. Z-1. R1. P500\nG80\nG0 X0\nM5\nM30\n"), "a.nc", fanuc.clone(), "G8|2");
+    assert!(dwell.len() == 1 && dwell[0].1.contains("G4 P500\n"), "{dwell:?}");
+    for text in ["G81 X1. Z-1. R1.\nG80\nX5.\nM5\nM30\n", "/G81 X1. Z-1. R1.\nG80\nG0 X5.\nM5\nM30\n"] {
+        let found = titles(&format!("{head}{text}"), "a.nc", fanuc.clone(), "G8|1");
+        assert!(found.is_empty(), "{found:?}");
+    }
+    let twice = titles(&format!("{head}G81 X1. Z-1. R1.\nG80\nG81 X2. Z-1. R1.\nG80\nG0 X0\nM5\nM30\n"), "a.nc", fanuc, "G8|1 X1");
+    assert!(twice.len() == 1 && !twice[0].1.contains("G81 G81"), "{twice:?}");
+    let arc = "G21 G90 G17 F100\n/G0 X3\nG2 X10 Y0 R9\nM2\n";
+    assert_eq!(titles(arc, "a.ngc", json!({}), "G|2 X"), []);
+}
+
+/// Subroutines lie beside their program, wherever the server was started and whatever lies in other folders.
+#[test]
+fn subroutines_lie_beside_their_program() {
+    let main = "G21 G90 F100\no<sq> call\nM2\n";
+    let (good, bad) = ("o<sq> sub\nG1 X1\no<sq> endsub\n", "o<sq> sub\nG1 X[1/0]\no<sq> endsub\n");
+    let files = [("u/main.ngc", main), ("u/sq.ngc", good), ("w/main.ngc", main), ("w/sq.ngc", bad)];
+    let mut c = Client::new(&files, json!({}));
+    let codes = |found: &[Value]| found.iter().filter(|d| d["severity"] == 1).filter_map(|d| d["code"].as_str().map(str::to_string)).collect::<Vec<_>>();
+    let u = c.open("u/main.ngc", None);
+    let found = c.diagnostics(&u);
+    assert_eq!(codes(&found), Vec::<String>::new(), "{found:?}");
+    let w = c.open("w/main.ngc", None);
+    let found = c.diagnostics(&w);
+    assert_eq!(codes(&found).len(), 1, "{found:?}");
+    assert_ne!(codes(&found), ["E0250"], "{found:?}");
+    c.shut_down();
+}
+
+/// Where the last line is empty, a new block begins there.
+#[test]
+fn completion_on_the_line_that_is_not_there_yet() {
+    let text = "G21 G90\nG1 F100 X1\n";
+    let mut c = Client::new(&[("a.ngc", text)], json!({}));
+    let uri = c.open("a.ngc", None);
+    let params = json!({ "textDocument": { "uri": uri }, "position": { "line": 2, "character": 0 } });
+    let found = c.request("textDocument/completion", params);
+    let items = found["items"].as_array().expect("a list");
+    assert!(items.iter().any(|i| i["label"] == "G2"), "{found}");
+    let empty = json!({ "line": 2, "character": 0 });
+    assert!(items.iter().all(|i| i["textEdit"]["range"] == json!({ "start": empty, "end": empty })), "{found}");
+    c.shut_down();
+}
+
 #[test]
 fn fixes_of_diagnostics() {
     let text = "G21 G90 F100\nG1 XO\nG1 X1,5\n(end\nM2\n";

@@ -54,15 +54,16 @@ fn other_arc_form(line: &LineOf<'_>, before: &Modal, after: &Modal, program: &Pr
     if words.is_empty() || !literal || arc.turns.abs() > 1 || line.word(b'p').is_some() {
         return None;
     }
-    let scale = if before.units() == Units::Inch { 25.4 } else { 1.0 };
-    let places = if before.units() == Units::Inch { 5 } else { 4 };
+    // Plane, unit and kind of centre may stand in the block itself: they hold before it moves.
+    let scale = if after.units() == Units::Inch { 25.4 } else { 1.0 };
+    let places = if after.units() == Units::Inch { 5 } else { 4 };
     let shape = ArcShape::new(&arc, &step.start, &step.end);
-    let (first, second, _) = gr_ir::plane_axes(before.plane());
+    let (first, second, _) = gr_ir::plane_axes(after.plane());
     let (title, text) = if words.iter().any(|w| w.letter == b'r') {
         let start = step.start.xyz();
-        let base = |i: usize| if before.ijk_absolute != 0 { 0.0 } else { start[i] };
+        let base = |i: usize| if after.ijk_absolute != 0 { 0.0 } else { start[i] };
         let word = |i: usize| format!("{}{}", ['I', 'J', 'K'][i.min(2)], number((shape.center[i] - base(i)) / scale, places));
-        ("Write the arc with its centre (I J K)", format!("{} {}", word(first), word(second)))
+        ("Write the arc with its centre (I J K)", format!("{} {}", word(first.min(second)), word(first.max(second))))
     } else {
         // A whole circle has no radius form, and near half a turn it is vague.
         let degrees = shape.sweep.to_degrees().abs();
@@ -79,6 +80,50 @@ fn other_arc_form(line: &LineOf<'_>, before: &Modal, after: &Modal, program: &Pr
         edits = words.iter().enumerate().map(|(i, w)| Edit { span: line.tight(w), text: if i == 0 { text.clone() } else { String::new() } }).collect();
     }
     Some(Action { title: title.into(), kind: ActionKind::Rewrite, edits })
+}
+
+/// The code of a block that says how it moves: those of drilling cycles and G80 too, which are a group of their own on
+/// some controls.
+fn motion_code(doc: Doc<'_>, line: &LineOf<'_>) -> Option<f64> {
+    let mut codes = line.words().iter().filter(|w| w.letter == b'g' && w.form == Form::Literal);
+    let moves = |w: &&gr_gcode::Word| {
+        matches!(w.value, 73.0 | 74.0 | 76.0) || (80.0..90.0).contains(&w.value)
+            || doc.dialect.code(&code_name(w.letter, w.value)).is_some_and(|c| c.group == "motion")
+    };
+    codes.find(moves).map(|w| w.value)
+}
+
+/// Whether blocks are skipped by a switch of the machine: what another block does then hangs on it.
+pub fn skips_blocks(doc: Doc<'_>) -> bool {
+    doc.file.chunks.iter().any(|c| c.scan.lines.iter().any(|l| l.deleted))
+}
+
+/// Whether the next motion is a cycle without a G80 before it: as one in a row it goes to its hole before it goes down to
+/// its R, behind plain moves it does not.
+fn a_cycle_follows(doc: Doc<'_>, line: u32) -> bool {
+    let next = doc.lines(line + 1..doc.count()).find_map(|l| motion_code(doc, &l));
+    next.is_some_and(|v| v == 73.0 || v == 74.0 || (81.0..90.0).contains(&v))
+}
+
+/// Fanuc: whether the block behind the end of a cycle goes on with the motion of before it, which the moves written in
+/// place of the cycle are no longer.
+fn back_to_old_motion(doc: Doc<'_>, line: u32) -> bool {
+    if doc.dialect.family != gr_spec::Family::Fanuc {
+        return false;
+    }
+    let axis = |l: &LineOf<'_>| l.words().iter().any(|w| matches!(w.letter, b'x' | b'y' | b'z' | b'a' | b'b' | b'c' | b'u' | b'v' | b'w' | b'h'));
+    let mut ended = false;
+    for l in doc.lines(line + 1..doc.count()) {
+        match motion_code(doc, &l) {
+            Some(80.0) => ended = true,
+            Some(_) => return false,
+            None => {}
+        }
+        if ended && axis(&l) {
+            return true;
+        }
+    }
+    false
 }
 
 /// Whether a block behind a line goes on with its cycle, or takes over words of it: depth, R, P or Q.
@@ -116,7 +161,7 @@ fn expand(doc: Doc<'_>, line: &LineOf<'_>, before: &Modal, after: &Modal, progra
     let moves = program.steps().filter(|s| s.op.moves()).count();
     // A setting in the block would be lost with its words.
     let sets = line.words().iter().any(|w| matches!(w.form, Form::Setting | Form::Control | Form::Bad));
-    if moves == 0 || moves > MOST_MOVES || !cycle || sets || is_shifted(before) || is_shifted(after) || is_leant_on(doc, line.line) {
+    if moves == 0 || moves > MOST_MOVES || !cycle || sets || is_shifted(before) || is_shifted(after) || is_leant_on(doc, line.line) || a_cycle_follows(doc, line.line) || back_to_old_motion(doc, line.line) {
         return None;
     }
     // A block that goes on with a cycle takes more from it than its words.
@@ -124,7 +169,7 @@ fn expand(doc: Doc<'_>, line: &LineOf<'_>, before: &Modal, after: &Modal, progra
         return None;
     }
     let title = format!("Write out this {}", code_name(b'g', f64::from(after.motion) / 10.0));
-    let (text, code) = write_moves(program, before, after, false)?;
+    let (text, code) = write_moves(doc.dialect, program, before, after, false)?;
     let words = line.words();
     let first = words.iter().find(|w| w.form != Form::Comment && !(w.letter == b'n'))?;
     let last = words.iter().rfind(|w| w.form != Form::Comment)?;
@@ -144,10 +189,7 @@ pub fn goes_on(doc: Doc<'_>, line: u32, code: &str, after: &Modal) -> Option<Opt
     if after.motion < 0 || after.motion == 800 || wanted == code {
         return Some(None);
     }
-    let motion = |l: &LineOf<'_>| {
-        let code = |w: &&gr_gcode::Word| w.letter == b'g' && w.form == Form::Literal;
-        l.words().iter().filter(code).any(|w| doc.dialect.code(&code_name(w.letter, w.value)).is_some_and(|c| c.group == "motion"))
-    };
+    let motion = |l: &LineOf<'_>| motion_code(doc, l).is_some();
     let unclear = |l: &LineOf<'_>| l.words().iter().any(|w| matches!(w.form, Form::Control | Form::Bad) || w.form == Form::Expr && w.letter == b'g') || l.has_code(b'm', 980) || l.has_code(b'm', 990);
     let axis = |w: &&gr_gcode::Word| matches!(w.letter, b'x' | b'y' | b'z' | b'a' | b'b' | b'c' | b'u' | b'v' | b'w' | b'@' | b'^');
     let mut next = None;
@@ -258,19 +300,50 @@ pub fn write_out_compensation(doc: Doc<'_>, lines: std::ops::Range<u32>, ran: &[
     if !there && doc.lines(last.0 + 1..doc.count()).any(|l| l.words().iter().any(|w| matches!(w.letter, b'x' | b'y' | b'z' | b'u' | b'v' | b'w' | b'@' | b'^') || w.form == Form::Control)) {
         return None;
     }
+    let edits = write_out(doc, lines, ran, true)?;
+    Some(Action { title: "Write out this contour without compensation".into(), kind: ActionKind::Inline, edits })
+}
+
+/// The blocks of a drilling cycle and of what goes on with it, when they are more than one.
+pub fn cycle_lines(doc: Doc<'_>, line: u32) -> Option<std::ops::Range<u32>> {
+    const MOST_LINES: u32 = 1_000;
+    let motion = |l: &LineOf<'_>| motion_code(doc, l);
+    let first = (line.saturating_sub(MOST_LINES)..line + 1).rev().filter_map(|n| doc.line(n)).find(|l| motion(l).is_some())?;
+    motion(&first).filter(|v| *v == 73.0 || *v == 74.0 || (81.0..90.0).contains(v))?;
+    let ends = |l: &LineOf<'_>| motion(l).is_some() || l.words().iter().any(|w| matches!(w.form, Form::Control | Form::Setting | Form::Bad) || w.letter == b'm');
+    let behind = doc.lines(first.line + 1..first.line + MOST_LINES).take_while(|l| !ends(l));
+    let last = behind.filter(|l| l.words().iter().any(|w| matches!(w.letter, b'x' | b'y' | b'z'))).last()?.line;
+    (line <= last).then(|| first.line..last + 1)
+}
+
+/// Writes the moves of a drilling cycle and of the blocks that go on with it.
+pub fn write_out_cycle(doc: Doc<'_>, lines: std::ops::Range<u32>, ran: &[(u32, &Modal, &Modal, &Program)]) -> Option<Action> {
+    let moves: usize = ran.iter().map(|r| r.3.steps().filter(|s| s.op.moves()).count()).sum();
+    let (first, last) = (ran.first()?, ran.last()?);
+    if moves > MOST_MOVES || ran.iter().any(|r| is_shifted(r.1) || is_shifted(r.2)) || is_leant_on(doc, last.0) || a_cycle_follows(doc, last.0) || back_to_old_motion(doc, last.0) {
+        return None;
+    }
+    let edits = write_out(doc, lines, ran, false)?;
+    let name = code_name(b'g', f64::from(first.2.motion) / 10.0);
+    Some(Action { title: format!("Write out this {name} and the blocks that go on with it"), kind: ActionKind::Inline, edits })
+}
+
+/// The moves of each line in place of its words, and what the next block needs then.
+fn write_out(doc: Doc<'_>, lines: std::ops::Range<u32>, ran: &[(u32, &Modal, &Modal, &Program)], compensated: bool) -> Option<Vec<Edit>> {
+    let end = ran.last()?;
     let (mut edits, mut code) = (Vec::new(), "");
     for line in doc.lines(lines) {
         let words = line.words();
         let Some(first) = words.iter().find(|w| w.form != Form::Comment && w.letter != b'n') else { continue };
         let last = words.iter().rfind(|w| w.form != Form::Comment)?;
         let (_, before, after, program) = ran.iter().find(|r| r.0 == line.line)?;
-        let (text, last_code) = write_moves(program, before, after, true)?;
+        let (text, last_code) = write_moves(doc.dialect, program, before, after, compensated)?;
         code = if last_code.is_empty() { code } else { last_code };
         edits.push(Edit { span: Span::new(line.tight(first).start, line.tight(last).end), text });
     }
     // Blocks behind it that say no code go on with the last one.
-    edits.extend(goes_on(doc, last.0, code, last.2)?);
-    Some(Action { title: "Write out this contour without compensation".into(), kind: ActionKind::Inline, edits })
+    edits.extend(goes_on(doc, end.0, code, end.2)?);
+    Some(edits)
 }
 
 /// Whether two states differ in nothing but place, feed, distance mode, level of return, motion code and the memory
@@ -291,7 +364,7 @@ fn alike(before: &Modal, after: &Modal, compensated: bool) -> bool {
 
 /// Moves as plain G0 G1 G2 G3 G4 in absolute distance, with what else the block leaves behind, and the last code of them.
 /// None where the program does more than these can say, or where F is not a feed per minute.
-pub fn write_moves(program: &Program, before: &Modal, after: &Modal, compensated: bool) -> Option<(String, &'static str)> {
+pub fn write_moves(dialect: &gr_spec::Dialect, program: &Program, before: &Modal, after: &Modal, compensated: bool) -> Option<(String, &'static str)> {
     if before.feed_mode != 0 || !alike(before, after, compensated) {
         return None;
     }
@@ -325,7 +398,9 @@ pub fn write_moves(program: &Program, before: &Modal, after: &Modal, compensated
                 (new, format!("{}{}{}{turns}", axes(&view.start.axes, &view.end.axes, false), word(first), word(second)))
             }
             Op::Dwell(s) => {
-                lines.push(format!("G4 P{}", number(s, 3)));
+                // Fanuc counts in milliseconds.
+                let (value, places) = if dialect.family == gr_spec::Family::Fanuc { (s * 1e3, 0) } else { (s, 3) };
+                lines.push(format!("G4 P{}", number(value, places)));
                 continue;
             }
             // Cycles keep to the exact path and give back what was in force.
@@ -464,12 +539,17 @@ pub fn units_title(line: &LineOf<'_>) -> Option<&'static str> {
 pub fn convert_units(doc: Doc<'_>, line: &LineOf<'_>, before: Option<&Modal>) -> Option<Action> {
     let title = units_title(line)?;
     let to_inch = line.words().iter().find(is_unit)?.value == 21.0;
-    if doc.len() > 4_000_000 {
+    if doc.len() > 4_000_000 || doc.dialect.id == "fanuc-turn" {
         return None;
     }
     // Inverse time, tables, surface speed, diameters: numbers whose unit is another, or of another block. Increments and
     // feeds per revolution: a rounded value adds up, or is too coarse.
-    let strange = |l: LineOf<'_>| [930, 100, 960, 70, 910, 911, 950].iter().any(|c| l.has_code(b'g', *c)) || l.has_code(b'm', 980) || l.has_code(b'g', 650) || l.has_code(b'g', 660);
+    // A thread makes another number of passes; the feed of rotary axes has no length in it.
+    let rotary = |l: &LineOf<'_>| {
+        let any = |letters: &[u8]| letters.iter().any(|x| l.word(*x).is_some());
+        any(b"abc") && !any(b"xyzuvw")
+    };
+    let strange = |l: LineOf<'_>| rotary(&l) || [930, 100, 960, 70, 760, 910, 911, 950].iter().any(|c| l.has_code(b'g', *c)) || l.has_code(b'm', 980) || l.has_code(b'g', 650) || l.has_code(b'g', 660);
     if doc.lines(0..doc.count()).any(strange) {
         return None;
     }
