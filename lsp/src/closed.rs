@@ -66,7 +66,7 @@ impl Closed {
         have: &BTreeMap<lsp::Uri, String>,
     ) -> (Vec<PathBuf>, Vec<lsp::WorkspaceDocumentDiagnosticReport>) {
         let (mut new, mut items) = (Vec::new(), Vec::new());
-        let paths = workspace.programs();
+        let paths = workspace.programs_and_plans();
         self.known.retain(|path, _| paths.contains(path) && !open.contains(path));
         for path in paths {
             let Some(uri) = lsp::Uri::from_file_path(&path).filter(|_| !open.contains(&path)) else { continue };

@@ -172,7 +172,7 @@ impl Backend {
         if !self.abilities().watching {
             return;
         }
-        let globs = ["**/gcc-robot.toml", "**/*.{tbl,var,ini,inc,toml}", "**/*.{ngc,nc,tap,cnc,g}"];
+        let globs = ["**/gcc-robot.toml", "**/*.{tbl,var,ini,inc,toml}", "**/*.{ngc,nc,tap,cnc,g}", "**/*.{p21,stpnc,stp,step}"];
         let options = json!({ "watchers": globs.map(|g| json!({ "globPattern": g })) });
         let registration = lsp::Registration {
             id: "gcc-robot/files".into(),

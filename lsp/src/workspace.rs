@@ -50,9 +50,16 @@ impl Workspace {
     }
     /// G-code programs in the folders, in order.
     pub fn programs(&self) -> Vec<PathBuf> {
+        self.files_that(is_program)
+    }
+    /// G-code programs and STEP-NC files in the folders.
+    pub fn programs_and_plans(&self) -> Vec<PathBuf> {
+        self.files_that(|path| is_program(path) || is_plan(path))
+    }
+    fn files_that(&self, wanted: fn(&Path) -> bool) -> Vec<PathBuf> {
         let mut found = Vec::new();
         for folder in self.folders() {
-            walk(&folder, 0, &mut found);
+            walk(&folder, 0, wanted, &mut found);
         }
         found.sort();
         found.dedup();
@@ -85,7 +92,13 @@ pub fn is_program(path: &Path) -> bool {
         || Dialect::all().iter().any(|d| d.extensions.contains(&extension.as_str()))
 }
 
-fn walk(folder: &Path, depth: u32, found: &mut Vec<PathBuf>) {
+/// Extensions of STEP-NC files. `.stp` and `.step` are mostly models of shapes: those are looked at when they are open.
+fn is_plan(path: &Path) -> bool {
+    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
+    matches!(extension.as_str(), "p21" | "stpnc")
+}
+
+fn walk(folder: &Path, depth: u32, wanted: fn(&Path) -> bool, found: &mut Vec<PathBuf>) {
     let Ok(entries) = std::fs::read_dir(folder) else { return };
     let mut entries: Vec<PathBuf> = entries.flatten().map(|e| e.path()).collect();
     entries.sort();
@@ -99,9 +112,9 @@ fn walk(folder: &Path, depth: u32, found: &mut Vec<PathBuf>) {
         }
         if path.is_dir() {
             if depth < MOST_DEPTH {
-                walk(&path, depth + 1, found);
+                walk(&path, depth + 1, wanted, found);
             }
-        } else if is_program(&path) {
+        } else if wanted(&path) {
             found.push(path);
         }
     }

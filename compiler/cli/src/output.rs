@@ -116,12 +116,23 @@ pub fn write_with(files: &[(PathBuf, Vec<u8>)], written: Vec<Pending>) -> Result
             p.flush()?;
             Ok(p)
         };
-        pending.push((path.clone(), write().map_err(|e| (path.clone(), e))?));
+        match write() {
+            Ok(p) => pending.push((path.clone(), p)),
+            Err(e) => {
+                drop_all(pending);
+                return Err((path.clone(), e));
+            }
+        }
     }
     for (path, p) in pending {
         p.commit().map_err(|e| (path, e))?;
     }
     Ok(())
+}
+
+/// Drops unfinished files, the last first: the first one may have made the folder of all.
+pub fn drop_all(mut pending: Vec<(PathBuf, Pending)>) {
+    while pending.pop().is_some() {}
 }
 
 /// Writes to standard output. A reader that went away (`| head`) is no error.

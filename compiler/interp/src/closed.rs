@@ -94,7 +94,13 @@ impl<S: Sink> Interp<'_, S> {
         let refused = match b.g(Group::NonModal) {
             100 if b.has(b'r') => Some(("R with G10", b'r')),
             100 if !matches!(b.get(b'l'), None | Some(2.0 | 20.0)) => Some(("G10 with an L other than 2 and 20", b'l')),
+            100 if b.get(b'p').is_some_and(|p| !(0.0..=6.0).contains(&p)) => Some(("G10 with a P above 6", b'p')),
+            100 if b.get(b'l').is_some() && !self.has_axes() => {
+                return Err(Fault::new(code::WORD_MISSING, rs274::SILENT).arg("G10").arg("X, Y or Z").at(b'g'));
+            }
             -1 if matches!(motion, 20 | 30) && b.has(b'p') => Some(("P with an arc", b'p')),
+            _ if b.g(Group::ToolLength) == 431 && (b.has(b'x') || b.has(b'y')) => Some(("G43.1 with an axis other than Z", b'g')),
+            _ if b.get(b't').is_some_and(|t| t > 255.0) => Some(("T above 255", b't')),
             _ => None,
         };
         refused.map_or(Ok(()), |(what, letter)| Err(self.not_in_dialect(what, OTHER_CODE).at(letter)))

@@ -197,6 +197,9 @@ fn dialects_are_closed_lists() {
         ("grbl", "G10 L10 P1 X1"),
         ("grbl", "G10 L2 P1 R30 X1"),
         ("grbl", "G2 X1 Y1 I.5 J.5 P2 F10"),
+        ("grbl", "G10 L20 P7 X0"),
+        ("grbl", "G43.1 X1"),
+        ("grbl", "T300"),
     ] {
         let (_, outcome) = run_in(id, &format!("{line}\nM30\n"));
         let fault = &outcome.findings[0].fault;

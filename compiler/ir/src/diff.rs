@@ -1,7 +1,7 @@
 //! Two programs compared as motion: where the tool goes in the machine, with which tool, how fast, and
 //! what else happens on the way. Not text, not the way a path is cut into blocks.
 
-use crate::geometry::{ArcShape, nurbs_point};
+use crate::geometry::{ArcShape, Length, length, nurbs_point};
 use crate::measure::{Rates, Totals, measure};
 use crate::{Axes, Cursor, FeedMode, Op, Pose, Program, Source, Spindle, State, Stop, Turn, View};
 
@@ -158,6 +158,8 @@ struct Conditions {
     tool: i32,
     mode: FeedMode,
     feed: f64,
+    /// The feed is that of rotary axes, rad/s.
+    angular: bool,
     spindles: [Spindle; 8],
     coolant: (bool, bool),
     work: u8,
@@ -174,20 +176,20 @@ impl Conditions {
             _ if sync.is_some() => Class::Sync,
             _ => Class::Feed,
         };
+        let angular = rotary_only(view);
         let feed = match sync {
             Some(s) => s.per_rev,
-            None if rotary_only(view) => state.feed_angular,
+            None if angular => state.feed_angular,
             None => state.feed,
         };
         let coolant = (state.flood, state.mist);
         let (tool, mode, spindles) = (state.tool, state.feed_mode, state.spindles);
-        Conditions { class, tool, mode, feed, spindles, coolant, work: state.work }
+        Conditions { class, tool, mode, feed, angular, spindles, coolant, work: state.work }
     }
 }
 
 fn rotary_only(view: &View<'_, '_>) -> bool {
-    let same = |i: usize| view.start.axes[i] == view.end.axes[i];
-    view.op == Op::Linear && [0, 1, 2, 6, 7, 8].into_iter().all(same)
+    view.op == Op::Linear && matches!(length(&view.op, view.start, view.end), Length::Angular(_))
 }
 
 /// Something that happens at a place.
@@ -392,7 +394,7 @@ impl Told {
         if changed(&mut self.works, (c.work, d.work), c.work != d.work) {
             note(Aspect::Event, format!("works in {}, the other in {}", system(c.work), system(d.work)));
         }
-        if cuts && c.class != Class::Tap && (c.mode != d.mode || !close(c.feed, d.feed, tolerance.rate)) {
+        if cuts && c.class != Class::Tap && (c.mode != d.mode || c.angular != d.angular || !close(c.feed, d.feed, tolerance.rate)) {
             note(Aspect::Feed, format!("feeds {}, the other {}", feed_text(c), feed_text(d)));
         }
         if cuts {
@@ -446,6 +448,7 @@ fn same_spindles(c: &Conditions, d: &Conditions, rate: f64) -> bool {
 fn feed_text(c: &Conditions) -> String {
     match (c.class, c.mode) {
         (Class::Sync, _) | (_, FeedMode::PerRev) => format!("{} mm/rev", c.feed),
+        (_, FeedMode::PerTime) if c.angular => format!("{} °/min", round(c.feed.to_degrees() * 60.0)),
         (_, FeedMode::PerTime) => format!("{} mm/min", round(c.feed * 60.0)),
         (_, FeedMode::Inverse) => format!("{} 1/min", round(c.feed * 60.0)),
     }

@@ -351,16 +351,20 @@ pub fn length(op: &Op<'_>, start: &Pose, end: &Pose) -> Length {
     }
 }
 
+/// Beside a rotary move, mm that offsets and units leave by rounding are none.
+const DUST: f64 = 1e-7;
+
 fn straight(start: &Pose, end: &Pose) -> Length {
     let d = |i: usize| end.axes[i] - start.axes[i];
+    let abc = norm([d(3), d(4), d(5)]);
+    let least = if abc > 0.0 { DUST } else { 0.0 };
     let xyz = norm([d(0), d(1), d(2)]);
-    if xyz > 0.0 {
+    if xyz > least {
         return Length::Linear(xyz);
     }
     let uvw = norm([d(6), d(7), d(8)]);
-    if uvw > 0.0 {
+    if uvw > least {
         return Length::Linear(uvw);
     }
-    let abc = norm([d(3), d(4), d(5)]);
     if abc > 0.0 { Length::Angular(abc) } else { Length::Linear(0.0) }
 }

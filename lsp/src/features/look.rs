@@ -39,7 +39,18 @@ pub(super) fn trace_line(view: &View, line: u32, wanted: &[Parameter]) -> Answer
     if dialect.family == gr_spec::Family::Ufmg2008 {
         return Ok(None);
     }
-    Ok(session.trace(file, line..line + 1, wanted, MOST_BLOCKS)?.into_iter().next())
+    let Some(mut traced) = session.trace(file, line..line + 1, wanted, MOST_BLOCKS)?.into_iter().next() else { return Ok(None) };
+    // A call's block is over when its subroutine is: the state then is that of before the next line.
+    let tables = (session.file(file)?, dialect);
+    let doc = doc(&tables);
+    let may_call = |l: gcode::doc::LineOf<'_>| l.has_code(b'm', 980) || l.has_code(b'g', 650) || l.words().iter().any(|w| w.form == gr_gcode::Form::Control);
+    if doc.line(line).is_some_and(may_call)
+        && names::calls(doc).iter().any(|c| c.line == line)
+        && let Some(next) = session.state_at(file, line + 1)?
+    {
+        traced.after = next.before;
+    }
+    Ok(Some(traced))
 }
 
 fn gcode_hover(view: &mut View, offset: u32) -> Answer<Option<gr_ide::Hover>> {

@@ -142,6 +142,7 @@ impl<'a> Round<'a> {
     }
 
     fn end(mut self, ran: bool) -> Ended {
+        crate::output::drop_all(std::mem::take(&mut self.written));
         let something = self.renderer.tally.errors + self.renderer.tally.warnings > 0;
         self.renderer.finish(ran && something && !self.global.quiet);
         Ended { exit: self.exit, files: self.files }

@@ -571,6 +571,18 @@ fn subroutines_lie_beside_their_program() {
     c.shut_down();
 }
 
+/// Behind a call the tool is where its subroutine left it.
+#[test]
+fn a_call_ends_where_its_subroutine_ends() {
+    let text = "G21 G90 F100\no<a> sub\nG1 X#1\no<a> endsub\nG0 X0\no<a> call [7]\nG0 Z5\nM2\n";
+    let mut c = Client::new(&[("a.ngc", text)], json!({}));
+    let uri = c.open("a.ngc", None);
+    let position = c.position(&uri, "o<a> c|all");
+    let state = c.request("gccRobot/state", json!({ "textDocument": { "uri": uri }, "position": position }));
+    assert_eq!((state["before"]["position"][0].as_f64(), state["after"]["position"][0].as_f64()), (Some(0.0), Some(7.0)), "{state}");
+    c.shut_down();
+}
+
 /// Where the last line is empty, a new block begins there.
 #[test]
 fn completion_on_the_line_that_is_not_there_yet() {

@@ -279,6 +279,24 @@ fn mistakes_in_settings_are_told() {
 }
 
 #[test]
+fn plans_that_are_not_open_are_looked_at() {
+    let plan = include_str!("../../../../docs/examples/stepnc/mistakes.p21");
+    let mut c = Client::pulling(&[("a.ngc", "G21\nM2\n"), ("p.p21", plan)]);
+    let _ = c.open("a.ngc", None);
+    let p = c.uri("p.p21");
+    for _ in 0..600 {
+        let all = c.request("workspace/diagnostic", json!({ "previousResultIds": [] }));
+        if let Some(of_p) = all["items"].as_array().expect("a list").iter().find(|i| i["uri"] == p) {
+            let found = of_p["items"].as_array().expect("a list");
+            assert!(found.iter().any(|d| d["code"] == "E0401"), "{of_p}");
+            return c.shut_down();
+        }
+        std::thread::sleep(std::time::Duration::from_millis(20));
+    }
+    panic!("nothing about {p}");
+}
+
+#[test]
 fn programs_that_are_not_open_are_looked_at() {
     let files = [("a.ngc", "G21\nM2\n"), ("b.ngc", "G21\nG1 XO\nM2\n"), ("gcc-robot.toml", "schema = 1\n[project]\nmachine = \"klingon/1\"\n")];
     let mut c = Client::pulling(&files);
