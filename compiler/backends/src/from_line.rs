@@ -56,11 +56,19 @@ pub fn from_line(
         notes.push(Diagnostic::new(code::FROM_LINE_INSIDE_LOOP, place.0, place.1, &[way]));
     }
     let (state, pose) = (*cursor.state(), *cursor.pose());
-    let safe = options.safe_z.unwrap_or_else(|| {
-        let top = top(program, &state);
-        notes.push(no_height(place, top));
-        top
-    });
+    let length = length_to_come(program, found.index, &state);
+    let safe = match options.safe_z {
+        // What is asked for is the height of the tool; where its length is not in force yet, the spindle goes higher.
+        Some(z) => z + length.unwrap_or(0.0),
+        None => {
+            let top = top(program, &state);
+            notes.push(no_height(place, top));
+            top
+        }
+    };
+    if length == Some(0.0) {
+        notes.push(Diagnostic::new(code::FROM_LINE_BARE_SPINDLE, place.0, place.1, &[state.tool.to_string()]));
+    }
     if let Some(lowest) = lowest_crossing(program, &state).filter(|lowest| safe.max(pose.axes[2]) < lowest - SAME_HEIGHT) {
         let heights = [safe.max(pose.axes[2]), lowest].map(|z| format!("{z:.3}"));
         notes.push(Diagnostic::new(code::FROM_LINE_LOW_HEIGHT, place.0, place.1, &heights));
@@ -176,6 +184,24 @@ fn top(program: &Program, state: &State) -> f64 {
     if highest.is_finite() { highest - state.machine(&[0.0; 9])[2] } else { 0.0 }
 }
 
+/// By how much the length that a later block asks for (G43), before the tool is changed again, is longer than what is in
+/// force; none where no tool is in the spindle or its length is in force. 0: it is asked for, and nobody knows it.
+fn length_to_come(program: &Program, index: usize, state: &State) -> Option<f64> {
+    if state.tool <= 0 || state.tool_offset != [0.0; 9] {
+        return None;
+    }
+    let mut cursor = program.cursor_at(index);
+    let mut said = None;
+    while let Some(view) = cursor.next() {
+        match view.op {
+            Op::ToolChange(_) | Op::ToolNumber(_) | Op::End => break,
+            Op::ToolOffset(offset) => said = Some(said.unwrap_or(0.0f64).max(offset[2])),
+            _ => {}
+        }
+    }
+    said
+}
+
 /// Heights that differ by less, mm, are the same.
 const SAME_HEIGHT: f64 = 1e-6;
 
@@ -249,7 +275,7 @@ fn build(program: &Program, from: &From, state: &State, pose: &Pose, safe: f64, 
         restore.push(Op::Units(state.units));
     }
     restore.modes(state);
-    restore.spindles(state);
+    restore.spindles(state, program.steps().any(|s| matches!(s.op, Op::SpindleMode { surface: Some(_), .. })));
     restore.outputs(program, index);
     let mut waiting = !from.known[2];
     let mut goal = *pose;
@@ -336,9 +362,10 @@ impl Restore {
         self.push(Op::Feed { linear: s.feed, angular: s.feed_angular });
     }
 
-    fn spindles(&mut self, s: &State) {
+    /// `surface`: the program has surface speeds, which outlast its stop.
+    fn spindles(&mut self, s: &State, surface: bool) {
         for (number, spindle) in (0..).zip(&s.spindles) {
-            if spindle.surface.is_some() {
+            if spindle.surface.is_some() || surface && spindle.speed != 0.0 {
                 self.push(Op::SpindleMode { spindle: number, surface: spindle.surface });
             }
             if spindle.speed != 0.0 {
@@ -373,38 +400,63 @@ impl Restore {
     /// Up, over the place, down: rapid to just above it, then at feed.
     fn approach(&mut self, program: &Program, index: usize, state: &State, goal: &Pose, approached: [bool; 9], safe: f64) {
         let mut at = *self.out.pose();
-        at.axes[2] = safe;
-        self.out.push_to(Op::Rapid, &at, self.source);
-        for (i, value) in goal.axes.iter().enumerate() {
-            if i != 2 && approached[i] {
-                at.axes[i] = *value;
+        let mut ways: Vec<Pose> = Vec::new();
+        let mut go = |axes: &[usize], to: &dyn Fn(usize) -> f64| {
+            axes.iter().filter(|i| approached[**i]).for_each(|i| at.axes[*i] = to(*i));
+            ways.push(at);
+        };
+        let goes = |i: usize| goal.axes[i];
+        let others: Vec<usize> = (0..9).filter(|i| *i != 2).collect();
+        if is_lathe(program, state) && approached[0] && goal.axes[2] != safe {
+            let rapid = last_rapid(program, index);
+            let last = rapid.map_or(goal.axes[0], |p| p.axes[0]);
+            let by_rapid = rapid.is_some_and(|p| p.axes == goal.axes);
+            let beside: Vec<usize> = (1..9).filter(|i| *i != 2).collect();
+            if last >= goal.axes[0] {
+                // From outside: along Z where no stock is, then in as the program came.
+                let out = outmost(program, state).max(last);
+                go(&[0], &|_| out);
+                go(&beside, &goes);
+                go(&[2], &goes);
+                go(&[0], &|i| if by_rapid { goes(i) } else { last.max(goes(i) + CLEARANCE) });
+            } else {
+                // In a bore: from the front, at the radius where the program goes by rapid.
+                go(&[2], &|_| safe);
+                go(&[0], &|_| last.min(goes(0) - CLEARANCE));
+                go(&beside, &goes);
+                go(&[2], &goes);
             }
+        } else {
+            go(&[2], &|_| safe);
+            go(&others, &goes);
+            let rapids = lowest_crossing(program, state).unwrap_or(safe);
+            let height = goal.axes[2];
+            go(&[2], &|_| if height < safe { (height + CLEARANCE).max(rapids).min(safe) } else { safe });
         }
-        self.out.push_to(Op::Rapid, &at, self.source);
-        let height = goal.axes[2];
-        if height == safe {
+        let mut here = *self.out.pose();
+        for way in ways {
+            if way != here {
+                self.out.push_to(Op::Rapid, &way, self.source);
+            }
+            here = way;
+        }
+        let mut end = here;
+        (0..9).filter(|i| approached[*i]).for_each(|i| end.axes[i] = goal.axes[i]);
+        if end == here {
             return;
         }
-        let down = |z: f64| {
-            let mut to = at;
-            to.axes[2] = z;
-            to
-        };
         let per_turn = state.feed_mode == gr_ir::FeedMode::PerRev;
         let turns = state.spindles.iter().any(|s| s.turn != Turn::Stop && s.speed != 0.0);
         let feeds = state.feed > 0.0 && (state.feed_mode == gr_ir::FeedMode::PerTime || per_turn && turns);
-        if !feeds && came_by_rapid(program, index) {
-            return self.out.push_to(Op::Rapid, &down(height), self.source);
+        if !feeds && last_rapid(program, index).is_some_and(|p| p.axes == goal.axes) {
+            return self.out.push_to(Op::Rapid, &end, self.source);
         }
         if !feeds {
             // No feed is in force, but this may be in the material: one that the program has elsewhere.
             self.push(Op::FeedMode { spindle: state.feed_spindle, mode: gr_ir::FeedMode::PerTime });
             self.push(Op::Feed { linear: feed_elsewhere(program, index), angular: state.feed_angular });
         }
-        if height + CLEARANCE < safe {
-            self.out.push_to(Op::Rapid, &down(height + CLEARANCE), self.source);
-        }
-        self.out.push_to(Op::Linear, &down(height), self.source);
+        self.out.push_to(Op::Linear, &end, self.source);
         if !feeds {
             self.push(Op::FeedMode { spindle: state.feed_spindle, mode: state.feed_mode });
             self.push(Op::Feed { linear: state.feed, angular: state.feed_angular });
@@ -412,14 +464,31 @@ impl Restore {
     }
 }
 
+/// Turning: the plane of X and Z, and nothing ever moves in Y.
+fn is_lathe(program: &Program, state: &State) -> bool {
+    state.plane == gr_ir::Plane::Xz && !axes_used(program)[1]
+}
+
+/// Where the last rapid before an operation ended: the program says that nothing is there.
+fn last_rapid(program: &Program, index: usize) -> Option<Pose> {
+    program.steps().take(index).filter(|s| s.op == Op::Rapid && s.start.axes != s.end.axes).last().map(|s| s.end)
+}
+
+/// The greatest X of the whole program, in the work frame of a state.
+fn outmost(program: &Program, state: &State) -> f64 {
+    let zero = state.machine(&[0.0; 9])[0];
+    let mut most = f64::NEG_INFINITY;
+    let mut cursor = program.cursor();
+    while let Some(view) = cursor.next() {
+        if view.op.moves() {
+            most = most.max(view.state.machine(&view.end.axes)[0] - zero);
+        }
+    }
+    most
+}
+
 /// Feed of an approach in programs that never say one per minute, mm/s.
 const SLOW: f64 = 100.0 / 60.0;
-
-/// Whether the place before an operation was reached by a rapid: the program says then that nothing is there.
-fn came_by_rapid(program: &Program, index: usize) -> bool {
-    let moved = program.steps().take(index).filter(|s| s.op.moves() && s.start.axes != s.end.axes).last();
-    moved.is_some_and(|s| s.op == Op::Rapid)
-}
 
 /// The first feed per minute behind an operation, else the last before it.
 fn feed_elsewhere(program: &Program, index: usize) -> f64 {

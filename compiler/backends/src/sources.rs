@@ -10,11 +10,13 @@ pub struct Words {
     /// Bit `letter - 'a'`; `@` counts as X and Y, `^` too.
     letters: u32,
     codes: u32,
+    /// The axes are named by increments alone.
+    incremental: bool,
 }
 
 /// Codes that [`Words`] looks for, times ten.
-const CODES: [u32; 22] =
-    [530, 280, 300, 281, 301, 400, 410, 420, 411, 421, 490, 520, 920, 921, 922, 923, 610, 611, 640, 430, 431, 432];
+const CODES: [u32; 24] =
+    [900, 910, 530, 280, 300, 281, 301, 400, 410, 420, 411, 421, 490, 520, 920, 921, 922, 923, 610, 611, 640, 430, 431, 432];
 
 /// Increments of a lathe, and the axis that each moves.
 const INCREMENTS: [(u8, u8); 4] = [(b'u', b'x'), (b'v', b'y'), (b'w', b'z'), (b'h', b'c')];
@@ -25,6 +27,7 @@ impl Words {
         let mut words = Words::of(sources.line(file, line)?);
         if sources.increments() {
             let said = words;
+            words.incremental = INCREMENTS.iter().any(|(i, _)| said.has(*i)) && !INCREMENTS.iter().any(|(_, a)| said.has(*a));
             for (increment, axis) in INCREMENTS.into_iter().filter(|(i, _)| said.has(*i)) {
                 words.letters = words.letters & !bit(increment) | bit(axis);
             }
@@ -71,6 +74,19 @@ impl Words {
         if let Some(i) = CODES.iter().position(|c| *c == tenths) {
             self.codes |= 1 << i;
         }
+    }
+
+    /// Whether a line moves by increments: it says so, or the last line before it that says G90 or G91 does.
+    pub fn goes_by_increments(sources: &dyn Sources, file: FileId, line: u32) -> bool {
+        const MOST_LINES: u32 = 10_000;
+        if Words::at(sources, file, line).is_some_and(|w| w.incremental) {
+            return true;
+        }
+        let said = (line.saturating_sub(MOST_LINES)..=line).rev().find_map(|l| {
+            let words = Words::at(sources, file, l)?;
+            (words.g(900) || words.g(910)).then(|| words.g(910))
+        });
+        said.unwrap_or(false)
     }
 
     /// Whether a letter (lower case) stands there.

@@ -366,7 +366,8 @@ fn a_restart_restores_outputs_and_feeds_down() {
     let restart = from_line::from_line(&run(text), FileId(0), 9, &from_line::Options { safe_z: Some(5.0) }, &texts).expect("a start");
     let written = emit(&restart.program, &options(Language::Linuxcnc), &texts).expect("written").text;
     assert!(written.contains("M64 P2\n") && written.contains("M68 E0 Q3\n"), "{written}");
-    assert!(written.contains("Z-2\n") && written.contains("G1 Z-4"), "{written}");
+    // No rapid goes lower than those of the program.
+    assert!(!written.contains("Z-2") && written.contains("G1 Z-4"), "{written}");
 }
 
 #[test]
@@ -429,7 +430,7 @@ fn a_restart_feeds_down_where_no_feed_is_in_force() {
                 down.push((view.op == gr_ir::Op::Rapid, view.end.axes[2], view.state.feed * 60.0));
             }
         }
-        assert_eq!(down.iter().map(|d| (d.0, d.1)).collect::<Vec<_>>(), [(true, -2.0), (false, -4.0)], "{mode}");
+        assert_eq!(down.iter().map(|d| (d.0, d.1)).collect::<Vec<_>>(), [(true, 5.0), (false, -4.0)], "{mode}");
         assert!((down[1].2 - 100.0).abs() < 1e-9, "{down:?}");
         // At a height that the program itself went to by a rapid, one is enough.
         let restart = from_line::from_line(&run(&text), FileId(0), 12, &o, &texts).expect("a start");
@@ -459,6 +460,53 @@ fn a_restart_goes_to_no_place_of_the_machine() {
     assert!(!approach(12).contains("Z-7"), "{}", approach(12));
     // Behind a G28 of all axes nothing is known.
     assert!(approach(15).starts_with("Z100 / X3"), "{}", approach(15));
+}
+
+/// On a lathe the tool comes from outside, in a bore from the front, and goes in by feed.
+#[test]
+fn a_restart_on_a_lathe_comes_from_outside() {
+    let head = "G21 G90 G18 G8 G95\nT1 M6\nM3 S500\n";
+    let groove = format!("{head}G0 X40 Z5\nG0 X32 Z-20\nG1 X25 F.08\nG4 P.5\nG0 X32\nX40 Z5\nM5\nM2\n");
+    let bore = format!("{head}G0 X8 Z5\nG1 X10 F.1\nG1 Z-20\nG4 P.5\nX11\nG0 X8\nZ5\nM5\nM2\n");
+    let ways = |text: &str, line: u32| {
+        let texts = Texts::new([(FileId(0), text)]);
+        let o = from_line::Options { safe_z: Some(5.0) };
+        let restart = from_line::from_line(&run(text), FileId(0), line, &o, &texts).expect("a start");
+        let mut out = Vec::new();
+        let mut cursor = restart.program.cursor();
+        while let Some(view) = cursor.next() {
+            if view.op.moves() && view.source.line == from_line::INSERTED {
+                out.push((view.op == gr_ir::Op::Rapid, view.end.axes[0], view.end.axes[2]));
+            }
+        }
+        out
+    };
+    let found = ways(&groove, 7);
+    assert_eq!(found.iter().skip(1).copied().collect::<Vec<_>>(), [(true, 40.0, -20.0), (true, 32.0, -20.0), (false, 25.0, -20.0)], "{found:?}");
+    let found = ways(&bore, 7);
+    assert_eq!(found.iter().skip(1).copied().collect::<Vec<_>>(), [(true, 8.0, 5.0), (true, 8.0, -20.0), (false, 10.0, -20.0)], "{found:?}");
+}
+
+/// The safe height is that of the tool, also where its length is not in force yet.
+#[test]
+fn a_safe_height_is_that_of_the_tool() {
+    let text = "G21 G90\nT1 M6\nG0 X10 Y10\nG43.1 Z150\nG0 Z50\nG1 Z-1 F100\nM2\n";
+    let texts = Texts::new([(FileId(0), text)]);
+    let o = from_line::Options { safe_z: Some(100.0) };
+    let restart = from_line::from_line(&run(text), FileId(0), 3, &o, &texts).expect("a start");
+    let first = restart.program.steps().find(|s| s.op.moves()).expect("a move");
+    assert_eq!(first.end.axes[2], 250.0);
+}
+
+/// G28 without a way-point has no way-point in any language, whatever the simulation takes for its place.
+#[test]
+fn a_reference_move_without_a_way_point_has_none() {
+    for (line, written) in [("G28 G91 Z0\nG90", "G91 G28 Z0\nG90\n"), ("G28 X5 Z0", "G28 X5 Z0\n"), ("G91\nG28 X0 Y0\nG90", "G91 G28 X0 Y0\nG90\n")] {
+        let text = format!("G21 G90\n{line}\nG0 X10 Y10\nZ5\nM2\n");
+        let texts = Texts::new([(FileId(0), text.as_str())]);
+        let emitted = emit(&run(&text), &options(Language::Linuxcnc), &texts).expect("written").text;
+        assert!(emitted.contains(written), "{line}: {emitted}");
+    }
 }
 
 /// A cycle whose moves are of a line of their own: nothing of ours writes one, but a motion file may.

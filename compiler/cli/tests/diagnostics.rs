@@ -179,6 +179,8 @@ fn what_a_written_program_cannot_carry() {
     told("E0606", &[file("a.p21", &plan(&[]))], "build a.p21 --cutter-compensation control -o a.nc");
     told("E0614", &[file("a.ngc", PART)], "build a.ngc --target rs274ngc --from-line 4 -o a.nc");
     let deep = "G21 G90 F100\nG0 X0 Y0 Z5\nX9\nG1 Z-3\nX5\nG0 Z5\nX20\nG1 Z-3\nX30\nM2\n";
+    let bare = "G21 G90 F100\nT1 M6\nG0 X1 Y1\nG43 H1 Z5\nG1 Z-1\nM2\n";
+    told("E0616", &[file("a.ngc", bare)], "build a.ngc --target rs274ngc --from-line 3 --safe-z 50 -o a.nc");
     told("E0615", &[file("a.ngc", deep)], "build a.ngc --target rs274ngc --from-line 5 --safe-z -1 -o a.nc");
 }
 

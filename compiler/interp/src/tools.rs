@@ -51,15 +51,31 @@ impl<S: Sink> Interp<'_, S> {
     /// T.
     pub(crate) fn convert_tool_select(&mut self) -> Res {
         let mut number = to_int(self.block.or_zero(b't'));
-        // T0101 of a lathe is tool 1 with offset 1.
-        if crate::fanuc::is_lathe(self.setup.dialect) && number >= 100 {
+        // T0101 of a lathe is tool 1 with offset 1: the turret turns, and the offset is in force.
+        let lathe = crate::fanuc::is_lathe(self.setup.dialect);
+        let offset = (lathe && number >= 100).then_some(number % 100);
+        if offset.is_some() {
             number /= 100;
         }
         let index = self.find_tool(number, b't')?;
         self.emit(Call::SelectTool(number));
         self.m.selected_pocket = index;
         self.m.selected_tool = number;
-        Ok(())
+        let Some(offset) = offset else { return Ok(()) };
+        if self.world_tools.rows.first().is_none_or(|t| t.number != number) {
+            self.convert_tool_change()?;
+        }
+        if offset == 0 {
+            return self.convert_tool_length(490);
+        }
+        let h = self.block.get(b'h');
+        self.block.set(b'h', f64::from(offset));
+        let done = self.convert_tool_length(430);
+        match h {
+            Some(h) => self.block.set(b'h', h),
+            None => self.block.unset(b'h'),
+        }
+        done
     }
 
     /// M6.
@@ -71,7 +87,8 @@ impl<S: Sink> Interp<'_, S> {
         if self.setup.version == Version::V2_9 {
             self.emit(Call::StartChange);
         }
-        if !self.config.change_with_spindle_on {
+        // A turret turns while the spindle does.
+        if !self.config.change_with_spindle_on && !crate::fanuc::is_lathe(self.setup.dialect) {
             for s in 0..self.config.spindles {
                 self.emit(Call::StopSpindleTurning(s));
                 self.m.turning[s as usize] = 0;

@@ -482,3 +482,17 @@ fn a_missing_subprogram_is_told_at_its_call() {
         assert_eq!((outcome.findings.len(), outcome.findings[0].line), (1, 3), "{text}: {:?}", outcome.findings);
     }
 }
+
+/// T0101: the turret turns while the spindle does, and offset 1 is in force; T0100 takes it back.
+#[test]
+fn a_lathe_changes_its_tool_with_t() {
+    let (calls, outcome) = run_in("fanuc-turn", "G21 G97 S500 M3\nT0101\nG0 X20. Z5.\nT0100\nT0202\nM30\n");
+    assert!(outcome.ok(), "{:?}", outcome.findings);
+    let tools: Vec<&str> = calls.iter().map(String::as_str).filter(|c| ["SELECT_TOOL", "CHANGE_TOOL", "USE_TOOL", "STOP_SPINDLE"].iter().any(|k| c.starts_with(k))).collect();
+    let names: Vec<&str> = tools.iter().map(|c| c.split('(').next().unwrap_or_default()).collect();
+    assert_eq!(
+        &names[..8],
+        ["SELECT_TOOL", "CHANGE_TOOL", "USE_TOOL_LENGTH_OFFSET", "SELECT_TOOL", "USE_TOOL_LENGTH_OFFSET", "SELECT_TOOL", "CHANGE_TOOL", "USE_TOOL_LENGTH_OFFSET"],
+        "{tools:?}"
+    );
+}

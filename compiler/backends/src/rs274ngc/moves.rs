@@ -3,6 +3,7 @@
 use super::Language;
 use super::emit::Emitter;
 use super::write::AXES;
+use crate::sources::Words;
 use gr_ir::{Axes, FeedMode, Op, Plane, Pose, Source, State, View};
 
 impl Emitter<'_> {
@@ -197,13 +198,20 @@ impl Emitter<'_> {
         let named: Vec<usize> = (0..9).filter(|i| self.has_axis(*i) && self.given(*i, view.source)).collect();
         let all = self.options.language == Language::FanucMill && named.is_empty();
         let axes = if all { vec![0, 1, 2] } else { named };
+        // Without a way-point the number of a simulation must not become one: where the axis is, only the machine knows.
+        let stands = second.is_none() || axes.iter().all(|i| view.start.axes[*i] == view.end.axes[*i]);
+        let straight = !axes.is_empty() && stands
+            && (all || axes.iter().all(|i| self.anchored[*i]) || Words::goes_by_increments(self.sources, view.source.file, view.source.line));
         let through = if second.is_some() { view.end } else { view.start };
-        let mut words = vec![code.to_string()];
+        let mut words = if straight { vec!["G91".to_string(), code.to_string()] } else { vec![code.to_string()] };
         let all = axes.is_empty();
         for &i in &axes {
-            words.push(format!("{}{}", AXES[i], self.w.axis(i, through.axes[i]).0));
+            words.push(format!("{}{}", AXES[i], self.w.axis(i, if straight { 0.0 } else { through.axes[i] }).0));
         }
         self.w.block(&words.join(" "));
+        if straight {
+            self.w.block("G90");
+        }
         self.motion = None;
         let end = second.map_or(view.end.axes, |s| s.end.axes);
         // An axis that is not named stands where its rounded number took it.

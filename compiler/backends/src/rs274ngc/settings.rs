@@ -243,6 +243,7 @@ impl Emitter<'_> {
         }
         let Some(place) = self.options.change_at else {
             self.w.block("M6");
+            self.turn_on(view);
             return self.motion_unsure();
         };
         let (high, low) = (self.w.length(ABOVE_CHANGE, self.w.places).0, view.state.work.clamp(1, 9));
@@ -259,6 +260,15 @@ impl Emitter<'_> {
         self.motion_unsure();
         self.anchored = [false; 9];
         self.displaced = true;
+    }
+
+    /// M6 stops the spindle. In a program whose turret turns while the spindle does, it is started again.
+    fn turn_on(&mut self, view: &View<'_, '_>) {
+        for (number, spindle) in (0..).zip(&view.state.spindles) {
+            if spindle.turn != Turn::Stop {
+                self.spindle_turn(number, spindle.turn, view.source);
+            }
+        }
     }
 
     fn tool_entry(&mut self, view: &View<'_, '_>) {
