@@ -93,6 +93,7 @@ fn find(program: &Program, file: FileId, line: u32) -> Option<Found> {
     let skip = program.steps().take(8).position(|s| s.op == Op::Reset).map_or(0, |i| i + 1);
     let mut first: Option<usize> = None;
     let mut later: Option<usize> = None;
+    let mut again = false;
     let mut ways: Vec<Source> = Vec::new();
     for step in program.steps().skip(skip) {
         if matches!(step.op, Op::Reset | Op::Finish) {
@@ -108,9 +109,10 @@ fn find(program: &Program, file: FileId, line: u32) -> Option<Found> {
                 ways.push(way);
             }
         }
-        let outer = program.call_stack(step.source).last().map_or(step.source.line, |f| f.line);
-        if later.is_none() && step.source.file == file && outer > line {
+        let (at_file, at_line, pass) = here(program, step.source);
+        if later.is_none() && at_file == file && at_line > line {
             later = Some(step.index);
+            again = pass;
         }
     }
     let repeated = (ways.len() > 1).then(|| {
@@ -119,7 +121,17 @@ fn find(program: &Program, file: FileId, line: u32) -> Option<Found> {
         let times = if ways.len() < 1000 { ways.len().to_string() } else { "many".into() };
         format!("{times} times{}", name.map_or(String::new(), |n| format!(", in {n}")))
     });
+    let repeated = repeated.or_else(|| (first.is_none() && again).then(|| "in a loop".to_string()));
     Some(Found { index: first.or(later)?, repeated })
+}
+
+/// Where in its file an operation is run: the line of the call that leads to it, else its own. True: in a loop.
+fn here(program: &Program, source: Source) -> (FileId, u32, bool) {
+    let mut place = (source.file, source.line, false);
+    for frame in program.call_stack(source) {
+        place = if frame.pass == 0 { (frame.file, frame.line, false) } else { (place.0, place.1, true) };
+    }
+    place
 }
 
 /// Whether cutter compensation is on before an operation. The motion shows no trace of it, so the lines that were
@@ -231,11 +243,17 @@ struct From {
 /// Axes whose place a program has said in its work frame before an operation. Of the others, and of those that G28, G30
 /// and G53 brought to a place of the machine, the numbers are only what a simulation takes them for.
 fn known_axes(program: &Program, index: usize, sources: &dyn Sources) -> [bool; 9] {
-    let mut known = [false; 9];
-    for s in program.steps().take(index).filter(|s| s.op.moves()) {
+    let (mut known, mut hidden) = ([false; 9], false);
+    for s in program.steps().take(index) {
+        if let Op::Note(Note::Comment, text) = s.op {
+            hidden = text == "AXIS,hide" || hidden && text != "AXIS,show";
+        }
+        if !s.op.moves() {
+            continue;
+        }
         let words = Words::at(sources, s.source.file, s.source.line);
-        let fixed = words.is_some_and(|w| [280, 300, 530].into_iter().any(|g| w.g(g)));
-        let home = fixed && words.is_some_and(|w| !w.g(530) && !AXIS_LETTERS.iter().any(|l| w.has(*l)));
+        let fixed = hidden || words.is_some_and(|w| [280, 300, 530].into_iter().any(|g| w.g(g)));
+        let home = fixed && !hidden && words.is_some_and(|w| !w.g(530) && !AXIS_LETTERS.iter().any(|l| w.has(*l)));
         for (i, letter) in AXIS_LETTERS.iter().enumerate() {
             if home || s.start.axes[i] != s.end.axes[i] || words.is_some_and(|w| w.has(*letter)) {
                 known[i] = !fixed;

@@ -1,7 +1,7 @@
 //! What words a source line holds. Motion is known from the IR alone; the text tells which words stood there,
 //! which matters where a number is only a simulation's: G53, G28, a word that happens to change nothing.
 
-use gr_ir::Sources;
+use gr_ir::{Note, Op, Program, Sources};
 use gr_text::FileId;
 
 /// What stands in a line, as far as a look at its letters tells: expressions are skipped, not evaluated.
@@ -89,6 +89,10 @@ impl Words {
         said.unwrap_or(false)
     }
 
+    /// Whether any axis is named.
+    pub fn names_axes(self) -> bool {
+        b"xyzabcuvw".iter().any(|l| self.has(*l))
+    }
     /// Whether a letter (lower case) stands there.
     pub fn has(self, letter: u8) -> bool {
         self.letters & bit(letter) != 0
@@ -97,6 +101,13 @@ impl Words {
     pub fn g(self, tenths: u32) -> bool {
         CODES.iter().position(|c| *c == tenths).is_some_and(|i| self.codes & (1 << i) != 0)
     }
+}
+
+/// Whether a move is one that the machine makes of itself, to a place of its own, before it changes the tool (INI keys
+/// TOOL_CHANGE_QUILL_UP and TOOL_CHANGE_AT_G30).
+pub fn is_hidden(program: &Program, index: usize) -> bool {
+    let before = (1..=2).filter_map(|n| program.get(index.checked_sub(n)?));
+    before.take_while(|s| !s.op.moves()).any(|s| matches!(s.op, Op::Note(Note::Comment, "AXIS,hide")))
 }
 
 fn bit(letter: u8) -> u32 {

@@ -509,6 +509,44 @@ fn a_reference_move_without_a_way_point_has_none() {
     }
 }
 
+/// A line of a loop that moves nothing begins where the loop goes on, not behind it.
+#[test]
+fn a_restart_in_a_loop_stays_in_it() {
+    let text = "G21 G90 F100\n#1=0\nG0 X0 Y0 Z5\no1 while [#1 lt 3]\n#1=[#1+1]\nG1 X#1\no1 endwhile\nG0 X9\nM2\n";
+    let texts = Texts::new([(FileId(0), text)]);
+    let o = from_line::Options { safe_z: Some(5.0) };
+    let restart = from_line::from_line(&run(text), FileId(0), 5, &o, &texts).expect("a start");
+    let ends: Vec<f64> = restart.program.steps().filter(|s| s.op == gr_ir::Op::Linear).map(|s| s.end.axes[0]).collect();
+    assert_eq!(ends, [1.0, 2.0, 3.0]);
+    assert_eq!(restart.notes.iter().map(|d| d.code.def().slug).collect::<Vec<_>>(), ["from-line/inside-loop"]);
+}
+
+/// What the machine does of itself before a tool change is a place of the machine, in the program and for a restart.
+#[test]
+fn moves_before_a_tool_change_are_the_machines() {
+    let text = "G21 G90\nT1 M6\nG0 X20 Y0 Z5\nT2 M6\nG0 X5 Y5\nZ3\nM2\n";
+    let ini = gr_interp::read_ini("[EMCIO]\nTOOL_CHANGE_QUILL_UP=1\n", FileId(1), None, None).0;
+    let setup = gr_interp::Setup { ini, tools: gr_interp::assumed_tools(), ..gr_interp::Setup::default() };
+    let program = reader::read(text, &setup).expect("it runs");
+    let texts = Texts::new([(FileId(0), text)]);
+    let written = emit(&program, &options(Language::Linuxcnc), &texts).expect("written").text;
+    assert!(written.contains("G53 G0 Z0"), "{written}");
+    let o = from_line::Options { safe_z: Some(50.0) };
+    let restart = from_line::from_line(&program, FileId(0), 5, &o, &texts).expect("a start");
+    let lowest = restart.program.steps().filter(|s| s.op.moves()).map(|s| s.end.axes[2]).fold(f64::INFINITY, f64::min);
+    assert_eq!(lowest, 3.0);
+}
+
+/// grbl: an axis that it lacks has no word, and its reference move is none of the others'.
+#[test]
+fn grbl_has_no_words_for_other_axes() {
+    let text = "G21 G90\nG0 X5 Z7 A0\nG0 X1\nM2\n";
+    let texts = Texts::new([(FileId(0), text)]);
+    let written = emit(&run(text), &options(Language::Grbl), &texts).expect("written").text;
+    assert!(!written.contains('A'), "{written}");
+    assert!(!errors("G21 G90\nG0 X5\nG28 A0\nG0 X1\nM2\n", Language::Grbl).is_empty());
+}
+
 /// A cycle whose moves are of a line of their own: nothing of ours writes one, but a motion file may.
 #[test]
 fn no_start_inside_a_cycle() {

@@ -394,7 +394,7 @@ impl Told {
         if changed(&mut self.works, (c.work, d.work), c.work != d.work) {
             note(Aspect::Event, format!("works in {}, the other in {}", system(c.work), system(d.work)));
         }
-        if cuts && c.class != Class::Tap && (c.mode != d.mode || c.angular != d.angular || !close(c.feed, d.feed, tolerance.rate)) {
+        if cuts && c.class != Class::Tap && (c.class != Class::Sync && (c.mode != d.mode || c.angular != d.angular) || !close(c.feed, d.feed, tolerance.rate)) {
             note(Aspect::Feed, format!("feeds {}, the other {}", feed_text(c), feed_text(d)));
         }
         if cuts {

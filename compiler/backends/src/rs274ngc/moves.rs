@@ -53,7 +53,7 @@ impl Emitter<'_> {
                 self.at[i] = to;
                 continue;
             }
-            let named = !self.anchored[i] && (self.given(i, source));
+            let named = !self.anchored[i] && self.has_axis(i) && self.given(i, source);
             let repeated = self.options.repeat_words && self.anchored[i] && i < 3;
             if !(force || moves || named || repeated) {
                 continue;
@@ -108,7 +108,7 @@ impl Emitter<'_> {
             return;
         }
         if let Some(words) = self.words(view.source) {
-            if words.g(530) {
+            if words.g(530) || !words.names_axes() && crate::sources::is_hidden(self.program, view.index) {
                 return self.machine_move(view, "G0", &[]);
             }
             let home = [(280, "G28"), (300, "G30")].into_iter().find(|(g, _)| words.g(*g));
@@ -195,7 +195,12 @@ impl Emitter<'_> {
             let words = self.axis_words(view.start, view.end, view.source, &[]);
             return self.motion_block(0, &words, &[]);
         }
-        let named: Vec<usize> = (0..9).filter(|i| self.has_axis(*i) && self.given(*i, view.source)).collect();
+        let named: Vec<usize> = (0..9).filter(|i| self.given(*i, view.source)).collect();
+        if !named.is_empty() && named.iter().all(|i| !self.has_axis(*i)) {
+            // Without its axis the code would send all the others home.
+            return self.cannot(&format!("{code} of the axis {}", AXES[named[0]]), view.source);
+        }
+        let named: Vec<usize> = named.into_iter().filter(|i| self.has_axis(*i)).collect();
         let all = self.options.language == Language::FanucMill && named.is_empty();
         let axes = if all { vec![0, 1, 2] } else { named };
         // Without a way-point the number of a simulation must not become one: where the axis is, only the machine knows.
