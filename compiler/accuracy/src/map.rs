@@ -510,6 +510,12 @@ impl<'a> Probe<'a> {
 
     /// The longest way from an axis of a turning joint to the tool, mm: what a radian counts beside a mm.
     fn longest_lever(&self) -> f64 {
+        if let Chain::Tricept(t) = &self.machine.chain
+            && t.shape.flange_offset > 0.0
+        {
+            // The only turning joints are those of the wrist, whose axes meet in its centre.
+            return t.shape.flange_offset;
+        }
         let lever = |q: &[f64]| {
             let columns = differential::velocity(self.machine, q).ok()?;
             let turning = columns.iter().zip(&self.machine.joints).filter(|(_, j)| j.kind == JointKind::Revolute);
@@ -518,10 +524,8 @@ impl<'a> Probe<'a> {
         let places = (1..LEVERS).map(|n| spread_joints(self.machine, n));
         let mut found: Vec<(f64, Vec<f64>)> = places.filter_map(|q| Some((lever(&q)?, q))).collect();
         found.sort_by(|a, b| b.0.total_cmp(&a.0));
-        // The forward solution of a Tricept is a search itself.
-        let (climbs, halvings) = if matches!(self.machine.chain, Chain::Tricept(_)) { (1, 10) } else { (CLIMBED, 40) };
-        found.truncate(climbs);
-        let longest = found.into_iter().map(|(v, q)| self.climbed(v, q, halvings, lever)).fold(0.0, f64::max);
+        found.truncate(CLIMBED);
+        let longest = found.into_iter().map(|(v, q)| self.climbed(v, q, 40, lever)).fold(0.0, f64::max);
         if longest > 0.0 { longest } else { 1.0 }
     }
 

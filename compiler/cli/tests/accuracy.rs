@@ -755,6 +755,27 @@ fn how_the_tool_is_held() {
     assert!(std::fs::read_to_string(folder.path().join("r.csv")).unwrap().starts_with("x mm,y mm,\"workspace (tool turned as at the start"));
 }
 
+/// A Tricept's lever is that of its wrist. 18.4 at X -300 Y 200 Z -1500 comes from a Jacobian worked out by hand: legs in
+/// closed form, tool point and lean of the tool, 200 mm from the wrist to the flange.
+#[test]
+fn condition_of_a_tricept() {
+    let folder = tempfile::tempdir().unwrap();
+    let legs: String = (1..=3).map(|n| format!("[[joint]]\nname = \"leg {n}\"\ntype = \"prismatic\"\nmin = 900\nmax = 1800\n")).collect();
+    let shape = "[kinematics]\nkind = \"tricept\"\nbase_radius = 500\nplatform_radius = 225\nwrist_offset = 300\nflange_offset = 200\n";
+    let text = format!("format = 1\nid = \"test/tricept\"\nextends = \"comau/tricept806\"\n{shape}{legs}");
+    std::fs::write(folder.path().join("t.toml"), text).unwrap();
+    let o = run(folder.path(), &["map", "--machine=t.toml", "--quantity=condition", "--plane=z=-1500", "--resolution=200", "-oc.csv", "-q"]);
+    assert!(o.status.success(), "{}", whole(&o));
+    let csv = std::fs::read_to_string(folder.path().join("c.csv")).unwrap();
+    let rows = csv.lines().skip(1).map(|l| l.split(',').map(|v| v.parse().unwrap_or(f64::NAN)).collect::<Vec<f64>>());
+    let nearest = rows.min_by(|a, b| {
+        let d = |v: &[f64]| (v[0] + 300.0).hypot(v[1] - 200.0);
+        d(a).total_cmp(&d(b))
+    });
+    let value = nearest.expect("places")[2];
+    assert!((value / 18.4 - 1.0).abs() < 0.1, "{value}");
+}
+
 /// The condition of an arm by its own Jacobian, lengths in units of the longest lever: all three links in a row, 300 mm.
 #[test]
 fn condition_in_units_of_the_longest_lever() {
