@@ -88,9 +88,11 @@ pub fn station(
 
 /// The same, as far as it goes: what could not be read is left out.
 pub fn assembled(args: &SetupArgs, lints: &LintArgs, from: &Path, sources: &mut Sources, renderer: &mut Renderer) -> Station {
-    let mut reader = Reader { sources, renderer, files: Vec::new(), project: None, blamed: None, ini: None };
+    let mut reader = Reader { sources, renderer, files: Vec::new(), project: None, blamed: None, ini: None, hard: Levels::default() };
     let project = reader.project(from);
     let section = project.as_ref().map(|p| &p.file.project);
+    let mut lints = reader.levels(lints, project.as_ref());
+    reader.hard = lints.clone();
     let named = |option: &Option<PathBuf>, key: Option<&PathBuf>| {
         option.clone().or_else(|| key.map(|k| project.as_ref().map_or(k.clone(), |p| p.path_of(k))))
     };
@@ -123,7 +125,6 @@ pub fn assembled(args: &SetupArgs, lints: &LintArgs, from: &Path, sources: &mut 
         limits(machine, &mut setup);
     }
     reader.remaps(&setup);
-    let mut lints = reader.levels(lints, project.as_ref());
     if machine.as_ref().is_some_and(|m| m.kind == gr_machine::Kind::Robot) {
         // The tool point of a robot is the machine file's, with G43 and without; a tool it doesn't have is an error there.
         lints.allow.push(code::TOOL_NO_LENGTH_OFFSET);
@@ -305,6 +306,8 @@ struct Reader<'a> {
     ini: Option<(FileId, String)>,
     /// Where the project names the file that is read now.
     blamed: Option<(FileId, Span)>,
+    /// Warnings count as errors, here too.
+    hard: Levels,
 }
 
 impl Reader<'_> {
@@ -332,7 +335,11 @@ impl Reader<'_> {
         self.blamed = project.map(value);
     }
     fn show(&mut self, found: &[Diagnostic]) {
-        found.iter().for_each(|d| self.renderer.show(self.sources, d));
+        for d in found {
+            let mut d = d.clone();
+            self.hard.harden(&mut d);
+            self.renderer.show(self.sources, &d);
+        }
     }
     fn project(&mut self, from: &Path) -> Option<Project> {
         let path = Project::find(from)?;

@@ -755,6 +755,21 @@ fn how_the_tool_is_held() {
     assert!(std::fs::read_to_string(folder.path().join("r.csv")).unwrap().starts_with("x mm,y mm,\"workspace (tool turned as at the start"));
 }
 
+/// A mill that the file places the part on has an end of its travel.
+#[test]
+fn travel_of_a_mill() {
+    let folder = tempfile::tempdir().unwrap();
+    let accuracy = "[accuracy]\nsource = \"x\"\njoints = [0.005, 0.005, 0.005]\n";
+    let program = "G21 G90 G94 G17 G54 F600\nT1 M6\nG43 H1\nS1000 M3\nG0 X0 Y0 Z0\nG1 X200\nM5\nM2\n";
+    std::fs::write(folder.path().join("p.ngc"), program).unwrap();
+    for (frames, refused) in [("", false), ("[frames.part]\nposition = [300, 0, 0]\n", true), ("[frames.part]\nposition = [100, 0, 0]\n", false)] {
+        let text = format!("format = 1\nextends = \"generic/mill3\"\nid = \"test/m\"\n{frames}{accuracy}");
+        std::fs::write(folder.path().join("m.toml"), text).unwrap();
+        let o = run(folder.path(), &["accuracy", "p.ngc", "--machine=m.toml", "--message-format=short"]);
+        assert_eq!((!o.status.success(), whole(&o).contains("p.ngc:6:1: error[E0507]")), (refused, refused), "{frames}{}", whole(&o));
+    }
+}
+
 /// A Tricept's lever is that of its wrist. 18.4 at X -300 Y 200 Z -1500 comes from a Jacobian worked out by hand: legs in
 /// closed form, tool point and lean of the tool, 200 mm from the wrist to the flange.
 #[test]

@@ -97,6 +97,10 @@ fn tables_and_settings() {
     for line in ["[TRAJ]\nSPINDLES = 9", "[AXIS_X]\nMAX_LIMIT = 400 # mm", "[EMCIO]\nTOOL_CHANGE_AT_G30 = YES"] {
         told("E0852", &[part.clone(), file("a.ini", &format!("{line}\n"))], "check -i a.ini a.ngc");
     }
+    // What a strict check does not pass is not passed in set-up files either.
+    let ini = file("a.ini", "[EMCIO]\nTOOL_CHANGE_AT_G30 = YES\n");
+    let (found, status) = codes(&[part.clone(), ini], "check --strict -i a.ini a.ngc");
+    assert_eq!((found.iter().filter(|c| *c == "E0852").count(), status), (1, Some(1)), "{found:?}");
     let many: String = (1..=1100).map(|n| format!("T{n} P{n} Z1\n")).collect();
     told("E0837", &[part, file("a.tbl", &many)], "check --tools a.tbl a.ngc");
     let ini = file("a.ini", "[EMCIO]\nTOOL_TABLE = a.tbl\n[TRAJ]\nLINEAR_UNITS = mm\n");

@@ -235,7 +235,8 @@ fn predict(
     if !strange.is_empty() {
         return Err(strange);
     }
-    for (source, joint, value) in report.outside.iter().filter(|_| args.part.is_some()) {
+    let placed = args.part.is_some() || machine.cell.part_in_base() != gr_machine::math::Frame::IDENTITY;
+    for (source, joint, value) in report.outside.iter().filter(|_| placed) {
         let (file, span) = place(motion, *source);
         found.extend(beyond(machine, *joint, *value, file, span));
     }
