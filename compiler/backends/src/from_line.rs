@@ -49,7 +49,7 @@ pub fn from_line(
         return fault(code::FROM_LINE_INSIDE_COMPENSATION);
     }
     let cursor = program.cursor_at(found.index);
-    if inside_cycle(program, found.index) || cursor.state().sync.is_some() {
+    if inside_cycle(program, found.index) || cursor.state().sync.is_some() || threaded(program, found.index) {
         return fault(code::FROM_LINE_INSIDE_CYCLE);
     }
     if let Some(way) = found.repeated {
@@ -170,6 +170,13 @@ fn compensated(program: &Program, index: usize, line: u32, sources: &dyn Sources
         }
     }
     on
+}
+
+/// Whether the last move before an operation followed the spindle: the tool stands in the thread that it cut, and gets
+/// there again by no other move.
+fn threaded(program: &Program, index: usize) -> bool {
+    let last = program.steps().take(index).filter(|s| s.op.moves() && s.start.axes != s.end.axes).last();
+    last.is_some_and(|s| program.cursor_at(s.index).state().sync.is_some_and(|sync| !sync.velocity))
 }
 
 fn inside_cycle(program: &Program, index: usize) -> bool {

@@ -509,6 +509,18 @@ fn a_reference_move_without_a_way_point_has_none() {
     }
 }
 
+/// Behind a G33 the tool stands in its thread: no other move brings it there. Behind the way out it does not.
+#[test]
+fn no_start_in_a_thread() {
+    let text = "G21 G90\nM3 S100\nG0 X0 Y10 Z5\nG33 Z-25 K1\nG4 P1\nG33 Z5 K1\nG0 X9\nG1 Z-1 F100\nM2\n";
+    let texts = Texts::new([(FileId(0), text)]);
+    let o = from_line::Options { safe_z: Some(25.0) };
+    let found = from_line::from_line(&run(text), FileId(0), 5, &o, &texts).map(|_| ()).expect_err("no start");
+    assert_eq!(found[0].code.def().slug, "from-line/inside-cycle");
+    assert!(from_line::from_line(&run(text), FileId(0), 8, &o, &texts).is_ok());
+    assert!(from_line::from_line(&run(text), FileId(0), 4, &o, &texts).is_ok());
+}
+
 /// A line of a loop that moves nothing begins where the loop goes on, not behind it.
 #[test]
 fn a_restart_in_a_loop_stays_in_it() {
