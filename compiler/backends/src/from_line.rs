@@ -1,9 +1,11 @@
 //! A program from a line on: what was in force there is set again, the tool goes to the place over a safe
 //! height, and the rest follows. The result is motion IR like any other, so every back end can write it.
 
+mod approach;
+
 use std::collections::BTreeMap;
 
-use crate::sources::Words;
+use crate::sources::{Words, is_hidden};
 use gr_ir::Sources;
 use gr_ir::{Builder, FrameId, Marker, Note, Op, Override, PathMode, Pose, Program, Source, State, Turn, Units};
 use gr_text::{Diagnostic, FileId, Span, code};
@@ -11,8 +13,8 @@ use gr_text::{Diagnostic, FileId, Span, code};
 /// Line number of operations that no source line asked for.
 pub const INSERTED: u32 = u32::MAX;
 
-/// How far above the place rapid ends and feed begins, mm.
-const CLEARANCE: f64 = 2.0;
+/// Heights that differ by less, mm, are the same.
+const SAME_HEIGHT: f64 = 1e-6;
 
 /// What can be chosen.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
@@ -69,7 +71,7 @@ pub fn from_line(
     if length == Some(0.0) {
         notes.push(Diagnostic::new(code::FROM_LINE_BARE_SPINDLE, place.0, place.1, &[state.tool.to_string()]));
     }
-    if let Some(lowest) = lowest_crossing(program, &state).filter(|lowest| safe.max(pose.axes[2]) < lowest - SAME_HEIGHT) {
+    if let Some(lowest) = approach::lowest_crossing(program, &state).filter(|lowest| safe.max(pose.axes[2]) < lowest - SAME_HEIGHT) {
         let heights = [safe.max(pose.axes[2]), lowest].map(|z| format!("{z:.3}"));
         notes.push(Diagnostic::new(code::FROM_LINE_LOW_HEIGHT, place.0, place.1, &heights));
     }
@@ -221,24 +223,6 @@ fn length_to_come(program: &Program, index: usize, state: &State) -> Option<f64>
     said
 }
 
-/// Heights that differ by less, mm, are the same.
-const SAME_HEIGHT: f64 = 1e-6;
-
-/// How low the rapids of the program go sideways, in the work frame of a state.
-fn lowest_crossing(program: &Program, state: &State) -> Option<f64> {
-    let zero = state.machine(&[0.0; 9])[2];
-    let mut lowest: Option<f64> = None;
-    let mut cursor = program.cursor();
-    while let Some(view) = cursor.next() {
-        let [from, to] = [view.start, view.end].map(|p| view.state.machine(&p.axes));
-        if view.op == Op::Rapid && (from[0] != to[0] || from[1] != to[1]) {
-            let low = from[2].min(to[2]) - zero;
-            lowest = Some(lowest.map_or(low, |l| l.min(low)));
-        }
-    }
-    lowest
-}
-
 /// Where a program begins.
 struct From {
     index: usize,
@@ -250,15 +234,10 @@ struct From {
 /// Axes whose place a program has said in its work frame before an operation. Of the others, and of those that G28, G30
 /// and G53 brought to a place of the machine, the numbers are only what a simulation takes them for.
 fn known_axes(program: &Program, index: usize, sources: &dyn Sources) -> [bool; 9] {
-    let (mut known, mut hidden) = ([false; 9], false);
-    for s in program.steps().take(index) {
-        if let Op::Note(Note::Comment, text) = s.op {
-            hidden = text == "AXIS,hide" || hidden && text != "AXIS,show";
-        }
-        if !s.op.moves() {
-            continue;
-        }
+    let mut known = [false; 9];
+    for s in program.steps().take(index).filter(|s| s.op.moves()) {
         let words = Words::at(sources, s.source.file, s.source.line);
+        let hidden = words.is_some_and(|w| !w.names_axes()) && is_hidden(program, s.index);
         let fixed = hidden || words.is_some_and(|w| [280, 300, 530].into_iter().any(|g| w.g(g)));
         let home = fixed && !hidden && words.is_some_and(|w| !w.g(530) && !AXIS_LETTERS.iter().any(|l| w.has(*l)));
         for (i, letter) in AXIS_LETTERS.iter().enumerate() {
@@ -307,7 +286,7 @@ fn build(program: &Program, from: &From, state: &State, pose: &Pose, safe: f64, 
     if waiting {
         goal.axes[2] = safe;
     }
-    restore.approach(program, index, state, &goal, approached, safe);
+    approach::Approach { program, index, state, goal, approached, safe }.make(&mut restore);
     let mut out = restore.out;
     let mut rest = program.cursor_at(index);
     while let Some(view) = rest.next() {
@@ -421,113 +400,6 @@ impl Restore {
         digital.into_iter().for_each(|(index, on)| self.push(Op::DigitalOut { index, on, synced: false }));
         analog.into_iter().for_each(|(index, value)| self.push(Op::AnalogOut { index, value, synced: false }));
     }
-
-    /// Up, over the place, down: rapid to just above it, then at feed.
-    fn approach(&mut self, program: &Program, index: usize, state: &State, goal: &Pose, approached: [bool; 9], safe: f64) {
-        let mut at = *self.out.pose();
-        let mut ways: Vec<Pose> = Vec::new();
-        let mut go = |axes: &[usize], to: &dyn Fn(usize) -> f64| {
-            axes.iter().filter(|i| approached[**i]).for_each(|i| at.axes[*i] = to(*i));
-            ways.push(at);
-        };
-        let goes = |i: usize| goal.axes[i];
-        let others: Vec<usize> = (0..9).filter(|i| *i != 2).collect();
-        if is_lathe(program, state) && approached[0] && goal.axes[2] != safe {
-            let rapid = last_rapid(program, index);
-            let last = rapid.map_or(goal.axes[0], |p| p.axes[0]);
-            let by_rapid = rapid.is_some_and(|p| p.axes == goal.axes);
-            let beside: Vec<usize> = (1..9).filter(|i| *i != 2).collect();
-            if last >= goal.axes[0] {
-                // From outside: along Z where no stock is, then in as the program came.
-                let out = outmost(program, state).max(last);
-                go(&[0], &|_| out);
-                go(&beside, &goes);
-                go(&[2], &goes);
-                go(&[0], &|i| if by_rapid { goes(i) } else { last.max(goes(i) + CLEARANCE) });
-            } else {
-                // In a bore: from the front, at the radius where the program goes by rapid.
-                go(&[2], &|_| safe);
-                go(&[0], &|_| last.min(goes(0) - CLEARANCE));
-                go(&beside, &goes);
-                go(&[2], &goes);
-            }
-        } else {
-            go(&[2], &|_| safe);
-            go(&others, &goes);
-            let rapids = lowest_crossing(program, state).unwrap_or(safe);
-            let height = goal.axes[2];
-            go(&[2], &|_| if height < safe { (height + CLEARANCE).max(rapids).min(safe) } else { safe });
-        }
-        let mut here = *self.out.pose();
-        for way in ways {
-            if way != here {
-                self.out.push_to(Op::Rapid, &way, self.source);
-            }
-            here = way;
-        }
-        let mut end = here;
-        (0..9).filter(|i| approached[*i]).for_each(|i| end.axes[i] = goal.axes[i]);
-        if end == here {
-            return;
-        }
-        let per_turn = state.feed_mode == gr_ir::FeedMode::PerRev;
-        let turns = state.spindles.iter().any(|s| s.turn != Turn::Stop && s.speed != 0.0);
-        let feeds = state.feed > 0.0 && (state.feed_mode == gr_ir::FeedMode::PerTime || per_turn && turns);
-        if !feeds && last_rapid(program, index).is_some_and(|p| p.axes == goal.axes) {
-            return self.out.push_to(Op::Rapid, &end, self.source);
-        }
-        if !feeds {
-            // No feed is in force, but this may be in the material: one that the program has elsewhere.
-            self.push(Op::FeedMode { spindle: state.feed_spindle, mode: gr_ir::FeedMode::PerTime });
-            self.push(Op::Feed { linear: feed_elsewhere(program, index), angular: state.feed_angular });
-        }
-        self.out.push_to(Op::Linear, &end, self.source);
-        if !feeds {
-            self.push(Op::FeedMode { spindle: state.feed_spindle, mode: state.feed_mode });
-            self.push(Op::Feed { linear: state.feed, angular: state.feed_angular });
-        }
-    }
-}
-
-/// Turning: the plane of X and Z, and nothing ever moves in Y.
-fn is_lathe(program: &Program, state: &State) -> bool {
-    state.plane == gr_ir::Plane::Xz && !axes_used(program)[1]
-}
-
-/// Where the last rapid before an operation ended: the program says that nothing is there.
-fn last_rapid(program: &Program, index: usize) -> Option<Pose> {
-    program.steps().take(index).filter(|s| s.op == Op::Rapid && s.start.axes != s.end.axes).last().map(|s| s.end)
-}
-
-/// The greatest X of the whole program, in the work frame of a state.
-fn outmost(program: &Program, state: &State) -> f64 {
-    let zero = state.machine(&[0.0; 9])[0];
-    let mut most = f64::NEG_INFINITY;
-    let mut cursor = program.cursor();
-    while let Some(view) = cursor.next() {
-        if view.op.moves() {
-            most = most.max(view.state.machine(&view.end.axes)[0] - zero);
-        }
-    }
-    most
-}
-
-/// Feed of an approach in programs that never say one per minute, mm/s.
-const SLOW: f64 = 100.0 / 60.0;
-
-/// The first feed per minute behind an operation, else the last before it.
-fn feed_elsewhere(program: &Program, index: usize) -> f64 {
-    let mut cursor = program.cursor();
-    let mut found = None;
-    while let Some(view) = cursor.next() {
-        if view.op.feeds() && view.state.feed_mode == gr_ir::FeedMode::PerTime && view.state.feed > 0.0 {
-            found = Some(view.state.feed);
-            if view.index >= index {
-                break;
-            }
-        }
-    }
-    found.unwrap_or(SLOW)
 }
 
 /// Which axes ever move.

@@ -193,6 +193,15 @@ mod tests {
         assert!(Pending::new(folder.path()).is_err());
     }
 
+    /// The first file made the folder of both: it goes last.
+    #[test]
+    fn no_folder_is_left() {
+        let folder = tempfile::tempdir().unwrap();
+        let both = ["a", "b"].map(|n| folder.path().join("out").join(n));
+        drop_all(both.into_iter().map(|p| (p.clone(), Pending::new(&p).unwrap())).collect());
+        assert!(!folder.path().join("out").exists());
+    }
+
     #[test]
     fn all_or_none() {
         let folder = tempfile::tempdir().unwrap();

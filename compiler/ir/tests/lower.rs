@@ -335,6 +335,20 @@ fn spindles_and_coolant_behind_rapids_are_told_apart() {
     assert!(diff(&early, &late, &Tolerance::default()).is_empty());
 }
 
+/// What offsets leave by rounding in an axis that stands still makes no linear move of a rotary one.
+#[test]
+fn rounding_does_not_change_what_a_feed_is() {
+    let turn = |dust: f64| {
+        let mut end = at(1.0 + dust, 0.0, 0.0);
+        end[3] = 90.0;
+        lower(&[Call::SetFeedRate(360.0), Call::StraightTraverse(at(1.0, 0.0, 0.0)), Call::StraightFeed(end)])
+    };
+    let result = diff(&turn(0.0), &turn(1e-12), &Tolerance::default());
+    assert!(result.is_empty(), "{result:?}");
+    let result = diff(&turn(0.0), &turn(1e-3), &Tolerance { length: 1.0, ..Tolerance::default() });
+    assert!(result.differs(Aspect::Feed), "{result:?}");
+}
+
 #[test]
 fn a_million_moves_in_64_bytes_each() {
     let mut out = Lowering::new();

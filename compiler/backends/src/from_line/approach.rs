@@ -1,0 +1,164 @@
+//! The way of the tool to where a program begins later: up, over the place and down; on a lathe from outside, in a bore
+//! from the front. Rapids go no lower than the program's own, the rest is fed.
+
+use gr_ir::{FeedMode, Op, Plane, Pose, Program, State, Turn};
+
+use super::{Restore, axes_used};
+
+/// How far before the place rapid ends and feed begins, mm.
+const CLEARANCE: f64 = 2.0;
+
+/// What an approach goes by.
+pub(super) struct Approach<'a> {
+    pub program: &'a Program,
+    /// The first operation that follows.
+    pub index: usize,
+    /// What is in force there.
+    pub state: &'a State,
+    pub goal: Pose,
+    /// Axes that go there; of the others nobody knows where they are.
+    pub approached: [bool; 9],
+    /// Safe height in the work frame, mm.
+    pub safe: f64,
+}
+
+/// Places of an approach, one after the other.
+struct Ways {
+    at: Pose,
+    approached: [bool; 9],
+    places: Vec<Pose>,
+}
+
+impl Ways {
+    fn go(&mut self, axes: impl IntoIterator<Item = usize>, to: impl Fn(usize) -> f64) {
+        for i in axes.into_iter().filter(|i| self.approached[*i]) {
+            self.at.axes[i] = to(i);
+        }
+        self.places.push(self.at);
+    }
+}
+
+impl Approach<'_> {
+    /// Writes the moves behind what is restored.
+    pub fn make(&self, restore: &mut Restore) {
+        let mut ways = Ways { at: *restore.out.pose(), approached: self.approached, places: Vec::new() };
+        if self.approached[0] && self.goal.axes[2] != self.safe && is_lathe(self.program, self.state) {
+            self.turning(&mut ways);
+        } else {
+            self.from_above(&mut ways);
+        }
+        for place in ways.places {
+            if place != *restore.out.pose() {
+                restore.out.push_to(Op::Rapid, &place, restore.source);
+            }
+        }
+        let mut end = *restore.out.pose();
+        (0..9).filter(|i| self.approached[*i]).for_each(|i| end.axes[i] = self.goal.axes[i]);
+        if end != *restore.out.pose() {
+            self.go_in(restore, &end);
+        }
+    }
+
+    fn from_above(&self, ways: &mut Ways) {
+        let (height, safe) = (self.goal.axes[2], self.safe);
+        ways.go([2], |_| safe);
+        ways.go((0..9).filter(|i| *i != 2), |i| self.goal.axes[i]);
+        let rapids = lowest_crossing(self.program, self.state).unwrap_or(safe);
+        ways.go([2], |_| if height < safe { (height + CLEARANCE).max(rapids).min(safe) } else { safe });
+    }
+
+    fn turning(&self, ways: &mut Ways) {
+        let goal = |i: usize| self.goal.axes[i];
+        let rapid = last_rapid(self.program, self.index);
+        let radius = rapid.map_or(goal(0), |p| p.axes[0]);
+        let beside = (1..9).filter(|i| *i != 2);
+        if radius < goal(0) {
+            // In a bore: from the front, at the radius where the program goes by rapid.
+            ways.go([2], |_| self.safe);
+            ways.go([0], |_| radius.min(goal(0) - CLEARANCE));
+            ways.go(beside, goal);
+            ways.go([2], goal);
+            return;
+        }
+        // From outside: along Z where no stock is, then in as the program came.
+        let out = outmost(self.program, self.state).max(radius);
+        let there = rapid.is_some_and(|p| p.axes == self.goal.axes);
+        ways.go([0], |_| out);
+        ways.go(beside, goal);
+        ways.go([2], goal);
+        ways.go([0], |i| if there { goal(i) } else { radius.max(goal(i) + CLEARANCE) });
+    }
+
+    /// The last piece: at the feed in force, by rapid where the program was by rapid, else at a feed that it has elsewhere.
+    fn go_in(&self, restore: &mut Restore, end: &Pose) {
+        let s = self.state;
+        let turns = s.spindles.iter().any(|s| s.turn != Turn::Stop && s.speed != 0.0);
+        if s.feed > 0.0 && (s.feed_mode == FeedMode::PerTime || s.feed_mode == FeedMode::PerRev && turns) {
+            return restore.out.push_to(Op::Linear, end, restore.source);
+        }
+        if last_rapid(self.program, self.index).is_some_and(|p| p.axes == self.goal.axes) {
+            return restore.out.push_to(Op::Rapid, end, restore.source);
+        }
+        restore.push(Op::FeedMode { spindle: s.feed_spindle, mode: FeedMode::PerTime });
+        restore.push(Op::Feed { linear: feed_elsewhere(self.program, self.index), angular: s.feed_angular });
+        restore.out.push_to(Op::Linear, end, restore.source);
+        restore.push(Op::FeedMode { spindle: s.feed_spindle, mode: s.feed_mode });
+        restore.push(Op::Feed { linear: s.feed, angular: s.feed_angular });
+    }
+}
+
+/// How low the rapids of the program go sideways, in the work frame of a state.
+pub(super) fn lowest_crossing(program: &Program, state: &State) -> Option<f64> {
+    let zero = state.machine(&[0.0; 9])[2];
+    let mut lowest: Option<f64> = None;
+    let mut cursor = program.cursor();
+    while let Some(view) = cursor.next() {
+        let [from, to] = [view.start, view.end].map(|p| view.state.machine(&p.axes));
+        if view.op == Op::Rapid && (from[0] != to[0] || from[1] != to[1]) {
+            let low = from[2].min(to[2]) - zero;
+            lowest = Some(lowest.map_or(low, |l| l.min(low)));
+        }
+    }
+    lowest
+}
+
+/// Turning: the plane of X and Z, and nothing ever moves in Y.
+fn is_lathe(program: &Program, state: &State) -> bool {
+    state.plane == Plane::Xz && !axes_used(program)[1]
+}
+
+/// Where the last rapid before an operation ended: the program says that nothing is there.
+fn last_rapid(program: &Program, index: usize) -> Option<Pose> {
+    program.steps().take(index).filter(|s| s.op == Op::Rapid && s.start.axes != s.end.axes).last().map(|s| s.end)
+}
+
+/// The greatest X of the whole program, in the work frame of a state.
+fn outmost(program: &Program, state: &State) -> f64 {
+    let zero = state.machine(&[0.0; 9])[0];
+    let mut most = f64::NEG_INFINITY;
+    let mut cursor = program.cursor();
+    while let Some(view) = cursor.next() {
+        if view.op.moves() {
+            most = most.max(view.state.machine(&view.end.axes)[0] - zero);
+        }
+    }
+    most
+}
+
+/// Feed of an approach in programs that never say one per minute, mm/s.
+const SLOW: f64 = 100.0 / 60.0;
+
+/// The first feed per minute behind an operation, else the last before it.
+fn feed_elsewhere(program: &Program, index: usize) -> f64 {
+    let mut cursor = program.cursor();
+    let mut found = None;
+    while let Some(view) = cursor.next() {
+        if view.op.feeds() && view.state.feed_mode == FeedMode::PerTime && view.state.feed > 0.0 {
+            found = Some(view.state.feed);
+            if view.index >= index {
+                break;
+            }
+        }
+    }
+    found.unwrap_or(SLOW)
+}
