@@ -11,7 +11,7 @@ use gr_ir::{Marker, Op, Program, Source, State, Turn, View};
 use gr_machine::{Chain, Control, Kind, Kinematics, Machine};
 use gr_machine::math::{Frame, V3, add, about, cross, dot, norm, rotate, scale, sub, turn_of};
 use gr_robot::{Action, RobotProgram, Target};
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 
 /// What a tool does to the material in an operation; what is not known is none.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
@@ -49,15 +49,20 @@ impl CutData {
     pub fn too_wide(&self) -> bool {
         matches!((self.width, self.diameter), (Some(w), Some(d)) if w > d * (1.0 + 1e-9))
     }
-    /// Names of what is not known for this kind of work.
-    pub fn missing(&self, work: Work) -> Vec<&'static str> {
+    /// What is not known for this kind of work.
+    pub fn missing(&self, work: Work) -> Vec<Lack> {
+        let of_tool = |what| Lack { what, of_tool: true };
+        let of_cut = |what| Lack { what, of_tool: false };
         let mill = [
-            (self.diameter, "the diameter of the tool (`--diameter`)"),
-            (self.teeth, "its number of teeth (`--teeth`)"),
-            (self.depth, "the depth of cut (`--depth`)"),
-            (self.width, "the width of cut (`--width`)"),
+            (self.diameter, of_tool("the diameter of the tool (`--diameter`)")),
+            (self.teeth, of_tool("its number of teeth (`--teeth`)")),
+            (self.depth, of_cut("the depth of cut (`--depth`)")),
+            (self.width, of_cut("the width of cut (`--width`)")),
         ];
-        let drill = [(self.diameter, "the diameter of the drill"), (self.point, "the point angle of the drill (`--point`)")];
+        let drill = [
+            (self.diameter, of_tool("the diameter of the drill (`--diameter`)")),
+            (self.point, of_tool("the point angle of the drill (`--point`)")),
+        ];
         let all = match work {
             Work::Mill => &mill[..],
             Work::Drill => &drill[..],
@@ -65,6 +70,15 @@ impl CutData {
         };
         all.iter().filter(|(v, _)| v.is_none()).map(|(_, n)| *n).collect()
     }
+}
+
+/// A number that a force law needs and nobody says.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+pub struct Lack {
+    /// Its name, and the option that says it.
+    pub what: &'static str,
+    /// It belongs to the tool, and else to the cut.
+    pub of_tool: bool,
 }
 
 /// How a tool takes the material away, as far as a force law goes.
@@ -107,6 +121,8 @@ pub struct Operation {
     pub cut: CutData,
     /// What it does all the time, where that is known; else each place says.
     pub work: Option<Work>,
+    /// Where its first cut is.
+    pub first: Source,
 }
 
 /// The operations of a program, and which one each place of the source belongs to.
@@ -181,7 +197,7 @@ impl Operations {
                         None => format!("T{} {}", tool.0, tool.1),
                     };
                     let workingstep = step.as_ref().map_or(0, |s| s.0);
-                    out.list.push(Operation { name, tool: tool.0, workingstep, ..Operation::default() });
+                    out.list.push(Operation { name, tool: tool.0, workingstep, first: view.source, ..Operation::default() });
                     out.works.push(Vec::new());
                     out.list.len() - 1
                 });
@@ -214,6 +230,8 @@ pub struct Worst {
     pub joints: Vec<f64>,
     /// Errors there.
     pub errors: Errors,
+    /// Thickness of the chip there, mm, where the deflection is by one that the force law was not measured for.
+    pub beyond_law: Option<f64>,
     /// What makes most of it: names of joints and numbers of the geometry, and how far each alone moves the tool point,
     /// mm, the greatest first.
     pub causes: Vec<(String, f64)>,
@@ -251,6 +269,17 @@ pub enum Unforced {
     TooWide,
 }
 
+/// A line whose deflection is by a chip that the force law was not measured for.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct BeyondLaw {
+    /// The line.
+    pub source: Source,
+    /// Thickness of the chip, mm.
+    pub chip: f64,
+    /// The largest deflection of the line by such a chip, mm.
+    pub deflection: f64,
+}
+
 /// One row of the report.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Row {
@@ -264,8 +293,8 @@ pub struct Row {
     pub over: Vec<Stretch>,
     /// Largest kinematic, geometric and elastic error anywhere in it, mm.
     pub most: [Option<f64>; 3],
-    /// Least and greatest thickness of the chip, mm, and where.
-    pub chip: Option<[(f64, Source); 2]>,
+    /// Lines whose chip is thinner or thicker than the force law was measured for, by file and line.
+    pub beyond_law: BTreeMap<(u32, u32), BeyondLaw>,
     /// Places whose force is not known: the first of each kind, and why.
     pub unforced: Vec<(Source, Unforced)>,
     /// How far at most the measured deviations of the machine put the tool point off, mm, and where: what compensation takes
@@ -343,7 +372,7 @@ pub fn report(
 }
 
 fn row(operation: Operation) -> Row {
-    Row { operation, places: 0, worst: None, over: Vec::new(), most: [None; 3], chip: None, unforced: Vec::new(), measured: None }
+    Row { operation, places: 0, worst: None, over: Vec::new(), most: [None; 3], beyond_law: BTreeMap::new(), unforced: Vec::new(), measured: None }
 }
 
 /// A place that is looked at.
@@ -550,9 +579,13 @@ impl<'a> Walk<'a> {
                 (a, b) => a.or(b),
             };
         }
-        if let Some(chip) = force.and_then(|f| f.1) {
-            let [least, most] = row.chip.unwrap_or([(chip, source); 2]);
-            row.chip = Some([if chip < least.0 { (chip, source) } else { least }, if chip > most.0 { (chip, source) } else { most }]);
+        let chip = force.and_then(|f| f.1).filter(|h| self.material.is_some_and(|m| *h < m.range.0 || *h > m.range.1));
+        let beyond_law = chip.filter(|_| errors.elastic.is_some());
+        if let (Some(chip), Some(deflection)) = (beyond_law, errors.elastic.map(norm)) {
+            let line = row.beyond_law.entry((source.file.0, source.line)).or_insert(BeyondLaw { source, chip, deflection });
+            if deflection > line.deflection {
+                *line = BeyondLaw { source, chip, deflection };
+            }
         }
         let sum = errors.sum();
         if row.operation.tolerance.is_some_and(|t| sum > t) {
@@ -572,7 +605,7 @@ impl<'a> Walk<'a> {
         }
         if row.worst.as_ref().is_none_or(|w| sum > w.errors.sum()) {
             let causes = causes(self.machine, at, self.budget);
-            row.worst = Some(Worst { source, point: spot.point, joints: spot.joints.clone(), errors, causes });
+            row.worst = Some(Worst { source, point: spot.point, joints: spot.joints.clone(), errors, beyond_law, causes });
         }
     }
 

@@ -827,3 +827,37 @@ fn condition_in_units_of_the_longest_lever() {
     }
     assert!(looked > 50, "{looked}");
 }
+
+/// The validity of the force law is told where the number of the row comes from, with the other lines that leave it; what a STEP-NC
+/// file doesn't say, or says of a material that is in no table, is told at the instance that would.
+#[test]
+fn told_where_it_is() {
+    let folder = tempfile::tempdir().unwrap();
+    let head = "G21 G90 G94\nT1 M6\nG43 H1\nS1000 M3\nF6\n";
+    let cut = ["--part=700,0,0", "--machine=usp/2ups-prp", "--material=1045", "--teeth=4", "--depth=0.5", "--width=2", "--diameter=10", "-q"];
+    let told = |text: &str| {
+        std::fs::write(folder.path().join("p.ngc"), format!("{head}{text}M5\nM2\n")).unwrap();
+        let text = whole(&run(folder.path(), &[&["accuracy", "p.ngc"], &cut[..]].concat()));
+        let err = text.split("--- err\n").nth(1).unwrap();
+        let all: Vec<&str> = err.split("\n\n").filter(|d| d.contains("E0703")).collect();
+        assert_eq!(all.len(), 1, "{text}");
+        all[0].trim().to_string()
+    };
+    let step = std::fs::read_to_string(examples().join("stepnc/case-study.p21")).unwrap();
+    let report = |text: &str, args: &[&str]| {
+        std::fs::write(folder.path().join("part.p21"), text).unwrap();
+        let o = run(folder.path(), &[&["accuracy", "part.p21", "--machine=usp/2ups-prp", "--part=700,-100,0", "--tolerance=1", "--message-format=short", "-q"], args].concat());
+        whole(&o).split("--- err\n").nth(1).unwrap().to_string()
+    };
+    let line = step.lines().find(|l| l.starts_with("#7=")).unwrap();
+    let nameless = step.replace(line, "#7=MATERIAL($,$,());");
+    let all = [
+        // The row is of the fast line, the slow ones are named; then the row is within the law and a slow line is not.
+        told("G0 X0 Y0 Z0\nG1 X20\nG1 X20.9 F60000\nG1 X20 F6\n"),
+        told("G0 X0 Y0 Z0\nG1 X20 F600\nG1 X21 F6\n"),
+        report(&step, &[]),
+        report(&nameless, &[]),
+        report(&nameless, &["--material=1045"]),
+    ];
+    insta::assert_snapshot!(all.join("\n---\n"));
+}

@@ -65,6 +65,8 @@ pub struct Workpiece {
     pub name: String,
     /// Material.
     pub material: String,
+    /// Instance that says it.
+    pub material_at: Option<Origin>,
     /// Global tolerance as written, mm.
     pub tolerance: Option<f64>,
     /// Raw block: where its corner lies, and its size.

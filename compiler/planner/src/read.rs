@@ -212,8 +212,10 @@ impl<'m> Reader<'m> {
             let frame = b.node("position").and_then(|p| self.placement(p)).unwrap_or_default();
             Some((frame, [b.real("x")?, b.real("y")?, b.real("z")?]))
         });
-        let material = w.node("its_material").map_or(String::new(), |m| m.string("standard_identifier").into_owned());
-        Workpiece { origin: origin(w), name: w.string("its_id").into_owned(), material, tolerance: w.length("global_tolerance"), block }
+        let stated = w.node("its_material");
+        let material = stated.map_or(String::new(), |m| m.string("standard_identifier").into_owned());
+        let material_at = stated.map(origin);
+        Workpiece { origin: origin(w), name: w.string("its_id").into_owned(), material, material_at, tolerance: w.length("global_tolerance"), block }
     }
 
     /// Adds what an executable does.

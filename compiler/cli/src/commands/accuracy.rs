@@ -1,11 +1,12 @@
 //! `gcc-robot accuracy part.p21 --machine usp/2ups-prp`
 
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use std::path::Path;
 
 use gr_accuracy::material::{self, Material};
 use gr_accuracy::map::DOUBT;
-use gr_accuracy::report::{CutData, Operations, Report, Row, Stretch, Unforced, Work, report, report_of_words};
+use gr_accuracy::report::{BeyondLaw, CutData, Lack, Operations, Report, Row, Stretch, Unforced, Work, report, report_of_words};
 use gr_accuracy::{Budget, BudgetOptions, put_down};
 use gr_ir::{Source, Sources as _};
 use gr_machine::Machine;
@@ -181,12 +182,14 @@ fn predict(
 ) -> Result<(String, Vec<Diagnostic>, Beside), Vec<Diagnostic>> {
     let process = unit.exchange.then(|| crate::exchange::process(unit).ok().map(|(p, _, _)| p)).flatten();
     let mut operations = Operations::new(&motion.program);
-    let fits = cutting(&mut operations, args, unit, motion, process.as_ref());
+    let Cutting { fits, stated } = cutting(&mut operations, args, unit, motion, process.as_ref());
     let global = process.as_ref().and_then(|p| p.workpieces.iter().find_map(|w| w.tolerance)).filter(|t| *t > 0.0);
     operations.list.iter_mut().for_each(|o| o.tolerance = args.tolerance.or(o.tolerance).or(global));
     let top = (FileId(0), Span::default());
     let say = |code, args: &[String]| Diagnostic::new(code, top.0, top.1, args);
-    let wanted = args.material.clone().or_else(|| process.as_ref().and_then(|p| p.workpieces.iter().map(|w| w.material.clone()).find(|m| !m.is_empty())));
+    let workpieces = process.as_ref().map_or(&[][..], |p| &p.workpieces);
+    let stated_material = workpieces.iter().find(|w| !w.material.is_empty());
+    let wanted = args.material.clone().or_else(|| stated_material.map(|w| w.material.clone()));
     let found_material = wanted.as_deref().map(|name| (name, material::find(name)));
     let mut found = Vec::new();
     if args.tolerance.is_none() {
@@ -197,11 +200,13 @@ fn predict(
         Some((name, None)) => {
             let known: Vec<&str> = material::materials().iter().filter_map(|m| m.names.first().map(String::as_str)).collect();
             let list = format!("known are {}", known.join(", "));
-            let mut d = say(code::ACCURACY_UNKNOWN_MATERIAL, &[name.to_string(), list]);
+            let told = [name.to_string(), list];
             if args.material.is_some() {
-                return Err(vec![d]);
+                return Err(vec![say(code::ACCURACY_UNKNOWN_MATERIAL, &told)]);
             }
             // A material that only the file names leaves the deflection out, and nothing else.
+            let at = stated_material.and_then(|w| w.material_at).map_or(top, |o| (FileId(0), o.span));
+            let mut d = Diagnostic::new(code::ACCURACY_UNKNOWN_MATERIAL, at.0, at.1, &told);
             d.severity = Severity::Warning;
             found.push(d);
             None
@@ -218,7 +223,11 @@ fn predict(
     };
     tool_points(&mut found, &mut planned_on, &motion.program, &say);
     found.extend(unsaid(machine, budget).into_iter().map(|args| say(code::ACCURACY_NO_DATA, &args)));
-    missing(&mut found, machine, &operations, material, &say);
+    let unsaid_at = workpieces.first().map_or(top, |w| (FileId(0), w.material_at.unwrap_or(w.origin).span));
+    missing(&mut found, machine, &operations, material, (top, unsaid_at), &|n, of_tool| match stated.get(n).copied().flatten() {
+        Some(s) => (FileId(0), if of_tool { s.tool } else { s.operation }.span),
+        None => operations.list.get(n).map_or(top, |o| place(motion, o.first)),
+    });
     let tell = |done: usize, of: usize| progress.tell(|| format!("errors at step {done} of {of}"));
     let report = match report_of_words(&motion.program, &planned_on, &operations, budget, material, &tell) {
         Some(report) => report,
@@ -274,7 +283,6 @@ pub fn beyond(machine: &Machine, joint: usize, value: f64, file: FileId, span: S
 
 /// Fits that can't be read, each with the operations that it is of.
 fn unread(fits: Vec<(String, Origin)>) -> Vec<Diagnostic> {
-    const NAMED: usize = 3;
     let mut by_fit: Vec<(Origin, Vec<String>)> = Vec::new();
     for (operation, fit) in fits {
         match by_fit.iter_mut().find(|f| f.0 == fit) {
@@ -283,11 +291,9 @@ fn unread(fits: Vec<(String, Origin)>) -> Vec<Diagnostic> {
         }
     }
     let one = |(fit, operations): (Origin, Vec<String>)| {
-        let more = operations.len().saturating_sub(NAMED);
-        let names = operations[..operations.len() - more].join(", ");
-        let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+        let names: Vec<&str> = operations.iter().map(String::as_str).collect();
         let why = "a `grade` of LIMITS_AND_FITS is the width of the band, a length above 0 and below 1 mm; the number of a grade is not read. `--tolerance` says what is allowed";
-        let what = [format!("the tolerance #{} of {names}{more}", fit.id), why.to_string()];
+        let what = [format!("the tolerance #{} of {}", fit.id, listed(&names)), why.to_string()];
         Diagnostic::new(code::ACCURACY_NO_DATA, FileId(0), fit.span, &what)
     };
     by_fit.into_iter().map(one).collect()
@@ -363,28 +369,76 @@ pub fn soft(machine: &Machine) -> Vec<&str> {
     machine.joints.iter().enumerate().filter(|(i, _)| !known(*i)).map(|(_, j)| j.name.as_str()).collect()
 }
 
-/// Why there is no deflection, told once.
+/// So many places that lack a number are told one by one.
+const LACKING: usize = 10;
+
+/// Why there is no deflection: what the machine lacks at the top, the material at `unsaid_at`; what an operation lacks where its tool
+/// or itself is stated, those that lack the same at the same place together.
 fn missing(
     found: &mut Vec<Diagnostic>,
     machine: &Machine,
     operations: &Operations,
     material: Option<&Material>,
-    say: &dyn Fn(gr_text::Code, &[String]) -> Diagnostic,
+    (top, unsaid_at): (Place, Place),
+    stated: &dyn Fn(usize, bool) -> Place,
 ) {
-    let mut none = |what: &str, why: String| found.push(say(code::ACCURACY_NO_DATA, &[what.to_string(), why]));
+    let none = |(file, span): Place, what: &str, why: String| Diagnostic::new(code::ACCURACY_NO_DATA, file, span, &[what.to_string(), why]);
     let soft = soft(machine);
-    let lacks = |(i, o): (usize, &gr_accuracy::report::Operation)| {
-        operations.works(i).into_iter().flat_map(|w| o.cut.missing(w)).collect::<Vec<_>>()
-    };
-    let unknown: std::collections::BTreeSet<&str> = operations.list.iter().enumerate().flat_map(lacks).collect();
     if !soft.is_empty() {
-        none("the deflection", format!("the file of {} has no `[stiffness]` of {}", machine.id, soft.join(", ")));
-    } else if material.is_none() {
-        none("the deflection", "the material is not known: `--material`".to_string());
-    } else if !unknown.is_empty() {
-        let list: Vec<&str> = unknown.into_iter().collect();
-        none("the deflection of some operations", format!("not known: {}", list.join(", ")));
+        found.push(none(top, "the deflection", format!("the file of {} has no `[stiffness]` of {}", machine.id, soft.join(", "))));
+        return;
     }
+    if material.is_none() {
+        found.push(none(unsaid_at, "the deflection", "the material is not known: `--material`".to_string()));
+        return;
+    }
+    let mut groups: Vec<Lacking> = Vec::new();
+    for (n, operation) in operations.list.iter().enumerate() {
+        let lacks: BTreeSet<Lack> = operations.works(n).into_iter().flat_map(|w| operation.cut.missing(w)).collect();
+        for of_tool in [true, false] {
+            let lacks: Vec<&str> = lacks.iter().filter(|l| l.of_tool == of_tool).map(|l| l.what).collect();
+            if lacks.is_empty() {
+                continue;
+            }
+            let at = stated(n, of_tool);
+            // In G-code nothing states them: those that lack the same are told at the first.
+            let same = |g: &&mut Lacking| g.lacks == lacks && (g.at == at || operation.workingstep == 0);
+            match groups.iter_mut().find(same) {
+                Some(group) => group.names.push(&operation.name),
+                None => groups.push(Lacking { at, lacks, names: vec![&operation.name] }),
+            }
+        }
+    }
+    let more: usize = groups.iter().skip(LACKING).map(|g| g.names.len()).sum();
+    groups.truncate(LACKING);
+    let last = groups.len();
+    for (n, group) in groups.into_iter().enumerate() {
+        let mut d = none(group.at, &format!("the deflection of {}", listed(&group.names)), format!("not known: {}", group.lacks.join(", ")));
+        if more > 0 && n + 1 == last {
+            d.notes.push(format!("{more} more operations lack some of it"));
+        }
+        found.push(d);
+    }
+}
+
+/// A file and a place in it.
+type Place = (FileId, Span);
+
+/// Operations that lack the same numbers, told at one place.
+struct Lacking<'a> {
+    at: Place,
+    lacks: Vec<&'static str>,
+    names: Vec<&'a str>,
+}
+
+/// So many names are told.
+const NAMED: usize = 3;
+
+/// Names of operations; of many the first.
+fn listed(names: &[&str]) -> String {
+    let more = names.len().saturating_sub(NAMED);
+    let more_of_them = if more > 0 { format!(" and {more} more") } else { String::new() };
+    format!("{}{more_of_them}", names[..names.len() - more].join(", "))
 }
 
 /// Whether anything at all is known of an error.
@@ -400,14 +454,39 @@ fn judge(found: &mut Vec<Diagnostic>, row: &Row, material: Option<&Material>, mo
     if let Some(limit) = row.operation.tolerance {
         over(found, row, limit, motion);
     }
-    if let (Some([least, most]), Some(m)) = (row.chip, material)
-        && (least.0 < m.range.0 || most.0 > m.range.1)
-    {
-        let (chip, source) = if least.0 < m.range.0 { least } else { most };
-        let (file, span) = place(motion, source);
-        let args = [row.operation.name.clone(), format!("{chip:.4}"), m.range.0.to_string(), m.range.1.to_string()];
-        found.push(Diagnostic::new(code::ACCURACY_CHIP_THICKNESS, file, span, &args));
+    if let Some(m) = material {
+        found.extend(beyond_law(row, m, motion));
     }
+}
+
+/// So many lines of one operation are named.
+const LINES: usize = 12;
+
+/// The validity of the force law, told once for an operation: at the place that its row is of, else where the deflection by such a chip
+/// is largest; all other lines with such chips by number.
+fn beyond_law(row: &Row, material: &Material, motion: &Motion) -> Option<Diagnostic> {
+    let mut all: Vec<&BeyondLaw> = row.beyond_law.values().collect();
+    all.sort_by(|a, b| b.deflection.total_cmp(&a.deflection));
+    let worst = row.worst.as_ref().and_then(|w| Some((w.source, w.beyond_law?, norm(w.errors.elastic?))));
+    let (source, chip, deflection) = worst.or_else(|| all.first().map(|b| (b.source, b.chip, b.deflection)))?;
+    let thick = |h: f64| if h >= 1.0 { format!("{h:.1}") } else { format!("{h:.4}") };
+    let (file, span) = place(motion, source);
+    let (least, most) = material.range;
+    let args = [row.operation.name.clone(), thick(chip), least.to_string(), most.to_string()];
+    let mut d = Diagnostic::new(code::ACCURACY_CHIP_THICKNESS, file, span, &args);
+    let whose = if worst.is_some() { "the deflection of the row" } else { "the largest deflection by such chips" };
+    d.notes.push(format!("{whose}, {} µm, is from here", um(deflection)));
+    all.retain(|b| (b.source.file, b.source.line) != (source.file, source.line));
+    let more = all.len().saturating_sub(LINES);
+    all.truncate(LINES);
+    all.sort_by_key(|b| (b.source.file.0, b.source.line));
+    let one = |b: &&BeyondLaw| format!("line {} ({} mm)", line_of(motion, b.source), thick(b.chip));
+    let mut lines: Vec<String> = all.iter().map(one).collect();
+    lines.extend((more > 0).then(|| format!("{more} more lines with less deflection")));
+    if !lines.is_empty() {
+        d.notes.push(format!("too thin or too thick for the law as well: {}", lines.join(", ")));
+    }
+    Some(d)
 }
 
 /// Places whose force no law gives, though all that is asked for is known.
@@ -418,7 +497,7 @@ fn lawless(found: &mut Vec<Diagnostic>, row: &Row, machine: &Machine, motion: &M
     for (source, why) in &row.unforced {
         let why = match why {
             Unforced::Axial => "the tool is fed along its axis, and the force law is that of milling across it (a drill is known by its cycle: G73 G81 G82 G83)",
-            Unforced::NoLaw => "the force law is that of milling and drilling, not of tapping, threading, boring, reaming and countersinking",
+            Unforced::NoLaw => "the force law is that of milling and drilling, not of center drilling, tapping, threading, boring, reaming and countersinking",
             Unforced::Across => "a drill is fed another way than along its axis, and the law of its thrust is that along it",
             Unforced::Turning => "only rotary axes move: the tool turns about its point, which stays where it is on the part, and no force law is about that",
             Unforced::TooWide => "the width of cut is more than the diameter of the tool",
@@ -490,15 +569,29 @@ fn most_of_it(causes: &[(String, f64)]) -> Option<String> {
     (!list.is_empty()).then(|| format!("most of it, each alone: {} µm", list.join(", ")))
 }
 
-/// How each operation cuts: the file's word, then the tool table's, then the options'. Operations whose feature has a fit
-/// that can't be read, and its instance.
+/// Instances of a STEP-NC file that say how an operation cuts.
+#[derive(Clone, Copy)]
+struct Stated {
+    tool: Origin,
+    operation: Origin,
+}
+
+/// What else a file says of its operations.
+struct Cutting {
+    /// Operations whose feature has a fit that can't be read, and its instance.
+    fits: Vec<(String, Origin)>,
+    /// Where each operation is stated.
+    stated: Vec<Option<Stated>>,
+}
+
+/// How each operation cuts: the file's word, then the tool table's, then the options'.
 fn cutting(
     operations: &mut Operations,
     args: &AccuracyArgs,
     unit: &Unit,
     motion: &Motion,
     process: Option<&Process>,
-) -> Vec<(String, Origin)> {
+) -> Cutting {
     let said = CutData {
         diameter: args.diameter,
         teeth: args.teeth,
@@ -508,7 +601,7 @@ fn cutting(
         ..CutData::default()
     };
     let tools = tool_rows(motion, unit);
-    let (mut steps, mut fits) = (Vec::new(), Vec::new());
+    let (mut steps, mut fits, mut stated) = (Vec::new(), Vec::new(), Vec::new());
     if let Some(p) = process {
         p.elements.iter().for_each(|e| collect(e, &mut steps));
     }
@@ -521,8 +614,9 @@ fn cutting(
         let table = CutData { diameter: row.map(|t| t.diameter), ..CutData::default() };
         o.work = step.map(|s| work_of(s));
         o.cut = own.or(table).or(said);
+        stated.push(step.map(|s| Stated { tool: s.operation.tool.origin, operation: s.operation.origin }));
     }
-    fits
+    Cutting { fits, stated }
 }
 
 fn collect<'p>(element: &'p Element, out: &mut Vec<&'p Workingstep>) {
