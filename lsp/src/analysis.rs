@@ -227,7 +227,7 @@ impl Analysis {
         let mut all: Vec<OpenFile> = self
             .documents
             .values()
-            .map(|d| OpenFile { path: d.path.clone(), uri: d.uri.clone(), text: d.text.clone(), kind: d.kind })
+            .map(|d| OpenFile { path: d.path.clone(), uri: d.uri.clone(), version: d.version, text: d.text.clone(), kind: d.kind })
             .collect();
         all.sort_by(|a, b| a.path.cmp(&b.path));
         all
@@ -256,7 +256,7 @@ impl Analysis {
         } else {
             self.forget_unopened(|d| d.uri == *uri);
             let text = gr_text::decode(std::fs::read(&path).ok().filter(|_| stamp.is_some())?).text;
-            let document = self.document(uri.clone(), String::new(), 0, &text, publish);
+            let document = Document { open: false, ..self.document(uri.clone(), String::new(), 0, &text, publish) };
             if matches!(document.kind, Kind::Other) {
                 return None;
             }

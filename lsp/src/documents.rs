@@ -1,6 +1,6 @@
 //! Open documents, and the views of them that requests work on.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicI32, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
@@ -160,6 +160,8 @@ pub struct View {
     pub path: PathBuf,
     /// Version of the client.
     pub version: i32,
+    /// A client has it open.
+    pub open: bool,
     /// What it is.
     pub kind: Kind,
     /// Text.
@@ -196,11 +198,16 @@ pub struct OpenFile {
     pub path: PathBuf,
     /// Name.
     pub uri: lsp::Uri,
+    /// Version of the client.
+    pub version: i32,
     /// Text.
     pub text: Arc<Text>,
     /// What it is.
     pub kind: Kind,
 }
+
+/// Versions of open documents.
+pub type Versions = BTreeMap<lsp::Uri, i32>;
 
 impl View {
     #[expect(clippy::too_many_arguments, reason = "made in one place")]
@@ -218,6 +225,7 @@ impl View {
             uri: document.uri.clone(),
             path: document.path.clone(),
             version: document.version,
+            open: document.open,
             kind: document.kind,
             text: document.text.clone(),
             columns,
@@ -248,6 +256,11 @@ impl View {
     /// The document was edited since: work on this view is of no use to anybody.
     pub fn is_overtaken(&self) -> bool {
         self.latest.load(Ordering::Relaxed) != self.version
+    }
+    /// What the client calls the texts that an edit is worked out for.
+    pub fn versions(&self) -> Versions {
+        let others = self.others.iter().map(|o| (o.uri.clone(), o.version));
+        others.chain(self.open.then(|| (self.uri.clone(), self.version))).collect()
     }
     /// Lets edits through.
     pub fn release(&mut self) {
@@ -427,6 +440,8 @@ pub struct Document {
     pub focus: u32,
     /// Worked out once per version.
     pub derived: Arc<Derived>,
+    /// A client has it open: else it is what stands on disk.
+    pub open: bool,
     /// `version`, for the views.
     pub latest: Arc<AtomicI32>,
     /// See [`View::sent_tokens`].
@@ -451,6 +466,7 @@ impl Document {
             failed: false,
             focus: 0,
             derived: Arc::default(),
+            open: true,
             latest: Arc::new(AtomicI32::new(version)),
             sent_tokens: Arc::default(),
         }

@@ -16,7 +16,7 @@ use tower_lsp::ls_types as lsp;
 use tower_lsp::{Client, LanguageServer, LspService, Server};
 
 use crate::analysis::{Analysis, Event, Message};
-use crate::documents::{Kind, OpenFile, View};
+use crate::documents::{Kind, OpenFile, Versions, View};
 use crate::features::{self, Answer, Failure};
 use crate::frames::BigTexts;
 use crate::host::Host;
@@ -39,8 +39,21 @@ struct Abilities {
     resolves: bool,
     snippets: bool,
     pages: bool,
+    /// An edit may say which version of a document it is for.
+    versions: bool,
     /// An edit may rename files.
     moves_files: bool,
+}
+
+impl Abilities {
+    /// An edit in the form that the client knows.
+    fn edit(self, edit: lsp::WorkspaceEdit, versions: &Versions) -> lsp::WorkspaceEdit {
+        if self.versions { features::versioned(edit, versions) } else { edit }
+    }
+    /// The same of what an action does.
+    fn action(self, action: lsp::CodeAction, versions: &Versions) -> lsp::CodeAction {
+        lsp::CodeAction { edit: action.edit.map(|e| self.edit(e, versions)), ..action }
+    }
 }
 
 #[derive(Clone)]
@@ -257,6 +270,11 @@ pub struct Everything {
 /// Outline of a file with its name and text.
 type Outline = (lsp::Uri, Text, Vec<gr_ide::Item>);
 
+fn outline_of_plan(text: &str) -> Vec<gr_ide::Item> {
+    let tables = gr_p21::parse(text.as_bytes());
+    gr_ide::p21::outline::outline(gr_ide::p21::Doc { text: text.as_bytes(), file: &tables, units: gr_ide::p21::Units::default() })
+}
+
 impl Everything {
     /// Outlines of all programs and plans, open ones first.
     pub fn outlines(&self) -> Vec<Outline> {
@@ -268,20 +286,21 @@ impl Everything {
                     gr_ide::gcode::outline::outline(gr_ide::gcode::Doc { file: &file, dialect })
                 }
                 Kind::Exchange => {
-                    let text = open.text.to_string();
-                    let tables = gr_p21::parse(text.as_bytes());
-                    gr_ide::p21::outline::outline(gr_ide::p21::Doc { text: text.as_bytes(), file: &tables, units: gr_ide::p21::Units::default() })
+                    outline_of_plan(&open.text.to_string())
                 }
                 _ => continue,
             };
             found.push((open.uri.clone(), (*open.text).clone(), items));
         }
         let dialect = gr_spec::Dialect::linuxcnc();
-        for path in self.workspace.programs() {
+        for path in self.workspace.programs_and_plans() {
             if self.open.iter().any(|o| o.path == path) {
                 continue;
             }
-            if let (Some(file), Some(uri)) = (self.workspace.file(&path, dialect), lsp::Uri::from_file_path(&path)) {
+            if let (Some(text), Some(uri)) = (self.workspace.plan(&path), lsp::Uri::from_file_path(&path)) {
+                let items = outline_of_plan(&text);
+                found.push((uri, Text::new(&text), items));
+            } else if let (Some(file), Some(uri)) = (self.workspace.file(&path, dialect), lsp::Uri::from_file_path(&path)) {
                 let doc = gr_ide::gcode::Doc { file: &file, dialect };
                 found.push((uri, Text::new(&doc.text()), gr_ide::gcode::outline::outline(doc)));
             }
@@ -348,6 +367,7 @@ impl LanguageServer for Backend {
                 && can("/textDocument/codeAction/dataSupport"),
             pages: options.get("explainPages").and_then(Value::as_bool).unwrap_or(false),
             snippets: can("/textDocument/completion/completionItem/snippetSupport"),
+            versions: can("/workspace/workspaceEdit/documentChanges"),
             moves_files: can("/workspace/workspaceEdit/documentChanges")
                 && wire.pointer("/workspace/workspaceEdit/resourceOperations").and_then(Value::as_array).is_some_and(|o| o.iter().any(|o| o == "rename")),
         };
@@ -462,15 +482,24 @@ impl LanguageServer for Backend {
         Ok(Some(lsp::WorkspaceSymbolResponse::Nested(found.map_err(|_| Error::internal_error())?)))
     }
     async fn code_action(&self, p: lsp::CodeActionParams) -> Result<Option<lsp::CodeActionResponse>> {
-        let (range, only, resolves) = (p.range, p.context.only, self.abilities().resolves);
-        let found = self.ask_again(p.text_document.uri, move |v| features::actions(v, range, only.as_deref(), resolves)).await?;
+        let (range, only, able) = (p.range, p.context.only, self.abilities());
+        let work = move |v: View| {
+            let versions = v.versions();
+            let found = features::actions(v, range, only.as_deref(), able.resolves)?;
+            Ok(found.into_iter().map(|a| able.action(a, &versions)).collect::<Vec<_>>())
+        };
+        let found = self.ask_again(p.text_document.uri, work).await?;
         Ok(found.map(|f| f.into_iter().map(lsp::CodeActionOrCommand::CodeAction).collect()))
     }
     async fn code_action_resolve(&self, p: lsp::CodeAction) -> Result<lsp::CodeAction> {
         let uri = p.data.as_ref().and_then(|d| serde_json::from_value::<lsp::Uri>(d.get("uri")?.clone()).ok());
         let Some(uri) = uri else { return Ok(p) };
-        let unknown = p.clone();
-        Ok(self.ask(uri, move |v| features::resolve(v, p)).await?.unwrap_or(unknown))
+        let (unknown, able) = (p.clone(), self.abilities());
+        let work = move |v: View| {
+            let versions = v.versions();
+            Ok(able.action(features::resolve(v, p)?, &versions))
+        };
+        Ok(self.ask(uri, work).await?.unwrap_or(unknown))
     }
     async fn code_lens(&self, p: lsp::CodeLensParams) -> Result<Option<Vec<lsp::CodeLens>>> {
         self.ask_again(p.text_document.uri, features::lenses).await
@@ -500,8 +529,12 @@ impl LanguageServer for Backend {
     }
     async fn rename(&self, p: lsp::RenameParams) -> Result<Option<lsp::WorkspaceEdit>> {
         let at = p.text_document_position;
-        let moves_files = self.abilities().moves_files;
-        self.ask(at.text_document.uri, move |v| features::rename(v, at.position, &p.new_name, moves_files)).await.map(Option::flatten)
+        let able = self.abilities();
+        let work = move |v: View| {
+            let versions = v.versions();
+            Ok(features::rename(v, at.position, &p.new_name, able.moves_files)?.map(|e| able.edit(e, &versions)))
+        };
+        self.ask(at.text_document.uri, work).await.map(Option::flatten)
     }
     async fn linked_editing_range(&self, p: lsp::LinkedEditingRangeParams) -> Result<Option<lsp::LinkedEditingRanges>> {
         let at = p.text_document_position_params;

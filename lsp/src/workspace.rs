@@ -65,6 +65,11 @@ impl Workspace {
         found.dedup();
         found
     }
+    /// Text of a STEP-NC file; none of what is another file.
+    pub fn plan(&self, path: &Path) -> Option<String> {
+        let wanted = is_plan(path) && std::fs::metadata(path).is_ok_and(|m| m.is_file() && m.len() <= MOST_BYTES);
+        wanted.then(|| std::fs::read(path).ok())?.map(|bytes| gr_text::decode(bytes).text)
+    }
     /// A file with its tables, read again when it changed.
     pub fn file(&self, path: &Path, dialect: &'static Dialect) -> Option<Arc<File>> {
         let meta = std::fs::metadata(path).ok()?;

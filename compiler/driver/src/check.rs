@@ -389,7 +389,16 @@ impl Source {
                 (format!("write the digit {digit}"), span, digit.into())
             }
             code::COMMENT_NESTED if written(span)?.starts_with('(') => {
-                ("remove the inner `(`".into(), Span::new(span.start, span.start + 1), String::new())
+                let inside = inside_of_comment(written(Span::new(span.start, end))?)?;
+                let bare: String = inside.chars().filter(|c| !matches!(c, '(' | ')')).collect();
+                let title = if inside.contains(')') { "remove the inner `(` and `)`" } else { "remove the inner `(`" };
+                (title.into(), Span::new(span.start, span.start + inside.len() as u32), bare)
+            }
+            code::SYNTAX_BAD_CHARACTER if matches!(written(span)?, "O" | "o") => {
+                let before = written(Span::new(span.start.checked_sub(1)?, span.start))?;
+                let count = zeros(before, written(Span::new(span.start, end))?)?;
+                let digits = "0".repeat(count);
+                (format!("write the digit{} {digits}", if count > 1 { "s" } else { "" }), Span::new(span.start, span.start + count as u32), digits)
             }
             code::TEXT_BYTE_ORDER_MARK if written(span)? == "\u{FEFF}" => ("remove the byte order mark".into(), span, String::new()),
             code::WORD_UNUSED => {
@@ -430,6 +439,38 @@ impl Source {
         let spans = || letters.iter().filter_map(|l| self.word(*l));
         Some(Span::new(spans().map(|s| s.start).min()?, spans().map(|s| s.end).max()?))
     }
+}
+
+/// Of a line from the second `(` of a comment on, what belongs to the comment: up to the `)` that closes the first `(`. Where
+/// none does, up to the last `)` if that ends the line: what stands behind it may be meant as program.
+fn inside_of_comment(rest: &str) -> Option<&str> {
+    let mut depth = 1;
+    for (at, c) in rest.char_indices() {
+        depth += match c {
+            '(' => 1,
+            ')' => -1,
+            _ => 0,
+        };
+        if depth == 0 {
+            return rest.get(..at);
+        }
+    }
+    rest.trim_end().strip_suffix(')')
+}
+
+/// How many letters O at the start of `rest` stand for digits of the number before them, rather than begin an O-word.
+fn zeros(before: &str, rest: &str) -> Option<usize> {
+    let count = rest.bytes().take_while(|b| matches!(b, b'o' | b'O')).count();
+    let behind = rest[count..].trim_start_matches(|c: char| c.is_ascii_digit() || c == '.');
+    let number = before.bytes().all(|b| b.is_ascii_digit() || b == b'.');
+    // A word's letter and its value, or nothing: not `o100 call`, `o<name> call`.
+    let mut next = behind.trim_start().chars();
+    let word = match (next.next(), next.next()) {
+        (None | Some('(' | ';'), _) => true,
+        (Some(letter), Some(value)) => letter.is_ascii_alphabetic() && !value.is_ascii_alphabetic(),
+        _ => false,
+    };
+    (number && word).then_some(count)
 }
 
 /// Words that also have to do with a mistake, and what they are.

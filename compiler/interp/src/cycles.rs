@@ -251,8 +251,10 @@ impl<S: Sink> Interp<'_, S> {
     fn cycle_words(&mut self, hole: &mut Hole, again: bool) -> Res {
         let p = self.block.get(b'p').filter(|p| *p != -1.0);
         let q = self.block.get(b'q').filter(|q| *q != -1.0);
+        // G86 of Fanuc controls has no dwell.
+        let dwells = !(self.is_fanuc() && hole.g == 860);
         match hole.g {
-            820 | 860 | 880 | 890 if p.is_none() && !again => {
+            820 | 860 | 880 | 890 if p.is_none() && !again && dwells => {
                 return Err(word_missing("P", rs274::CYCLE_NO_P).arg(hole.g / 10));
             }
             730 | 830 if q.is_none() && !again => {
@@ -269,7 +271,7 @@ impl<S: Sink> Interp<'_, S> {
         }
         // Milliseconds on Fanuc controls.
         let unit = if self.is_fanuc() { 0.001 } else { 1.0 };
-        hole.dwell = p.map_or(self.m.cycle_p, |p| p * unit);
+        hole.dwell = if dwells { p.map_or(self.m.cycle_p, |p| p * unit) } else { 0.0 };
         hole.peck = q.unwrap_or(self.m.cycle_q);
         self.cycle_spindle(hole)?;
         if hole.g == 870 {
@@ -333,6 +335,7 @@ impl<S: Sink> Interp<'_, S> {
 
     fn keep_cycle_words(&mut self, hole: &Hole) {
         match hole.g {
+            860 if self.is_fanuc() => {}
             820 | 740 | 840 | 860 | 880 | 890 => self.m.cycle_p = hole.dwell,
             730 | 830 => self.m.cycle_q = hole.peck,
             _ => {}
@@ -513,7 +516,9 @@ impl<S: Sink> Interp<'_, S> {
     fn bore_stopped(&mut self, hole: &Hole) -> Res {
         Self::check_bore_spindle(hole)?;
         self.cycle_feed(hole, hole.bottom);
-        self.emit(Call::Dwell(hole.dwell));
+        if !self.is_fanuc() {
+            self.emit(Call::Dwell(hole.dwell));
+        }
         self.emit(Call::StopSpindleTurning(hole.spindle));
         self.cycle_rapid(hole, hole.at, hole.clear);
         self.turn_spindle(hole.spindle, hole.turning == 1);

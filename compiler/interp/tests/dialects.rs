@@ -149,6 +149,17 @@ fn fanuc_cycles_keep_their_levels() {
     assert_eq!(drilled, ["feed 1 2 -5", "feed 6 2 -5", "feed 11 2 -5"]);
 }
 
+/// The same: G86 has no P, and takes none over from another cycle.
+#[test]
+fn a_fanuc_bore_does_not_dwell() {
+    let text = "G21 G90 S500 M3\nG0 Z5.\nG82 X1. Z-5. R2. P250 F100.\nG86 X2. Z-5. R2.\nG82 X3. Z-5. R2. P250\nG80\nM30\n";
+    let (calls, outcome) = run_in("fanuc-mill", text);
+    assert!(outcome.ok(), "{:?}", outcome.findings);
+    assert_eq!(calls.iter().filter(|c| c.starts_with("DWELL")).count(), 2);
+    // G86 and M30.
+    assert_eq!(calls.iter().filter(|c| c.starts_with("STOP_SPINDLE")).count(), 2);
+}
+
 #[test]
 fn fanuc_dwells_are_milliseconds_or_seconds() {
     let text = "G21 G90\nG4 P500\nG04 X1.5\nF100.\nG82 X1. Z-5. R2. P250\nG80\nM30\n";

@@ -10,7 +10,7 @@ use gr_text::{Diagnostic, Span, code};
 use tower_lsp::ls_types as lsp;
 
 use super::{Answer, Failure, doc, exchange_doc, text_edits};
-use crate::documents::{Kind, Motion, View};
+use crate::documents::{Kind, Motion, Versions, View};
 use crate::protocol::{self, action_kind};
 
 /// Whole files above this are rewritten when the action is chosen, not when it is offered, bytes.
@@ -365,6 +365,28 @@ fn called_from(program: &Program, main: FileId, line: u32) -> Option<Program> {
         }
     }
     Some(out?.finish())
+}
+
+/// An edit that says which versions of the documents it is for, in the longer form that has room for it. A client then
+/// refuses what was overtaken; of a file that is not open, what stands on disk is meant.
+pub fn versioned(mut edit: lsp::WorkspaceEdit, versions: &Versions) -> lsp::WorkspaceEdit {
+    let version = |uri: &lsp::Uri| versions.get(uri).copied();
+    if let Some(changes) = edit.changes.take() {
+        let mut changes: Vec<_> = changes.into_iter().collect();
+        changes.sort_by(|a, b| a.0.cmp(&b.0));
+        let of = |(uri, edits): (lsp::Uri, Vec<lsp::TextEdit>)| lsp::TextDocumentEdit {
+            text_document: lsp::OptionalVersionedTextDocumentIdentifier { version: version(&uri), uri },
+            edits: edits.into_iter().map(lsp::OneOf::Left).collect(),
+        };
+        edit.document_changes = Some(lsp::DocumentChanges::Edits(changes.into_iter().map(of).collect()));
+    } else if let Some(lsp::DocumentChanges::Operations(operations)) = &mut edit.document_changes {
+        for operation in operations {
+            if let lsp::DocumentChangeOperation::Edit(of) = operation {
+                of.text_document.version = version(&of.text_document.uri);
+            }
+        }
+    }
+    edit
 }
 
 /// Refusals in the words of the protocol.

@@ -30,7 +30,7 @@ pub fn hover(mut view: View, at: lsp::Position) -> Answer<Option<lsp::Hover>> {
         Kind::Vars => config::linuxcnc::vars_hover(&view.text.to_string(), offset),
         Kind::Other => None,
     };
-    Ok(found.map(|h| lsp::Hover { contents: lsp::HoverContents::Markup(markdown(h.text)), range: Some(view.range(h.span)) }))
+    Ok(found.map(|h| lsp::Hover { contents: lsp::HoverContents::Markup(markdown(h.text)), range: Some(view.range(super::with(h.span, offset))) }))
 }
 
 /// One block as it is run, with the values of some parameters.
@@ -191,11 +191,13 @@ pub fn workspace_symbols(view: &crate::server::Everything, query: &str) -> Vec<l
     for (uri, text, items) in view.outlines() {
         let mut open: Vec<(&Item, String)> = items.iter().map(|i| (i, String::new())).collect();
         open.reverse();
+        // A statement of an exchange file stands in the outline of every plan that it is part of.
+        let mut seen = std::collections::BTreeSet::new();
         while let Some((item, container)) = open.pop() {
             if found.len() >= MOST_SYMBOLS {
                 return found;
             }
-            if fits(&item.name) {
+            if fits(&item.name) && seen.insert(item.span) {
                 let location = lsp::Location { uri: uri.clone(), range: text.range(item.span, view.columns) };
                 found.push(lsp::WorkspaceSymbol {
                     name: item.name.clone(),

@@ -197,6 +197,11 @@ fn exchange_in_units<'a>(view: &View, exchange: &'a crate::documents::Exchange) 
     gr_ide::p21::Doc { units: view.step_units(), ..exchange_doc(exchange) }
 }
 
+/// A place taken up to the cursor: at `#` or `o` before a name, the name is meant.
+fn with(span: Span, offset: u32) -> Span {
+    Span::new(span.start.min(offset), span.end.max(offset))
+}
+
 /// Edits of one file as the protocol has them.
 fn text_edits(view: &View, edits: Vec<gr_ide::Edit>) -> Vec<lsp::TextEdit> {
     let ends = edits.iter().any(|e| e.text.contains('\n'));

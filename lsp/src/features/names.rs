@@ -248,7 +248,8 @@ pub fn prepare_rename(mut view: View, at: lsp::Position) -> Answer<Option<lsp::P
         }
         found.map(|f| f.1)
     };
-    Ok(span.map(|s| lsp::PrepareRenameResponse::RangeWithPlaceholder { range: view.range(s), placeholder: view.text.slice(s) }))
+    let range = |s: Span| view.range(super::with(s, offset));
+    Ok(span.map(|s| lsp::PrepareRenameResponse::RangeWithPlaceholder { range: range(s), placeholder: view.text.slice(s) }))
 }
 
 /// Renames in all files. `moves_files`: the client can rename a file together with what it calls.

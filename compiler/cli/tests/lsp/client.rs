@@ -281,7 +281,14 @@ impl Client {
     }
     /// A text after the edits of a workspace edit.
     pub fn edited(&self, uri: &str, edit: &Value) -> String {
-        apply(&self.texts[uri], &edit["changes"][uri])
+        apply(&self.texts[uri], &self.edits_of(uri, edit))
+    }
+    /// Edits of a document in a workspace edit; each is for the version that the client has.
+    pub fn edits_of(&self, uri: &str, edit: &Value) -> Value {
+        let Some(documents) = edit["documentChanges"].as_array() else { return edit["changes"][uri].clone() };
+        let all: Vec<&Value> = documents.iter().filter(|d| d["textDocument"]["uri"] == uri).collect();
+        assert!(all.len() < 2 && all.iter().all(|d| d["textDocument"]["version"].as_i64() == self.versions.get(uri).copied()), "{edit}");
+        all.first().map_or(json!([]), |d| d["edits"].clone())
     }
     /// The files of the folder after a workspace edit: texts changed, files renamed.
     pub fn carried_out(&self, names: &[&str], edit: &Value) -> BTreeMap<String, String> {

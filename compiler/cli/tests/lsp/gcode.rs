@@ -350,6 +350,17 @@ fn rename_of_parameters_and_labels() {
     let at = c.at(&uri, "#<dep|th> = 2");
     let range = c.request("textDocument/prepareRename", at.clone());
     assert_eq!(range["placeholder"], "depth");
+    // At `#` and `o` too, and what is said there is said of a place that the cursor is in.
+    for marked in ["|#<depth> = 2", "#|<depth> = 2", "|o100 if"] {
+        let at = c.at(&uri, marked);
+        let here = at["position"].clone();
+        let hover = c.request("textDocument/hover", at.clone());
+        let range = c.request("textDocument/prepareRename", at);
+        for range in [&range["range"], &hover["range"]].into_iter().filter(|r| r.is_object()) {
+            assert!(range["start"]["line"] == here["line"] && range["start"]["character"].as_u64() <= here["character"].as_u64(), "{marked}: {range}");
+        }
+        assert!(["depth", "100"].contains(&range["placeholder"].as_str().unwrap_or("")), "{range}");
+    }
     let mut rename = at;
     rename["newName"] = "#<deep>".into();
     let edit = c.request("textDocument/rename", rename.clone());
@@ -522,6 +533,17 @@ fn actions_know_the_block_itself() {
     c.shut_down();
 }
 
+/// Near half a turn the centre moves 76 times as far as the radius is rounded.
+#[test]
+fn a_radius_has_the_decimals_that_it_needs() {
+    let text = "G21 G90 G17 F100\nG0 X0 Y0\nG3 X2.7793 Y-0.7249 I1.3944 J-0.3442\nG2 X5 Y-0.7249 I2 J-1.2\nM2\n";
+    let mut c = Client::new(&[("a.ngc", text)], json!({}));
+    let uri = c.open("a.ngc", None);
+    let near_half = act(&mut c, &uri, "G3| X2", "Write the arc with its radius");
+    insta::assert_snapshot!(near_half);
+    c.shut_down();
+}
+
 /// Rewritings that would do something else are not there: Fanuc's dwell in milliseconds, the motion that G80 goes back to,
 /// blocks that a switch of the machine skips.
 #[test]
@@ -600,7 +622,7 @@ fn completion_on_the_line_that_is_not_there_yet() {
 
 #[test]
 fn fixes_of_diagnostics() {
-    let text = "G21 G90 F100\nG1 XO\nG1 X1,5\n(end\nM2\n";
+    let text = "G21 G90 F100\nG1 XO\nG1 X1,5\n(a (b (c)) d) (e)\nG1 X1O.5 Y5\nG1 F1OO\n(end\nM2\n";
     let mut c = Client::new(&[("a.ngc", text)], json!({}));
     let uri = c.open("a.ngc", None);
     let found = c.diagnostics(&uri);
@@ -615,9 +637,17 @@ fn fixes_of_diagnostics() {
         let line = d["range"]["start"]["line"].as_u64().expect("a line") as usize;
         fixed.push(format!("{}: {}", action["title"].as_str().unwrap_or(""), after.lines().nth(line).unwrap_or("")));
     }
-    assert_eq!(fixed, ["write the digit 0: G1 X0", "write a decimal point: G1 X1.5", "close the comment: (end)"]);
+    let wanted = [
+        "write the digit 0: G1 X0",
+        "write a decimal point: G1 X1.5",
+        "remove the inner `(` and `)`: (a b c d) (e)",
+        "write the digit 0: G1 X10.5 Y5",
+        "write the digits 00: G1 F100",
+        "close the comment: (end)",
+    ];
+    assert_eq!(fixed, wanted);
     // With all of them in place nothing is left to say.
-    c.edit(&uri, "XO\nG1 X1,5\n(end\n", "X0\nG1 X1.5\n(end)\n");
+    c.edit(&uri, "XO\nG1 X1,5\n(a (b (c)) d) (e)\nG1 X1O.5 Y5\nG1 F1OO\n(end\n", "X0\nG1 X1.5\n(a b c d) (e)\nG1 X10.5 Y5\nG1 F100\n(end)\n");
     assert_eq!(c.diagnostics(&uri), Vec::<Value>::new());
     c.shut_down();
 }
@@ -922,7 +952,7 @@ fn numbers_of_big_programs_are_worked_out_when_chosen() {
     let offered = actions.as_array().and_then(|a| a.iter().find(|a| a["title"] == "Number blocks in steps of 10")).cloned().unwrap_or_else(|| panic!("{actions}"));
     assert!(offered.get("edit").is_none());
     let resolved = c.request("codeAction/resolve", offered);
-    assert_eq!(resolved["edit"]["changes"][&uri].as_array().map(Vec::len), Some(6_002));
+    assert_eq!(c.edits_of(&uri, &resolved["edit"]).as_array().map(Vec::len), Some(6_002));
     // A computed jump needs the numbers as they are.
     let uri = c.open("b.nc", Some("#101=20\nGOTO #101\nN20 G1 X1 F100\nM30\n"));
     let ask = json!({ "textDocument": { "uri": uri }, "range": { "start": { "line": 0, "character": 0 }, "end": { "line": 0, "character": 0 } }, "context": { "diagnostics": [], "only": ["source"] } });

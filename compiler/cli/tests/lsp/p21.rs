@@ -126,12 +126,29 @@ fn names() {
     c.shut_down();
 }
 
+fn holds(range: &serde_json::Value, at: &serde_json::Value) -> bool {
+    let place = |p: &serde_json::Value| (p["line"].as_u64(), p["character"].as_u64());
+    place(&range["start"]) <= place(at) && place(at) <= place(&range["end"])
+}
+
 #[test]
 fn outline_folding_selection_lenses() {
     let (mut c, uri) = plan();
     let document = json!({ "textDocument": { "uri": uri } });
     let symbols = c.request("textDocument/documentSymbol", document.clone());
     insta::assert_snapshot!("outline", tree(&symbols, 0));
+    // Editors find the entry around the cursor by its place: from the file's sections down each lies in the one above it.
+    let mut found = Vec::new();
+    for at in ["#1=PRO|JECT", "#10=MACHINING|", "#19=DRILL|ING", "#44=MILLING_CUTTING|", "#66=|"] {
+        let at = c.position(&uri, at);
+        let (mut list, mut names) = (symbols.clone(), Vec::new());
+        while let Some(around) = list.as_array().and_then(|l| l.iter().find(|s| holds(&s["range"], &at))).cloned() {
+            names.push(around["name"].as_str().unwrap_or("").to_string());
+            list = around["children"].clone();
+        }
+        found.push(names.join(" > "));
+    }
+    assert_eq!(found, ["PLATE", "DATA > WS DRILL", "DATA > DRILL1", "DATA > SPIRAL_DRILL_8", "DATA"]);
     let folds = c.request("textDocument/foldingRange", document.clone());
     let lines: Vec<_> = folds.as_array().expect("a list").iter().map(|f| (f["startLine"].as_u64(), f["endLine"].as_u64())).collect();
     assert!(lines.contains(&(Some(1), Some(5))) && lines.contains(&(Some(6), Some(41))), "{lines:?}");

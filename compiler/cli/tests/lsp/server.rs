@@ -284,6 +284,9 @@ fn plans_that_are_not_open_are_looked_at() {
     let mut c = Client::pulling(&[("a.ngc", "G21\nM2\n"), ("p.p21", plan)]);
     let _ = c.open("a.ngc", None);
     let p = c.uri("p.p21");
+    let symbols = c.request("workspace/symbol", json!({ "query": "workpl" }));
+    let places: Vec<&Value> = symbols.as_array().into_iter().flatten().map(|s| &s["location"]).collect();
+    assert!(places.len() == 1 && places[0]["uri"] == p, "{symbols}");
     for _ in 0..600 {
         let all = c.request("workspace/diagnostic", json!({ "previousResultIds": [] }));
         if let Some(of_p) = all["items"].as_array().expect("a list").iter().find(|i| i["uri"] == p) {

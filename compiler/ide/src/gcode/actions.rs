@@ -65,13 +65,7 @@ fn other_arc_form(line: &LineOf<'_>, before: &Modal, after: &Modal, program: &Pr
         let word = |i: usize| format!("{}{}", ['I', 'J', 'K'][i.min(2)], number((shape.center[i] - base(i)) / scale, places));
         ("Write the arc with its centre (I J K)", format!("{} {}", word(first.min(second)), word(first.max(second))))
     } else {
-        // A whole circle has no radius form, and near half a turn it is vague.
-        let degrees = shape.sweep.to_degrees().abs();
-        if degrees > 359.0 || (179.0..181.0).contains(&degrees) {
-            return None;
-        }
-        let radius = shape.radius / scale * if degrees > 180.0 { -1.0 } else { 1.0 };
-        ("Write the arc with its radius (R)", format!("R{}", number(radius, places)))
+        ("Write the arc with its radius (R)", format!("R{}", radius_word(&shape, [first, second], scale, places)?))
     };
     let span = Span::new(line.tight(words.first()?).start, line.tight(words.last()?).end);
     let between = line.words().iter().any(|w| !arc_words(&w) && { let s = line.tight(w); s.start > span.start && s.end < span.end });
@@ -80,6 +74,31 @@ fn other_arc_form(line: &LineOf<'_>, before: &Modal, after: &Modal, program: &Pr
         edits = words.iter().enumerate().map(|(i, w)| Edit { span: line.tight(w), text: if i == 0 { text.clone() } else { String::new() } }).collect();
     }
     Some(Action { title: title.into(), kind: ActionKind::Rewrite, edits })
+}
+
+/// The R of an arc, with as many decimals as keep its path within half the last of `places`; none where no R does.
+fn radius_word(shape: &ArcShape, axes: [usize; 2], scale: f64, places: usize) -> Option<String> {
+    // A whole circle has no radius form, and near half a turn it is vague.
+    let degrees = shape.sweep.to_degrees().abs();
+    if degrees > 359.0 || (179.0..181.0).contains(&degrees) {
+        return None;
+    }
+    let flat = |p: [f64; 3]| [p[axes[0]], p[axes[1]]];
+    let (start, middle, end) = (flat(shape.point(0.0)), flat(shape.point(0.5)), flat(shape.point(1.0)));
+    let between = |a: [f64; 2], b: [f64; 2]| ((b[0] - a[0]) * (b[0] - a[0]) + (b[1] - a[1]) * (b[1] - a[1])).sqrt();
+    let (chord, tolerance) = (between(start, end), 0.5 * scale / 10f64.powi(places as i32));
+    // Through both ends and the middle: written ends differ from the circle around a written centre.
+    let rise = between([(start[0] + end[0]) / 2.0, (start[1] + end[1]) / 2.0], middle);
+    let round = (rise * rise + chord * chord / 4.0) / (2.0 * rise);
+    let radius = if degrees > 180.0 { -round } else { round } / scale;
+    // How far the arc of a radius lies from the one that there is, in the middle between the ends.
+    let away = |r: f64| {
+        let to_chord = (r * r - chord * chord / 4.0).sqrt();
+        (rise - r.abs() - if degrees > 180.0 { to_chord } else { -to_chord }).abs()
+    };
+    let written = (places..places + 5).map(|n| number(radius, n));
+    let mut near = written.filter(|w| w.parse::<f64>().is_ok_and(|r| away(r * scale) <= tolerance));
+    near.next()
 }
 
 /// The code of a block that says how it moves: those of drilling cycles and G80 too, which are a group of their own on

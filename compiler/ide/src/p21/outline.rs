@@ -11,7 +11,9 @@ use crate::{Fold, Item, ItemKind, Token, TokenKind};
 /// Entries and folds: more would be of no use.
 const MOST: usize = 5_000;
 
-/// Projects with everything below; a file without one shows its workplans.
+/// Projects with everything below, as they are planned; a file without one shows its workplans. What a statement refers to
+/// stands anywhere in the file, so that the places of this tree do not lie in each other. Editors that look for the entry
+/// around the cursor find it in the sections of the file: there the same statements are listed where they stand.
 pub fn outline(doc: Doc<'_>) -> Vec<Item> {
     let model = super::model(doc);
     let mut left = MOST;
@@ -26,14 +28,42 @@ pub fn outline(doc: Doc<'_>) -> Vec<Item> {
         let roots = model.all("workplan").filter(|w| !used.contains(&w.id()));
         items.extend(roots.map(|w| element(doc, w, 0, &mut left)));
     }
-    let bare = items.is_empty();
-    for section in doc.file.sections.iter().filter(|s| s.name != "DATA" || bare) {
+    let stand = in_order(&model);
+    let sections = doc.file.sections.iter().map(|section| {
         let span = Span::new(section.span.start, section.span.start + section.name.len() as u32);
         let detail = format!("{} entities", section.instances.len());
-        items.push(Item { kind: ItemKind::Section, name: section.name.into(), detail, range: section.span, span, children: Vec::new() });
-    }
-    items.sort_by_key(|i| i.range.start);
+        let inside = stand.iter().filter(|(node, _)| section.instances.contains(&node.index()));
+        let children = inside.map(|(node, kind)| entry(doc, *node, *kind)).collect();
+        Item { kind: ItemKind::Section, name: section.name.into(), detail, range: section.span, span, children }
+    });
+    // The plan stands between the header and the data, where its first statement is.
+    let at = items.first().map_or(u32::MAX, |i| i.range.start);
+    let (before, behind): (Vec<Item>, Vec<Item>) = sections.partition(|s| s.range.end <= at);
+    items.splice(0..0, before);
+    items.extend(behind);
     items
+}
+
+/// Statements that the tree may lead to, in the order of the file.
+fn in_order<'m>(model: &'m gr_step::Model<'m>) -> Vec<(Node<'m>, ItemKind)> {
+    let kinds = [
+        ("project", ItemKind::Project),
+        ("workingstep", ItemKind::Workingstep),
+        ("executable", ItemKind::Workplan),
+        ("manufacturing_feature", ItemKind::Feature),
+        ("operation", ItemKind::MachiningOperation),
+        ("machining_tool", ItemKind::CuttingTool),
+    ];
+    // Some keywords are a tool in one edition of the standard, and part of one in another.
+    let schema = gr_step::schema();
+    let fits = |node: &Node<'m>, name: &str| node.entity().is_none_or(|e| e.is_a.iter().any(|n| schema.text_of(*n) == name));
+    let of = |(name, kind): (&'static str, ItemKind)| model.all(name).filter(move |n| fits(n, name)).map(move |n| (n, kind));
+    let mut found: Vec<(Node<'m>, ItemKind)> = kinds.into_iter().flat_map(of).collect();
+    // A workingstep is an executable too: what it is first counts.
+    found.sort_by_key(|(node, _)| node.index());
+    found.dedup_by_key(|(node, _)| node.index());
+    found.truncate(MOST);
+    found
 }
 
 fn entry(doc: Doc<'_>, node: Node<'_>, kind: ItemKind) -> Item {
