@@ -12,7 +12,7 @@
 //! | `clearance` | how far places are from what is out of reach |
 //! | `place` | where a part is best put |
 //! | `report` | errors along a program |
-//! | `words` | joints of machine tools from the words of a program |
+//! | `words` | what moves the tool point of a machine tool, by the words of a program |
 //! | `compensate` | correction for known deviations, of a robot's program or of motion |
 
 // `!(x <= limit)` is meant: a value that is not a number must fail the test.
@@ -31,4 +31,5 @@ pub mod report;
 mod words;
 
 pub use error::{Budget, BudgetOptions, Errors, Sensitivity, Spread, closed_form};
-pub use words::{Named, put_down, work_shift};
+pub use gr_robot::words::{put_down, work_shift};
+pub use words::Named;

@@ -2,7 +2,7 @@
 
 use crate::clearance::Lattice;
 use crate::error::{Budget, Sensitivity, Spread, at_lever, closed_form};
-use crate::words::{Asked, Words};
+use crate::words::{Asked, Words, sensitivity};
 use gr_machine::math::{Frame, M3, V3, dot, eigenvalues, norm, rot_x, rotate, sub};
 use gr_machine::{Chain, Control, JointKind, Kind, Kinematics, Machine, Opw, TwoLegs, differential};
 use std::sync::OnceLock;
@@ -302,7 +302,7 @@ impl<'a> Probe<'a> {
         let zero = match Words::of(self.machine) {
             Ok(Words::Joints(slides)) if self.machine.kind != Kind::Robot => {
                 let asked = Asked { tip: at, tool: self.tool, rotary: [0.0; 3] };
-                slides.sensitivity(self.machine, &*self.kinematics, &asked)
+                sensitivity(&slides, self.machine, &*self.kinematics, &asked)
             }
             _ => None,
         };

@@ -132,7 +132,7 @@ fn a_mill_that_is_not_square() {
     let deviations = compensate::deviations(&m).unwrap();
     let way = |x: f64, y: f64, z: f64| [x, y, z, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
     let program = program_of(&[(way(100.0, 0.0, -5.0), None), (way(100.0, 200.0, -5.0), None), (way(80.0, 220.0, -5.0), Some([80.0, 200.0, -5.0]))]);
-    let made = compensate::motion(&program, &m, &deviations, 0.01).unwrap();
+    let made = compensate::motion(&program, &m, &deviations, 0.01, &gr_ir::NoSources).unwrap();
     assert_eq!(made.arcs, 1);
     // A lean takes straight lines to straight lines: they stay whole.
     let moves: Vec<_> = made.program.steps().filter(|s| s.op.moves()).collect();
@@ -167,7 +167,7 @@ fn five_axes_as_built() {
             (axes[letters[3]], axes[letters[4]]) = (-0.1 * t, 0.2 * t);
             moves.push((axes, None));
         }
-        let made = compensate::motion(&program_of(&moves), &m, &deviations, 0.01).unwrap();
+        let made = compensate::motion(&program_of(&moves), &m, &deviations, 0.01, &gr_ir::NoSources).unwrap();
         // Joints for words: of the solutions for the direction, that with these rotary words.
         let joints = |axes: &gr_ir::Axes| {
             let q = [0.0, 0.0, 0.0, axes[letters[3]], axes[letters[4]]];
@@ -235,6 +235,6 @@ fn an_arm_as_built() {
     }
     assert!(cuts > 4 && made.arcs == 1);
     // Motion alone doesn't say how an arm stands.
-    let e = compensate::motion(&program_of(&[]), &m, &deviations, 0.01).unwrap_err();
+    let e = compensate::motion(&program_of(&[]), &m, &deviations, 0.01, &gr_ir::NoSources).unwrap_err();
     assert!(e.1.contains("configuration"), "{e:?}");
 }

@@ -1,5 +1,6 @@
 //! The margin of a place is kept on every machine: wherever the part is put within it, every point is within reach.
 
+use gr_ir::NoSources;
 use gr_accuracy::map::Probe;
 use gr_accuracy::place::{Aim, Arm, Found, Mill, Part, Reach, place};
 use gr_accuracy::{Budget, BudgetOptions};
@@ -115,7 +116,7 @@ fn straight(points: impl Iterator<Item = V3>) -> gr_ir::Program {
 #[test]
 fn margin_of_a_mill() {
     let machine = builtin("generic/mill3").unwrap();
-    let reach = Mill::new(&machine, &straight(plate(120.0, 80.0).into_iter()), true).unwrap();
+    let reach = Mill::new(&machine, (&straight(plate(120.0, 80.0).into_iter()), &NoSources), true).unwrap();
     let found = found(&reach, &machine, Aim::Margin).unwrap();
     let travel = |i: usize| machine.joints[i].max.unwrap() - machine.joints[i].min.unwrap();
     let free = [(travel(0) - 120.0) / 2.0, (travel(1) - 80.0) / 2.0, (travel(2) - 28.0) / 2.0];
@@ -133,10 +134,10 @@ fn a_part_as_large_as_the_travel() {
     let machine = builtin("generic/mill3").unwrap();
     let (low, high) = (machine.joints[0].min.unwrap(), machine.joints[0].max.unwrap());
     let row = |width: f64| straight((0..=40).map(move |i| [width * f64::from(i) / 40.0, 0.0, 0.0]));
-    let whole = Mill::new(&machine, &row(high - low), true).unwrap();
+    let whole = Mill::new(&machine, (&row(high - low), &NoSources), true).unwrap();
     let got = found(&whole, &machine, Aim::Margin).unwrap();
     assert!(got.margin == 0.0 && whole.fits(got.position), "{got:?}");
-    assert!(found(&Mill::new(&machine, &row(high - low + 1.0), true).unwrap(), &machine, Aim::Margin).is_none());
+    assert!(found(&Mill::new(&machine, (&row(high - low + 1.0), &NoSources), true).unwrap(), &machine, Aim::Margin).is_none());
 }
 
 /// Rotary words are joints: with the table tilted the slides carry the part over the head. What the forward solution says of
@@ -152,13 +153,13 @@ fn margin_of_a_mill_with_rotary_words() {
         ([0.0, 0.0, 0.0], [20.0, 0.0, 0.0]),
     ];
     let made = program(&stops);
-    let reach = Mill::new(&machine, &made, true).unwrap();
+    let reach = Mill::new(&machine, (&made, &NoSources), true).unwrap();
     assert!(reach.beyond.is_empty());
     let found = found(&reach, &machine, Aim::Margin).unwrap();
     assert!(found.margin > 30.0, "{found:?}");
     for by in shifts(found.margin) {
         let at = add(found.position, by);
-        assert!(reach.fits(at) && reach.outside(&made, at).is_empty(), "{found:?} moved by {by:?}");
+        assert!(reach.fits(at) && reach.outside((&made, &NoSources), at).is_empty(), "{found:?} moved by {by:?}");
     }
     assert!(shifts(found.margin * 1.3).any(|by| !reach.fits(add(found.position, by))));
     // The table's own arithmetic: the part's point turned about C, then A, through (0, 0, -350).
@@ -177,7 +178,7 @@ fn margin_of_a_mill_with_rotary_words() {
         assert!(!reach.fits(at) || inside(at), "{at:?}");
     }
     let far = program(&[([0.0; 3], [0.0; 3]), ([0.0; 3], [35.0, 0.0, 0.0])]);
-    let reach = Mill::new(&machine, &far, true).unwrap();
+    let reach = Mill::new(&machine, (&far, &NoSources), true).unwrap();
     assert_eq!(reach.beyond.iter().map(|t| (t.0.line, t.1)).collect::<Vec<_>>(), [(1, 3)]);
 }
 
@@ -185,7 +186,7 @@ fn margin_of_a_mill_with_rotary_words() {
 #[test]
 fn refused_places() {
     let machine = builtin("generic/mill3").unwrap();
-    let reach = Mill::new(&machine, &straight(plate(120.0, 80.0).into_iter()), true).unwrap();
+    let reach = Mill::new(&machine, (&straight(plate(120.0, 80.0).into_iter()), &NoSources), true).unwrap();
     let budget = Budget::new(&machine, BudgetOptions::default());
     let mut asked = Vec::new();
     let mut allowed = |at: V3| {

@@ -6,7 +6,7 @@ pub mod joint;
 pub mod plot;
 pub mod rs274ngc;
 pub mod sheet;
-mod sources;
+pub mod sources;
 mod sweep;
 mod target;
 

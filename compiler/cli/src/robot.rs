@@ -247,7 +247,7 @@ pub fn corrected(program: &gr_ir::Program, goal: &Goal<'_>, texts: &dyn Sources)
         return Err("--arc-tolerance must be above zero".into());
     }
     let made = deviations(machine, texts).and_then(|d| {
-        compensate::motion(program, machine, &d, tolerance).map_err(|(source, why)| not_corrected(source, why, texts))
+        compensate::motion(program, machine, &d, tolerance, texts).map_err(|(source, why)| not_corrected(source, why, texts))
     });
     Ok(made.map(|m| {
         let corrected = Corrected::new(&m.corrections, m.arcs);

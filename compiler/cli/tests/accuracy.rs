@@ -861,3 +861,45 @@ fn told_where_it_is() {
     ];
     insta::assert_snapshot!(all.join("\n---\n"));
 }
+
+/// Places of the machine (G53, G28, G30) stay where they are when the part goes elsewhere, and what no word has named yet stays where
+/// the machine stood: `place`, a build for joints and `accuracy` agree.
+#[test]
+fn places_of_the_machine() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = "format = 1\nid = \"test/m\"\nextends = \"generic/mill3\"\n[frames.part]\nposition = [300, 200, -100]\n";
+    std::fs::write(folder.path().join("m.toml"), file).unwrap();
+    std::fs::write(folder.path().join("t.tbl"), "T1 P1 Z50 D10\n").unwrap();
+    let program = |text: &str| std::fs::write(folder.path().join("p.ngc"), format!("G21 G90 G94 F600\nS1000 M3\n{text}M5\nM2\n")).unwrap();
+    let place = |text: &str| {
+        program(text);
+        let v = json(&run(folder.path(), &["place", "p.ngc", "--machine=generic/mill3", "--format=json", "-q"]));
+        let at: Vec<f64> = v["position"].as_array().unwrap().iter().map(|p| p.as_f64().unwrap()).collect();
+        (at, v["margin"].as_f64().unwrap())
+    };
+    let plain = place("G0 X0 Y0 Z0\nG1 X10\n");
+    assert_eq!((&plain.0[..], plain.1), (&[-5.0, 0.0, -75.0][..], 224.9), "{plain:?}");
+    for machine in ["G53 G0 Z140\n", "G53 G0 Z-290\n", "G53 G0 X390 Y-240\n", "G28\n", "G91 G28 Z0\nG90\n", "G53 G0 Z140\nG91 G0 Z-5\nG90\n"] {
+        assert_eq!(place(&format!("G0 X0 Y0 Z0\nG1 X10\n{machine}")), plain, "{machine}");
+        // In front it is the same.
+        assert_eq!(place(&format!("{machine}G0 X0 Y0\nZ0\nG1 X10\n")), plain, "{machine}");
+    }
+    program("G0 X0 Y0 Z0\nG1 X10\nG53 G0 Z200\n");
+    let o = whole(&run(folder.path(), &["place", "p.ngc", "--machine=generic/mill3", "-q", "--message-format=short"]));
+    assert!(o.contains("p.ngc:5:1: error[E0507]") && o.contains("200 mm"), "{o}");
+    let joints = |text: &str| {
+        program(text);
+        let o = run(folder.path(), &["build", "p.ngc", "--machine=m.toml", "-tt.tbl", "--target=joint-gcode", "-oj.ngc", "--message-format=short"]);
+        let text = std::fs::read_to_string(folder.path().join("j.ngc")).unwrap_or_default();
+        let moves: Vec<&str> = text.lines().filter(|l| l.starts_with("G0") || l.starts_with("G1")).map(|l| l.split(" F").next().unwrap()).collect();
+        format!("{}{}\n", whole(&o).split("--- err\n").nth(1).unwrap().lines().filter(|l| l.contains("p.ngc")).map(|l| format!("{l}\n")).collect::<String>(), moves.join("\n"))
+    };
+    let all = [
+        joints("T1 M6\nG43 H1\nG0 Z5\nG0 X10 Y0\nG1 Z-2\nG1 X20\nG53 G0 Z0\nG53 G0 X0 Y0\n"),
+        joints("G0 X0 Y0\nZ5\nG1 Z-2\nG1 X20\nG91 G28 Z0\nG28\n"),
+        joints("G53 G0 Z100\nG81 X0 Y0 Z-5 R2\nX10\nG80\nG53 G0 Z100\n"),
+        // Nobody names Y: it stays.
+        joints("G0 X10\nZ1\nG1 Z-1\nG1 X20\n"),
+    ];
+    insta::assert_snapshot!(all.join("\n"));
+}

@@ -21,6 +21,8 @@
 //! | `joints` | moves cut to joint positions by tolerance; joint-space G-code |
 //! | `setpoints` | positions, velocities, accelerations at a fixed rate |
 //! | `along` | joint values along a path somebody else cut into points |
+//! | `settle` | coordinates of machine tools that no word of the work frame has named |
+//! | `words` | joints of machine tools from the words of a program |
 //! | `verify` | joint values against targets: table, CSV, pictures |
 
 // Joints are walked by index; a value that is not a number must fail the test.
@@ -39,11 +41,14 @@ mod plan;
 mod program;
 pub mod reference;
 pub mod setpoints;
+mod settle;
 mod solver;
 mod turns;
 pub mod verify;
+pub mod words;
 
 pub use options::{Options, Planned, Setup, Singularity, Summary};
 pub use plan::plan;
 pub use program::{Action, Curves, MAX_JOINTS, RobotProgram, Step, Target, Tool, Word, WorkFrame, Zone};
+pub use settle::{By, Coordinates, settled};
 pub use turns::Turns;

@@ -9,6 +9,7 @@ use crate::choose::{Chain, Chooser, Fault, Node, Why, chains};
 use crate::emit::Emit;
 use crate::gather::{Findings, Gather, Gathered, Item, Move, Way};
 use crate::path::Mount;
+use crate::settle::{control_tool, settled};
 use crate::solver::{Branches, Joints, Limits, Solver};
 use crate::{MAX_JOINTS, Options, Planned, Zone};
 
@@ -20,7 +21,9 @@ pub fn plan(program: &Program, machine: &Machine, sources: &dyn Sources, options
         gather.findings.say(code::ROBOT_HOME, None, &[why]);
         return Err(gather.findings.take());
     }
-    gather.run(program);
+    // Setups have places of their own for the part.
+    let settled = options.setups.is_empty().then(|| settled(program, machine, sources, control_tool)).flatten();
+    gather.run(settled.as_ref().unwrap_or(program));
     let Gather { out: gathered, findings, .. } = gather;
     let mut solver = Solver::new(machine);
     solver.words = !gathered.by_direction;

@@ -7,9 +7,10 @@
 
 use super::{Correction, Corrector, halved};
 use crate::words::{Asked, Slides, Words, frame, rotary, slid, started, tool};
-use gr_ir::{Axes, Builder, FeedMode, Op, Pose, Program, Source, State, geometry};
+use gr_ir::{Axes, Builder, FeedMode, Op, Pose, Program, Source, Sources, State, geometry};
 use gr_machine::math::{Frame, V3, add, rotate, sub, transpose};
 use gr_machine::{Kinematics, KinematicsError, Machine};
+use gr_robot::{By, Coordinates};
 
 /// A corrected program.
 #[derive(Clone, PartialEq, Debug)]
@@ -29,14 +30,19 @@ pub fn motion(
     machine: &Machine,
     deviations: &[f64],
     tolerance: f64,
+    sources: &dyn Sources,
 ) -> Result<CompensatedMotion, (Source, String)> {
     let words = Words::of(machine).map_err(|why| (Source::default(), why))?;
     let corrector = Corrector::new(machine, deviations);
     let mut out = Builder::from_state(*program.start(), *program.start_state());
     out.names_of(program);
-    let mut run = Run { machine, corrector, words, zero: None, out, corrections: Vec::new(), arcs: 0 };
+    let mut run = Run { machine, corrector, words, zero: None, fixed: [false; 3], out, corrections: Vec::new(), arcs: 0 };
     let mut cursor = program.cursor();
+    let mut coordinates = matches!(run.words, Words::Joints(_)).then(|| Coordinates::new(program));
     while let Some(view) = cursor.next() {
+        if let Some(coordinates) = &mut coordinates {
+            run.fixed = coordinates.step(program, &view, sources).map(|by| by == By::Machine);
+        }
         run.step(&view, tolerance).map_err(|e| (view.source, format!("the corrected point can't be reached: {e}")))?;
     }
     Ok(CompensatedMotion { program: run.out.finish(), corrections: run.corrections, arcs: run.arcs })
@@ -50,6 +56,8 @@ struct Run<'a> {
     corrector: Corrector,
     words: Words,
     zero: Option<(ZeroKey, V3)>,
+    /// Coordinates at places of the machine: there is nothing to correct.
+    fixed: [bool; 3],
     out: Builder,
     corrections: Vec<Correction>,
     arcs: usize,
@@ -116,7 +124,10 @@ impl Run<'_> {
         let by = sub(by, zero);
         let frame = frame(self.machine, state);
         let mut out = *pose;
-        let moved = add(pose.xyz(), rotate(&transpose(&frame.turn), by));
+        let turned = rotate(&transpose(&frame.turn), by);
+        let turned = [0, 1, 2].map(|i| if self.fixed[i] { 0.0 } else { turned[i] });
+        let by = rotate(&frame.turn, turned);
+        let moved = add(pose.xyz(), turned);
         out.axes[..3].copy_from_slice(&moved);
         let aim = frame.apply(pose.xyz());
         self.corrections.push(Correction { line: Some(source.line), aim, by, turn: 0.0, left });

@@ -5,10 +5,11 @@ use super::{Look, Reach, telling};
 use crate::error::{Budget, Errors, Sensitivity};
 use crate::map::{Probe, limits};
 use crate::report::turns_apart;
-use crate::words::{Asked, Named, Slides, Words, put_down, started};
-use gr_ir::{Axes, Program, Source, State, geometry};
+use crate::words::{Asked, Slides, Words, put_down, sensitivity, started};
+use gr_ir::{Axes, Program, Source, Sources, State, geometry};
 use gr_machine::math::{Frame, V3, add, dot, norm, scale, sub};
 use gr_machine::{Kind, Kinematics, Machine};
+use gr_robot::{By, Coordinates};
 use std::collections::{BTreeMap, HashMap, HashSet};
 
 /// The path is looked at this often, mm.
@@ -36,8 +37,10 @@ struct Stop {
     rotary: [f64; 3],
     /// From the part's origin in the directions of the base, mm.
     point: V3,
-    /// Coordinates that the program has named: else the machine stands where it happens to.
-    said: [bool; 3],
+    /// What its coordinates are known by: those that are not by a word of the work frame don't go with the part.
+    by: [By; 3],
+    /// Where it is in the coordinates of the machine, mm.
+    fixed: V3,
     /// Of [`Mill::zeros`].
     zero: usize,
     source: Source,
@@ -45,6 +48,10 @@ struct Stop {
 }
 
 impl Stop {
+    /// All its coordinates go with the part.
+    fn whole(&self) -> bool {
+        self.by == [By::Work; 3]
+    }
     fn tip(&self, at: V3) -> V3 {
         add(self.point, at)
     }
@@ -62,7 +69,7 @@ struct Zero {
 struct Posed {
     rows: [V3; 3],
     base: V3,
-    /// Slides that depend on no coordinate that the program has not named yet.
+    /// Slides that depend on no coordinate that doesn't go with the part.
     counts: [bool; 3],
     /// Least and greatest `row · point` of each slide.
     range: [(f64, f64); 3],
@@ -82,7 +89,8 @@ pub struct Mill<'a> {
     few: Vec<usize>,
     faces: Vec<Face>,
     room: Option<[(f64, f64); 3]>,
-    /// Rotary axes beyond their limits, wherever the part is: each with the first place and its value.
+    /// Rotary axes, and slides at places of the machine, beyond their limits, wherever the part is: each with the first place and its
+    /// value.
     pub beyond: Vec<(Source, usize, f64)>,
     /// Slides that the program needs more of than there is, wherever the part is: how much it needs and how much there is, mm.
     pub short: Vec<(usize, f64, f64)>,
@@ -90,12 +98,13 @@ pub struct Mill<'a> {
 
 impl<'a> Mill<'a> {
     /// None on machines whose joints are not the words of a program. Rapids count with their ends where they count.
-    pub fn new(machine: &'a Machine, program: &Program, rapids: bool) -> Option<Mill<'a>> {
+    pub fn new(machine: &'a Machine, (program, sources): (&Program, &dyn Sources), rapids: bool) -> Option<Mill<'a>> {
         let mut out = Mill::empty(machine)?;
         let mut posed: Vec<Posed> = Vec::new();
         let (mut poses, mut known) = (HashMap::new(), HashSet::new());
-        out.walk(program, rapids, &mut |out, stop| {
-            let key = (stop.tool, stop.rotary.map(f64::to_bits), stop.said);
+        out.walk((program, sources), rapids, &mut |out, stop| {
+            out.at_machine(&stop);
+            let key = (stop.tool, stop.rotary.map(f64::to_bits), stop.by.map(|by| by == By::Work));
             let n = *poses.entry(key).or_insert_with(|| {
                 posed.push(out.posed(&stop));
                 posed.len() - 1
@@ -108,7 +117,7 @@ impl<'a> Mill<'a> {
                 stop.point.map(|v| (v / SAME).round() as i64),
                 stop.rotary.map(|v| (v / 1.7e-4).round() as i64),
             );
-            if stop.cuts && known.insert(near) {
+            if stop.cuts && stop.whole() && known.insert(near) {
                 out.stops.push(stop);
             }
         });
@@ -116,7 +125,7 @@ impl<'a> Mill<'a> {
             // A program without any move: its origin.
             out.tools.push(machine.tool_of_length(0.0));
             let (rotary, point, source) = ([0.0; 3], [0.0; 3], Source::default());
-            let stop = Stop { tool: 0, rotary, point, said: [true; 3], zero: 0, source, cuts: false };
+            let stop = Stop { tool: 0, rotary, point, by: [By::Work; 3], fixed: point, zero: 0, source, cuts: false };
             let mut at_origin = out.posed(&stop);
             at_origin.take(stop.point);
             posed.push(at_origin);
@@ -132,13 +141,13 @@ impl<'a> Mill<'a> {
     }
 
     /// Joints that leave their limits when the part's origin is there: each with the first place and its value.
-    pub fn outside(&self, program: &Program, at: V3) -> Vec<(Source, usize, f64)> {
+    pub fn outside(&self, (program, sources): (&Program, &dyn Sources), at: V3) -> Vec<(Source, usize, f64)> {
         let mut found: Vec<(Source, usize, f64)> = Vec::new();
         let Some(mut look) = Mill::empty(self.machine) else { return found };
-        look.walk(program, true, &mut |out, stop| {
+        look.walk((program, sources), true, &mut |out, stop| {
             let Some(joints) = out.joints(&stop, at) else { return };
             for (joint, value) in out.machine.outside(&joints) {
-                let unsaid = (0..3).any(|i| out.slides.sliding[i] == joint && !stop.said[i]);
+                let unsaid = (0..3).any(|i| out.slides.sliding[i] == joint && stop.by[i] != By::Work);
                 if !unsaid && found.iter().all(|f| f.1 != joint) {
                     found.push((stop.source, joint, value));
                 }
@@ -169,34 +178,39 @@ impl<'a> Mill<'a> {
     }
 
     /// Calls with every place of the tool that is looked at.
-    fn walk(&mut self, program: &Program, rapids: bool, take: &mut dyn FnMut(&mut Mill<'a>, Stop)) {
+    fn walk(&mut self, (program, sources): (&Program, &dyn Sources), rapids: bool, take: &mut dyn FnMut(&mut Mill<'a>, Stop)) {
         let put = put_down(self.machine, Frame { position: [0.0; 3], ..self.machine.cell.part_in_base() });
         let mut cursor = program.cursor();
-        let mut named = Named::default();
+        let mut coordinates = Coordinates::new(program);
         while let Some(view) = cursor.next() {
-            let said = named.step(&view);
+            let before = coordinates.by();
+            let after = coordinates.step(program, &view, sources);
             if !view.op.cuts() && !(rapids && view.op.moves()) {
                 continue;
             }
-            let mut at = |axes: &Axes, cuts: bool| {
-                let stop = Stop { source: view.source, cuts, said, ..self.stop(&put, axes, view.state) };
+            let mut at = |axes: &Axes, cuts: bool, by: [By; 3]| {
+                let stop = Stop { source: view.source, cuts, by, ..self.stop(&put, axes, view.state) };
                 take(self, stop);
             };
             if !view.op.cuts() {
-                at(&view.end.axes, false);
+                at(&view.end.axes, false, after);
                 continue;
             }
+            // A cut that leads from a place of the machine into the work goes with the part at its end alone.
+            let first = [0, 1, 2].map(|i| if before[i] == By::Machine { By::Machine } else { after[i] });
+            let between = [0, 1, 2].map(|i| if first[i] == after[i] { after[i] } else { By::Nothing });
             let mut from = view.start.axes;
-            at(&from, true);
+            at(&from, true, first);
             geometry::flatten(&view.op, view.start, view.end, CHORD, |to| {
                 let way: V3 = [0, 1, 2].map(|i| to[i] - from[i]);
                 let count = ((norm(way) / APART).ceil().clamp(1.0, 1e5) as usize).max(turns_apart(&from, to));
                 for i in 1..=count {
                     let t = i as f64 / count as f64;
-                    at(&std::array::from_fn(|k| from[k] + (to[k] - from[k]) * t), true);
+                    at(&std::array::from_fn(|k| from[k] + (to[k] - from[k]) * t), true, between);
                 }
                 from = *to;
             });
+            at(&from, true, after);
         }
     }
 
@@ -207,7 +221,19 @@ impl<'a> Mill<'a> {
         let zero = Asked::new(put, &[0.0; 9], state);
         let zero = Zero { tool: place_of(&mut self.tools, zero.tool), rotary: zero.rotary, point: zero.tip };
         let zero = place_of(&mut self.zeros, zero);
-        Stop { tool, rotary: asked.rotary, point: asked.tip, said: [true; 3], zero, source: Source::default(), cuts: true }
+        let [x, y, z, ..] = state.machine(axes);
+        let (fixed, source) = ([x, y, z], Source::default());
+        Stop { tool, rotary: asked.rotary, point: asked.tip, by: [By::Work; 3], fixed, zero, source, cuts: true }
+    }
+
+    /// Notes slides that a place of the machine sends beyond their limits.
+    fn at_machine(&mut self, stop: &Stop) {
+        for i in (0..3).filter(|i| stop.by[*i] == By::Machine) {
+            let (joint, value) = (self.slides.sliding[i], stop.fixed[i]);
+            if !self.machine.joints[joint].allows(value) && self.beyond.iter().all(|t| t.1 != joint) {
+                self.beyond.push((stop.source, joint, value));
+            }
+        }
     }
 
     /// How the slides go with the tool point while the rotary axes stand; notes rotary axes beyond their limits.
@@ -234,7 +260,7 @@ impl<'a> Mill<'a> {
                 self.beyond.push((stop.source, *joint, value));
             }
         }
-        let counts = rows.map(|row| (0..3).all(|i| stop.said[i] || row[i].abs() < LEVEL));
+        let counts = rows.map(|row| (0..3).all(|i| stop.by[i] == By::Work || row[i].abs() < LEVEL));
         let range = [(f64::INFINITY, f64::NEG_INFINITY); 3];
         Posed { rows, base, counts, range }
     }
@@ -370,13 +396,13 @@ impl Reach for Mill<'_> {
         };
         let zero = |z: &Zero| {
             let tip = add(at, z.point);
-            self.slides.sensitivity(self.machine, &*self.kinematics, &Asked { tip, tool: self.tools[z.tool], rotary: z.rotary })
+            sensitivity(&self.slides, self.machine, &*self.kinematics, &Asked { tip, tool: self.tools[z.tool], rotary: z.rotary })
         };
         let zeros: Vec<Option<Sensitivity>> = self.zeros.iter().map(zero).collect();
         let mut out = 0.0f64;
         for n in 0..count {
             let stop = if look == Look::All { &self.stops[n] } else { &self.stops[self.few[n]] };
-            let s = self.slides.sensitivity(self.machine, &*self.kinematics, &self.asked(stop, at))?;
+            let s = sensitivity(&self.slides, self.machine, &*self.kinematics, &self.asked(stop, at))?;
             let s = match &zeros[stop.zero] {
                 Some(zero) => s.since(zero),
                 None => s,

@@ -4,16 +4,17 @@
 use super::{Operations, Report, Spot, Walk, pieces};
 use crate::error::{Budget, Sensitivity};
 use crate::material::Material;
-use crate::words::{Asked, Slides, Words, ZeroKey};
+use crate::words::{Asked, Slides, Words, ZeroKey, key, sensitivity, tool};
 use gr_ir::measure::{Rates, measure};
-use gr_ir::{Axes, Program, State, View, geometry};
+use gr_ir::{Axes, Program, Sources, State, View, geometry};
 use gr_machine::math::{V3, dot, norm, rotate, scale};
 use gr_machine::{Kind, Machine};
 use std::rc::Rc;
 
-/// Draws up a report by the words of a program; none on machines whose joints are not its words.
+/// Draws up a report by the words of a program, whose text says which places are the machine's; none on machines whose joints are not
+/// its words.
 pub fn report_of_words(
-    program: &Program,
+    (program, sources): (&Program, &dyn Sources),
     machine: &Machine,
     operations: &Operations,
     budget: &Budget,
@@ -24,6 +25,8 @@ pub fn report_of_words(
         return None;
     }
     let Ok(Words::Joints(slides)) = Words::of(machine) else { return None };
+    let settled = gr_robot::settled(program, machine, sources, tool);
+    let program = settled.as_ref().unwrap_or(program);
     let kinematics = machine.kinematics();
     let mut mill = Mill { walk: Walk::new(machine, &*kinematics, operations, budget, material), slides, zero: None, first_zero: None };
     let count = program.len();
@@ -107,10 +110,10 @@ impl Mill<'_> {
     fn at_zero(&mut self, state: &State) -> Option<Rc<Sensitivity>> {
         let machine = self.walk.machine;
         let asked = Asked::new(machine, &[0.0; 9], state);
-        let key = asked.key();
+        let key = key(&asked);
         self.first_zero.get_or_insert(asked.tip);
         if self.zero.as_ref().is_none_or(|(known, _)| *known != key) {
-            let s = self.slides.sensitivity(machine, self.walk.kinematics, &asked)?;
+            let s = sensitivity(&self.slides, machine, self.walk.kinematics, &asked)?;
             self.zero = Some((key, Rc::new(s)));
         }
         self.zero.as_ref().map(|(_, s)| s.clone())

@@ -229,7 +229,7 @@ fn predict(
         None => operations.list.get(n).map_or(top, |o| place(motion, o.first)),
     });
     let tell = |done: usize, of: usize| progress.tell(|| format!("errors at step {done} of {of}"));
-    let report = match report_of_words(&motion.program, &planned_on, &operations, budget, material, &tell) {
+    let report = match report_of_words((&motion.program, &texts), &planned_on, &operations, budget, material, &tell) {
         Some(report) => report,
         None => {
             let planned = gr_robot::plan(&motion.program, &planned_on, &texts, &options)?;

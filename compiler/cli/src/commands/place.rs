@@ -147,7 +147,7 @@ impl Wish<'_> {
             beyond(self.machine, *joint, *value, file, span)
         };
         let nowhere = || Diagnostic::new(code::PLACE_DOES_NOT_FIT, FileId(0), Span::default(), std::slice::from_ref(&self.machine.id));
-        if let Some(mill) = Mill::new(self.machine, program, true) {
+        if let Some(mill) = Mill::new(self.machine, (program, &texts), true) {
             let strange = crate::robot::missing_axes(program, self.machine, &texts).into_iter();
             let beyond: Vec<Diagnostic> = strange.chain(mill.beyond.iter().filter_map(limits)).collect();
             if !beyond.is_empty() {
@@ -162,9 +162,9 @@ impl Wish<'_> {
             };
             return self.best(&mill, 1, &mut |_| true).map_err(|_| {
                 // Where rapids are out of reach everywhere: which, when the cuts fit.
-                let Some(cuts) = Mill::new(self.machine, program, false) else { return vec![nowhere()] };
+                let Some(cuts) = Mill::new(self.machine, (program, &texts), false) else { return vec![nowhere()] };
                 let Ok(found) = self.best(&cuts, 1, &mut |_| true) else { return vec![short(nowhere(), &cuts)] };
-                let mut out: Vec<Diagnostic> = mill.outside(program, found.position).iter().filter_map(limits).collect();
+                let mut out: Vec<Diagnostic> = mill.outside((program, &texts), found.position).iter().filter_map(limits).collect();
                 out.push(short(near(nowhere(), found.position, "its cuts fit"), &mill));
                 out
             });
@@ -241,10 +241,10 @@ impl Wish<'_> {
         let put = put(self.motion, self.machine, at);
         let operations = Operations::new(program);
         let tell = |done: usize, of: usize| self.progress.tell(|| format!("errors at step {done} of {of}"));
-        let report = match report_of_words(program, &put, &operations, self.budget, None, &tell) {
+        let texts = gr_ir::Texts::new(self.motion.sources.iter().map(|(id, f)| (id, &*f.text)));
+        let report = match report_of_words((program, &texts), &put, &operations, self.budget, None, &tell) {
             Some(report) => report,
             None => {
-                let texts = gr_ir::Texts::new(self.motion.sources.iter().map(|(id, f)| (id, &*f.text)));
                 let planned = gr_robot::plan(program, &put, &texts, &gr_robot::Options::default()).ok()?;
                 report(&planned.program, &operations, self.budget, None, &tell)
             }
