@@ -1,4 +1,4 @@
-//! Maps over the work space: a quantity on a grid in a plane of the base.
+//! Maps over the work space: a quantity on a grid in a plane of the base; on machines with a turning table, of the part's frame on it.
 
 use crate::clearance::Lattice;
 use crate::error::{Budget, Sensitivity, Spread, at_lever, closed_form};
@@ -329,6 +329,11 @@ impl<'a> Probe<'a> {
         self.kinematics.control() == Control::Axis
     }
 
+    /// Whether places and directions are those of the part on a table that turns it, not of the base.
+    pub fn turns_part(&self) -> bool {
+        turns_part(self.machine)
+    }
+
     /// Least and greatest coordinate that is within reach, on a lattice, and how fine that is, mm.
     pub fn span(&self, axis: usize) -> Option<(f64, f64, f64)> {
         let count = if closed_form(self.machine) { 60_000 } else { 4_000 };
@@ -470,9 +475,44 @@ impl<'a> Probe<'a> {
         })
     }
 
-    /// The part of the base the tool can reach, roughly: least and greatest X, Y and Z, mm.
+    /// The part of the base the tool can reach, roughly: least and greatest X, Y and Z, mm. Exactly so for the turn of the tool on mills
+    /// of five axes.
     pub fn extent(&self) -> [(f64, f64); 3] {
-        *self.extent.get_or_init(|| self.searched_extent())
+        *self.extent.get_or_init(|| self.corners().unwrap_or_else(|| self.searched_extent()))
+    }
+
+    /// The part of the base the tool can reach in any turn of it, roughly.
+    pub(crate) fn extent_of_all_turns(&self) -> [(f64, f64); 3] {
+        self.searched_extent()
+    }
+
+    /// Slides that go straight reach a box, with the rotary axes where the turn of the tool wants them: its corners say all.
+    fn corners(&self) -> Option<[(f64, f64); 3]> {
+        if !matches!(self.machine.chain, Chain::FiveAxis(_)) {
+            return None;
+        }
+        let joints = &self.machine.joints;
+        let middle: Vec<f64> = joints.iter().map(|j| if j.kind == JointKind::Revolute { 0.0 } else { (limits(j).0 + limits(j).1) / 2.0 }).collect();
+        let somewhere = self.kinematics.forward_frame(&middle).ok()?.position;
+        let turning = |q: &[f64]| joints.iter().zip(q).all(|(j, v)| j.kind != JointKind::Revolute || j.allows(*v));
+        let ways = self.kinematics.inverse_frame(&self.flange(somewhere)).ok()?.into_iter().map(|s| s.joints).filter(|q| turning(q));
+        let mut out: Option<[(f64, f64); 3]> = None;
+        for q in ways {
+            for corner in 0..1u32 << joints.len().min(16) {
+                let end = |(i, (j, v)): (usize, (&gr_machine::Joint, &f64))| {
+                    if j.kind == JointKind::Revolute {
+                        return *v;
+                    }
+                    let (low, high) = limits(j);
+                    if corner >> i & 1 == 1 { high } else { low }
+                };
+                let q: Vec<f64> = joints.iter().zip(&q).enumerate().map(end).collect();
+                let p = self.kinematics.forward_frame(&q).ok()?.then(&self.tool).position;
+                let known = out.unwrap_or(p.map(|v| (v, v)));
+                out = Some([0, 1, 2].map(|i| (known[i].0.min(p[i]), known[i].1.max(p[i]))));
+            }
+        }
+        out
     }
 
     fn searched_extent(&self) -> [(f64, f64); 3] {
@@ -651,6 +691,11 @@ impl<'a> Probe<'a> {
             }
         })
     }
+}
+
+/// Whether a table turns the part, so that places and directions are those of its frame: the base's at rotary values 0.
+pub fn turns_part(machine: &Machine) -> bool {
+    matches!(&machine.chain, Chain::FiveAxis(k) if k.turns_part())
 }
 
 /// The fast form of `TwoLegs::broken(at).is_empty()`.

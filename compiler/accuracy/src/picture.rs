@@ -230,29 +230,41 @@ impl Picture {
         self.text(unit, [x, y - 10.0], 12.0, 0.0);
     }
 
-    /// Bars with their names below each other.
-    pub fn bars(rows: &[(String, f64)], title: &str, unit: &str) -> Picture {
-        const LEFT: f32 = 150.0;
+    /// Bars with their names below each other; below them, what else must be known to read it.
+    pub fn bars(rows: &[(String, f64)], title: &str, unit: &str, notes: &[String]) -> Picture {
+        const EDGE: f32 = 20.0;
         const WIDE: f32 = 560.0;
         const ROW: f32 = 22.0;
+        const TOP: f32 = 74.0;
+        const NOTE: f32 = 9.0;
         let tall = ROW * rows.len() as f32;
-        let size = ((LEFT + WIDE + 110.0) as u32, (tall + 110.0) as u32);
+        let names = rows.iter().map(|r| font::width(&r.0, 11.0)).fold(0.0, f32::max);
+        let left = EDGE + names.max(60.0) + 10.0;
+        // The machine in the first line, what is shown in the second.
+        let (machine, what) = title.split_once(": ").unwrap_or((title, ""));
+        let longest = notes.iter().map(|n| font::width(n, NOTE)).fold(font::width(machine, 14.0).max(font::width(what, 11.0)), f32::max);
+        let wide = (left + WIDE + 110.0).max(2.0 * EDGE + longest);
+        let size = (wide.ceil() as u32, (TOP + tall + 66.0 + 18.0 * notes.len() as f32).ceil() as u32);
         let mut p = Picture { size, title: title.to_string(), shapes: Vec::new() };
-        p.text(title, [20.0, 30.0], 14.0, 0.0);
+        p.text(machine, [EDGE, 26.0], 14.0, 0.0);
+        p.text(what, [EDGE, 48.0], 11.0, 0.0);
         let most = rows.iter().fold(1e-300f64, |m, r| m.max(r.1));
         for t in ticks(0.0, most, 6) {
-            let at = LEFT + (t / most) as f32 * WIDE;
-            p.shapes.push(Shape::Line([at, 50.0], [at, 50.0 + tall], FAINT));
-            p.text(number(t, most), [at, 50.0 + tall + 20.0], 11.0, 0.5);
+            let at = left + (t / most) as f32 * WIDE;
+            p.shapes.push(Shape::Line([at, TOP], [at, TOP + tall], FAINT));
+            p.text(number(t, most), [at, TOP + tall + 20.0], 11.0, 0.5);
         }
         for (i, (name, v)) in rows.iter().enumerate() {
-            let top = 50.0 + ROW * i as f32;
-            p.text(name.as_str(), [LEFT - 10.0, top + 16.0], 11.0, 1.0);
+            let top = TOP + ROW * i as f32;
+            p.text(name.as_str(), [left - 10.0, top + 16.0], 11.0, 1.0);
             let long = (v / most) as f32 * WIDE;
-            p.shapes.push(Shape::Rect([LEFT, top + 4.0, long.max(0.5), ROW - 8.0], BAR));
-            p.text(number(*v, most), [LEFT + long + 8.0, top + 16.0], 11.0, 0.0);
+            p.shapes.push(Shape::Rect([left, top + 4.0, long.max(0.5), ROW - 8.0], BAR));
+            p.text(number(*v, most), [left + long + 8.0, top + 16.0], 11.0, 0.0);
         }
-        p.text(unit, [LEFT + WIDE / 2.0, 50.0 + tall + 44.0], 12.0, 0.5);
+        p.text(unit, [left + WIDE / 2.0, TOP + tall + 44.0], 12.0, 0.5);
+        for (n, note) in notes.iter().enumerate() {
+            p.text(note.as_str(), [EDGE, TOP + tall + 68.0 + 18.0 * n as f32], NOTE, 0.0);
+        }
         p
     }
 

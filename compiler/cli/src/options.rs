@@ -575,7 +575,7 @@ pub struct MapArgs {
     /// total-rss, stiffness, or sensitivity (bars)
     #[arg(long, value_name = "NAME", default_value = "workspace")]
     pub quantity: String,
-    /// Plane of the base: x=…, y=… or z=…, mm
+    /// Plane of the base (with a turning table: of the part's frame on it): x=…, y=… or z=…, mm
     #[arg(long, value_name = "AXIS=MM", default_value = "z=0")]
     pub plane: String,
     /// Picture or table: its ending says which (.png, .svg, .csv); may be given several times
@@ -584,7 +584,7 @@ pub struct MapArgs {
     /// Nodes along each side [default: 400, for bars 120]
     #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u32).range(2..=4000))]
     pub resolution: Option<u32>,
-    /// Force on the tool, N: three numbers, for deflections
+    /// Force on the tool, N: three numbers along X, Y and Z of the same frame, for deflections
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
     pub force: Option<String>,
     /// Deviations of the geometry, such as ls1x=0.0077,lu2y=-0.013 (mm or degrees); without them the worst pattern of the

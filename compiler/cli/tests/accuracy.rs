@@ -903,3 +903,33 @@ fn places_of_the_machine() {
     ];
     insta::assert_snapshot!(all.join("\n"));
 }
+
+/// A box is as large as it is; frames have names; sensitivities say what must be known to read them; a quantity tells only what it has
+/// a part of.
+#[test]
+fn labels_and_boxes() {
+    let folder = tempfile::tempdir().unwrap();
+    let map = |args: &[&str]| run(folder.path(), &[&["map"], args, &["-q", "--message-format=short"]].concat());
+    for (id, volume) in [("generic/mill5-cb-head", "288.0"), ("generic/mill3", "180.0")] {
+        let o = whole(&map(&[&format!("--machine={id}"), "--resolution=8"]));
+        assert!(o.contains(&format!("volume {volume} dm³")), "{o}");
+    }
+    let joints = ["X", "Y", "Z", "B", "C"].map(|j| format!("[[stiffness.member]]\njoint = \"{j}\"\nname = \"drive\"\nstiffness = 100000\n")).concat();
+    let file = format!("format = 1\nid = \"test/m5\"\nextends = \"generic/mill5-b-head-c-table\"\n[accuracy]\nsource = \"made up\"\njoints = [0.005, 0.006, 0.007, 0.01, 0.02]\ngrade = 7\n[stiffness]\nsource = \"made up\"\n{joints}");
+    std::fs::write(folder.path().join("m5.toml"), file).unwrap();
+    std::fs::write(folder.path().join("p.ngc"), "G21 G90 G94 F600\nT1 M6\nS1000 M3\nG0 X0 Y0 Z0\nG1 X60 C138\nM5\nM2\n").unwrap();
+    let report = run(folder.path(), &["accuracy", "p.ngc", "--machine=m5.toml", "--format=json", "-q"]);
+    assert_eq!(json(&report)["frame"], "in the part's frame on the turned table");
+    let all = [
+        whole(&map(&["--machine=m5.toml", "--quantity=kinematic", "--resolution=8"])),
+        whole(&map(&["--machine=m5.toml", "--quantity=geometric", "--resolution=8"])),
+        whole(&map(&["--machine=m5.toml", "--quantity=elastic-x", "--force=100,0,0", "--tool-turn=0,30,90", "--plane=z=-100", "--resolution=20"])),
+        whole(&map(&["--machine=m5.toml", "--quantity=sensitivity", "--resolution=8", "-os.csv", "-os.svg", "-os.png"])),
+        std::fs::read_to_string(folder.path().join("s.csv")).unwrap(),
+        whole(&run(folder.path(), &["accuracy", "p.ngc", "--machine=m5.toml", "-q", "--message-format=short"])),
+        whole(&run(folder.path(), &["place", "p.ngc", "--machine=m5.toml", "-q", "--message-format=short"])),
+    ];
+    insta::assert_snapshot!(all.join("\n"));
+    let svg = std::fs::read_to_string(folder.path().join("s.svg")).unwrap();
+    assert!(svg.contains("tool upright") && svg.contains("turned table") && svg.contains("rotary1.tilt-a (mrad)"), "{svg}");
+}

@@ -38,6 +38,10 @@ impl FiveAxis {
     pub fn rotary(&self) -> [Rotary; 2] {
         self.rotary
     }
+    /// Whether an axis turns the part, so that its frame is not that of the machine.
+    pub fn turns_part(&self) -> bool {
+        self.rotary.iter().any(|r| r.on == Carrier::Table)
+    }
     /// From the crossing of the head's axes to the spindle nose, mm.
     pub fn pivot(&self) -> f64 {
         self.pivot

@@ -324,7 +324,7 @@ impl<'a> Mill<'a> {
         const ROUNDS: usize = 12;
         const SOME: usize = 2_000;
         let long = self.tools.iter().map(|t| norm(t.position)).fold(0.0, f64::max);
-        let extent = Probe::downward(self.machine).extent();
+        let extent = Probe::downward(self.machine).extent_of_all_turns();
         let mut room = [0, 1, 2].map(|i| (extent[i].0 - long - self.span[i].1, extent[i].1 + long - self.span[i].0));
         for _ in 0..ROUNDS {
             for face in self.faces.iter().take(SOME) {

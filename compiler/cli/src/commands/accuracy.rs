@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use gr_accuracy::material::{self, Material};
-use gr_accuracy::map::DOUBT;
+use gr_accuracy::map::{DOUBT, turns_part};
 use gr_accuracy::report::{BeyondLaw, CutData, Lack, Operations, Report, Row, Stretch, Unforced, Work, report, report_of_words};
 use gr_accuracy::{Budget, BudgetOptions, put_down};
 use gr_ir::{Source, Sources as _};
@@ -660,6 +660,9 @@ fn work_of(step: &Workingstep) -> Work {
 
 const RULES: &str = "sum = longest kinematic + longest geometric + deflection; rss = root of the squares of the typical ones and the deflection";
 
+/// Whose frame places and directions are of where a table turns the part.
+const ON_TABLE: &str = "in the part's frame on the turned table";
+
 /// How errors by the geometry count on a machine tool.
 const TOUCHED: &str = "counted from the program's zero, which is touched on this machine";
 
@@ -675,6 +678,9 @@ fn text(report: &Report, motion: &Motion, machine: &Machine, material: Option<&M
     }
     if let Some(text) = &args.deviations {
         let _ = writeln!(out, "geometry: by the deviations {text}");
+    }
+    if budget.joints.is_some() {
+        let _ = writeln!(out, "joints: the error of each with that of its zero");
     }
     if report.touched.is_some() && budget.tells_geometry() {
         let _ = writeln!(out, "geometry: {TOUCHED}");
@@ -724,10 +730,11 @@ fn text(report: &Report, motion: &Motion, machine: &Machine, material: Option<&M
         let [x, y, z] = w.point;
         let _ = writeln!(
             out,
-            "\nlargest: {} µm in {} at line {}, tool point {x:.3} {y:.3} {z:.3} in the base; X {} Y {} Z {} µm at most",
+            "\nlargest: {} µm in {} at line {}, tool point {x:.3} {y:.3} {z:.3} {}; X {} Y {} Z {} µm at most",
             um(w.errors.sum()),
             r.operation.name,
             line_of(motion, w.source),
+            if turns_part(machine) { ON_TABLE } else { "in the base" },
             axis(0),
             axis(1),
             axis(2)
@@ -785,6 +792,7 @@ fn as_json(
         "machine": machine.id, "unit": "mm", "rules": RULES, "doubt": DOUBT,
         "accuracy_source": machine.cell.accuracy.as_ref().map(|a| a.source.clone()),
         "stiffness_source": machine.cell.stiffness.as_ref().map(|s| s.source.clone()),
+        "frame": if turns_part(machine) { ON_TABLE } else { "in the base" },
         "geometry_from_zero": report.touched.is_some(),
         "material": material.map(|m| m.id.clone()), "deviations": args.deviations, "taken_as_exact": budget.unsaid, "operations": rows,
     })

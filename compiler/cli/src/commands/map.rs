@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
-use gr_accuracy::map::{self, DOUBT, Map, Plane, Probe, Quantity, Request};
+use gr_accuracy::map::{self, DOUBT, Map, Plane, Probe, Quantity, Request, turns_part};
 use gr_accuracy::outline::outline;
 use gr_accuracy::picture::Picture;
 use gr_accuracy::{Budget, BudgetOptions, closed_form};
@@ -217,9 +217,9 @@ fn area(global: &Global, args: &MapArgs, machine: &Machine, plane: Plane, budget
     }
     drop(progress);
     let mut notes: Vec<String> = stands(&probe, args.tool_turn.as_deref());
+    notes.extend(framed(machine));
     if geometry && probe.counts_from_zero() {
-        let [x, y, z] = zero(machine, args)?;
-        notes.push(format!("geometry: counted from X {x} Y {y} Z {z} mm in the base, as if the part were touched there (`--zero`)"));
+        notes.push(format!("geometry: {}", counted(machine, args)?));
     }
     if singular {
         let count = if infinite { map.lost } else { map.summary().map_or(0, |s| s.nodes) };
@@ -298,6 +298,18 @@ fn zero(machine: &Machine, args: &MapArgs) -> Result<[f64; 3], Refused> {
     triple(text).ok_or_else(|| ("--zero".to_string(), "three numbers are wanted, such as 100,50,0".to_string()))
 }
 
+/// Where errors by the geometry count from.
+fn counted(machine: &Machine, args: &MapArgs) -> Result<String, Refused> {
+    let [x, y, z] = zero(machine, args)?;
+    Ok(format!("counted from X {x} Y {y} Z {z} mm in the base, as if the part were touched there (`--zero`)"))
+}
+
+/// Whose frame places and directions are of, where that is not the base.
+pub fn framed(machine: &Machine) -> Option<String> {
+    let what = "places, directions and forces: in the part's frame on the turned table, which is the base's with the rotary axes at zero";
+    turns_part(machine).then(|| what.to_string())
+}
+
 /// How far the tool gets along an axis.
 pub fn reach_along(probe: &Probe<'_>, axis: usize) -> String {
     let name = ["X", "Y", "Z"][axis];
@@ -320,8 +332,11 @@ fn left_out(quantity: Quantity, machine: &Machine, budget: &Budget, force: [f64;
     let (joints, geometry, _) = quantity.needs();
     let mut out = Vec::new();
     if joints || geometry {
-        // What is needed and lacks altogether has been refused.
-        out.extend(unsaid(machine, budget).into_iter().filter(|[_, why]| why.contains("taken as exact")));
+        // What is needed and lacks altogether has been refused; what this quantity has no part of is not told.
+        let joint = |name: &String| machine.joints.iter().any(|j| j.name == *name);
+        let counts = |name: &&String| if joint(name) { joints } else { geometry };
+        let budget = Budget { unsaid: budget.unsaid.iter().filter(counts).cloned().collect(), ..budget.clone() };
+        out.extend(unsaid(machine, &budget).into_iter().filter(|[_, why]| why.contains("taken as exact")));
     }
     if joints && geometry && force == [0.0; 3] {
         out.push(["the deflection".into(), "no `--force` is given".into()]);
@@ -451,9 +466,6 @@ fn told(map: &Map, machine: &Machine, what: &str) -> String {
     out
 }
 
-/// One row of a bar chart: its name, and a number for each column.
-type Bar = (String, Vec<f64>);
-
 /// Mean sensitivities, the greatest first.
 fn bars(global: &Global, machine: &Machine, plane: Plane, args: &MapArgs) -> Result<Made, Refused> {
     if args.signs.is_some() || args.force.is_some() || args.grade.is_some() || args.deviations.is_some() {
@@ -468,21 +480,24 @@ fn bars(global: &Global, machine: &Machine, plane: Plane, args: &MapArgs) -> Res
     }
     let tell = |done: usize, of: usize| progress.tell(|| format!("sensitivities of {}: row {done} of {of}", machine.id));
     let published = args.reference.and_then(|_| map::mean_sensitivity_usp2009(&probe, plane, size));
-    let (columns, what, mut all): (&[&str], &str, Vec<Bar>) = match published {
+    let (columns, what, unit, mut all): (&[&str], &str, &str, Vec<Bar>) = match published {
         Some(list) => (
             &["yaw rad/mm", "arm mm/mm"],
             "mean change of yaw and arm length per mm of each length (Gojtan 2009, eq. 7.5)",
-            list.into_iter().map(|(n, v)| (n, v.to_vec())).collect(),
+            "arm, mm per mm",
+            list.into_iter().map(|(name, v)| Bar { name, per: "mm", values: v.to_vec() }).collect(),
         ),
         None => (
             &["X", "Y", "Z", "length"],
             "mean movement of the tool point per mm or mrad of each number of the geometry, mm",
+            "tool point, mm per mm or mrad",
             match map::mean_sensitivity(&probe, plane, size, &tell) {
                 // A radian of a joint would hide every length; a thousandth of it moves the tool about as far as a mm.
                 Some(list) => {
                     let angles: Vec<bool> = machine.parameters().iter().map(|p| p.kind == ParameterKind::Angle).collect();
-                    let one = |((n, v), angle): ((String, [f64; 4]), bool)| {
-                        if angle { (format!("{n} (mrad)"), v.map(|v| v * 1e-3).to_vec()) } else { (n, v.to_vec()) }
+                    let one = |((name, v), angle): ((String, [f64; 4]), bool)| match angle {
+                        true => Bar { name, per: "mrad", values: v.map(|v| v * 1e-3).to_vec() },
+                        false => Bar { name, per: "mm", values: v.to_vec() },
                     };
                     list.into_iter().zip(angles).map(one).collect()
                 }
@@ -494,35 +509,66 @@ fn bars(global: &Global, machine: &Machine, plane: Plane, args: &MapArgs) -> Res
         ),
     };
     drop(progress);
-    let last = |b: &Bar| b.1.last().copied().unwrap_or(0.0);
     // Rounding must not decide the order of what a symmetric machine has twice.
-    let rounded = |b: &Bar| (last(b) * 1e9).round();
+    let rounded = |b: &Bar| (b.last() * 1e9).round();
     all.sort_by(|a, b| rounded(b).total_cmp(&rounded(a)));
-    let mut text = format!("{}: {what}\n{:<20}", machine.id, "");
+    let wide = all.iter().map(|b| b.label().chars().count() + 1).fold(20, usize::max);
+    let mut text = format!("{}: {what}\n{:<wide$}", machine.id, "");
     columns.iter().for_each(|c| text += &format!("{c:>14}"));
-    for (name, values) in &all {
-        let _ = write!(text, "\n{name:<20}");
-        values.iter().for_each(|v| text += &format!("{v:>14.7}"));
+    for bar in &all {
+        let _ = write!(text, "\n{:<wide$}", bar.label());
+        bar.values.iter().for_each(|v| text += &format!("{v:>14.7}"));
     }
     text.push('\n');
-    let rows: Vec<(String, f64)> = all.iter().map(|b| (b.0.clone(), last(b))).collect();
-    let title = format!("{}: mean sensitivity, {} = {} mm", machine.id, ["X", "Y", "Z"][plane.axis], plane.at);
-    let unit = if columns.len() == 2 { "arm, mm per mm" } else { "tool point, mm per mm or mrad" };
-    stands(&probe, args.tool_turn.as_deref()).iter().for_each(|n| text += &format!("{n}\n"));
+    let plane = format!("{} = {} mm", ["X", "Y", "Z"][plane.axis], plane.at);
+    let mut notes = vec![format!("mean over the places within reach in the plane {plane}")];
+    notes.extend(stands(&probe, args.tool_turn.as_deref()));
+    notes.extend(framed(machine));
     if probe.counts_from_zero() {
-        let [x, y, z] = zero(machine, args)?;
-        text += &format!("counted from X {x} Y {y} Z {z} mm in the base, as if the part were touched there (`--zero`)\n");
+        notes.push(counted(machine, args)?);
     }
-    let picture = Picture::bars(&rows, &title, unit);
-    let csv = || {
-        let mut out = format!("parameter,{}\n", columns.join(",").to_lowercase());
-        for (name, values) in &all {
-            let list: Vec<String> = values.iter().map(f64::to_string).collect();
-            let _ = writeln!(out, "{name},{}", list.join(","));
-        }
-        out
-    };
+    if all.iter().any(|b| b.name.ends_with(".zero")) {
+        notes.push("zeros of joints: in reports and maps a part of the joint's own error".to_string());
+    }
+    notes.iter().for_each(|n| text += &format!("{n}\n"));
+    let rows: Vec<(String, f64)> = all.iter().map(|b| (b.label(), b.last())).collect();
+    let title = format!("{}: mean sensitivity, {plane}", machine.id);
+    let lines: Vec<String> = notes.iter().flat_map(|n| wrapped(n)).collect();
+    let picture = Picture::bars(&rows, &title, unit, &lines);
+    let csv = || bars_csv(&all, columns, &notes);
     Ok(Made { text, files: files(&args.output, &picture, csv)?, ..Made::default() })
+}
+
+/// A row of a bar chart.
+struct Bar {
+    name: String,
+    /// Unit of what is varied.
+    per: &'static str,
+    /// A number for each column.
+    values: Vec<f64>,
+}
+
+impl Bar {
+    fn label(&self) -> String {
+        if self.per == "mm" { self.name.clone() } else { format!("{} ({})", self.name, self.per) }
+    }
+    fn last(&self) -> f64 {
+        self.values.last().copied().unwrap_or(0.0)
+    }
+}
+
+/// Sensitivities as a table: the unit of what is varied in each row, that of the values in the head, in its last column what must be
+/// known to read it.
+fn bars_csv(all: &[Bar], columns: &[&str], notes: &[String]) -> String {
+    let head: Vec<String> = columns.iter().map(|c| if c.contains('/') { (*c).to_string() } else { format!("{} mm", c.to_lowercase()) }).collect();
+    let notes = notes.join("; ").replace('"', "\"\"");
+    let (last, first) = head.split_last().map_or((String::new(), &[][..]), |(l, f)| (l.clone(), f));
+    let mut out = format!("parameter,per,{},\"{last} ({notes})\"\n", first.join(","));
+    for bar in all {
+        let list: Vec<String> = bar.values.iter().map(|v| gr_text::figures::number(*v, 9)).collect();
+        let _ = writeln!(out, "{},{},{}", bar.name, bar.per, list.join(","));
+    }
+    out
 }
 
 /// The map that belongs to a report: errors by joints and geometry, those that are known, at a height.
@@ -556,6 +602,7 @@ pub fn beside(global: &Global, machine: &Machine, budget: &Budget, of: &Beside, 
     let mut notes: Vec<String> = unsaid(machine, budget).iter().map(without).collect();
     notes.push("left out: the deflection".to_string());
     notes.extend(stands(&probe, None));
+    notes.extend(framed(machine));
     if probe.counts_from_zero() {
         notes.push("geometry: counted from the program's zero, which is touched on this machine".to_string());
     }

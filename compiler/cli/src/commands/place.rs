@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use gr_accuracy::map::Probe;
+use gr_accuracy::map::{Probe, turns_part};
 use gr_accuracy::place::{Aim, Arm, Found, Mill, Part, Reach, Rectangle, around, place, rectangle};
 use gr_accuracy::report::{Operations, report, report_of_words};
 use gr_accuracy::{Budget, BudgetOptions, closed_form, put_down};
@@ -116,8 +116,10 @@ pub fn run(global: &Global, args: &PlaceArgs) -> Exit {
             };
             let how = if found.apart > 0.0 { format!("looked at every {:.1} mm", found.apart) } else { "by the limits of its axes".to_string() };
             format!(
-                "part's origin at X {x} Y {y} Z {z} mm in the base of {} (--part {x},{y},{z})\nfree to move {:.1} mm any way: every point of the path stays within reach ({how})\n{error}every move of the program can be made there, rapids too\n",
-                machine.id, found.margin
+                "part's origin at X {x} Y {y} Z {z} mm in the base of {}{} (--part {x},{y},{z})\nfree to move {:.1} mm any way: every point of the path stays within reach ({how})\n{error}every move of the program can be made there, rapids too\n",
+                machine.id,
+                if turns_part(&machine) { ", its table at zero" } else { "" },
+                found.margin
             )
         }
     })
