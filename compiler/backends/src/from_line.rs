@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 
 use crate::sources::{Words, is_hidden};
 use gr_ir::Sources;
-use gr_ir::{Builder, FrameId, Marker, Note, Op, Override, PathMode, Pose, Program, Source, State, Turn, Units};
+use gr_ir::{Axes, Builder, FrameId, Marker, Note, Op, Override, PathMode, Pose, Program, Source, State, Turn, Units};
 use gr_text::{Diagnostic, FileId, Span, code};
 
 /// Line number of operations that no source line asked for.
@@ -54,6 +54,11 @@ pub fn from_line(
     if inside_cycle(program, found.index) || cursor.state().sync.is_some() || threaded(program, found.index) {
         return fault(code::FROM_LINE_INSIDE_CYCLE);
     }
+    let asks = |w: Words| w.names_axes() || w.has(b'm') || w.has(b't') || w.has(b's');
+    let skipped = Words::at(sources, file, target).is_some_and(asks);
+    if let Some(at) = found.begins_at.filter(|_| skipped) {
+        notes.push(Diagnostic::new(code::FROM_LINE_NOT_EXECUTED, place.0, place.1, &[line.to_string(), (at + 1).to_string()]));
+    }
     if let Some(way) = found.repeated {
         notes.push(Diagnostic::new(code::FROM_LINE_INSIDE_LOOP, place.0, place.1, &[way]));
     }
@@ -68,6 +73,9 @@ pub fn from_line(
             top
         }
     };
+    if let Some(way) = lifted_before_change(program, found.index, sources) {
+        notes.push(Diagnostic::new(code::FROM_LINE_TOOL_CHANGE, place.0, place.1, &[state.tool.to_string(), way.into()]));
+    }
     if length == Some(0.0) {
         notes.push(Diagnostic::new(code::FROM_LINE_BARE_SPINDLE, place.0, place.1, &[state.tool.to_string()]));
     }
@@ -75,7 +83,16 @@ pub fn from_line(
         let heights = [safe.max(pose.axes[2]), lowest].map(|z| format!("{z:.3}"));
         notes.push(Diagnostic::new(code::FROM_LINE_LOW_HEIGHT, place.0, place.1, &heights));
     }
-    let from = From { index: found.index, line, known: known_axes(program, found.index, sources) };
+    let lathe = approach::is_lathe(program);
+    let places = places(program, found.index, lathe, sources);
+    let cuts = cuts_first(program, found.index, sources);
+    if places[2] == Place::Machine && cuts {
+        return fault(code::FROM_LINE_HEIGHT_UNKNOWN);
+    }
+    let known = places.map(|p| p == Place::Named || p == Place::Renamed && cuts);
+    // On a lathe no height is safe, and a cut has none that nobody named: the program begins as it begins itself.
+    let wait = !known[2] && !lathe && !cuts && axes_used(program)[2];
+    let from = From { index: found.index, line, known, wait, lathe };
     let restart = build(program, &from, &state, &pose, safe.max(pose.axes[2]), sources);
     Ok(Restart { program: restart, notes })
 }
@@ -88,13 +105,15 @@ struct Found {
     index: usize,
     /// How often, in words, when it is more than once.
     repeated: Option<String>,
+    /// The line, from 0, where it begins when the one asked for does nothing.
+    begins_at: Option<u32>,
 }
 
 /// The first operation that the line asks for, itself or through a call; failing that the first of a later line.
 fn find(program: &Program, file: FileId, line: u32) -> Option<Found> {
     let skip = program.steps().take(8).position(|s| s.op == Op::Reset).map_or(0, |i| i + 1);
     let mut first: Option<usize> = None;
-    let mut later: Option<usize> = None;
+    let mut later: Option<(usize, u32)> = None;
     let mut again = false;
     let mut ways: Vec<Source> = Vec::new();
     for step in program.steps().skip(skip) {
@@ -113,7 +132,7 @@ fn find(program: &Program, file: FileId, line: u32) -> Option<Found> {
         }
         let (at_file, at_line, pass) = here(program, step.source);
         if later.is_none() && at_file == file && at_line > line {
-            later = Some(step.index);
+            later = Some((step.index, at_line));
             again = pass;
         }
     }
@@ -124,7 +143,8 @@ fn find(program: &Program, file: FileId, line: u32) -> Option<Found> {
         format!("{times} times{}", name.map_or(String::new(), |n| format!(", in {n}")))
     });
     let repeated = repeated.or_else(|| (first.is_none() && again).then(|| "in a loop".to_string()));
-    Some(Found { index: first.or(later)?, repeated })
+    let begins_at = later.filter(|_| first.is_none()).map(|(_, line)| line);
+    Some(Found { index: first.or(later.map(|(index, _)| index))?, repeated, begins_at })
 }
 
 /// Where in its file an operation is run: the line of the call that leads to it, else its own. True: in a loop.
@@ -181,6 +201,26 @@ fn threaded(program: &Program, index: usize) -> bool {
     last.is_some_and(|s| program.cursor_at(s.index).state().sync.is_some_and(|sync| !sync.velocity))
 }
 
+/// By which code the program brought the tool away before it changed to the one that it has at an operation: a restart
+/// can't do that before it knows where the tool is.
+fn lifted_before_change(program: &Program, index: usize, sources: &dyn Sources) -> Option<&'static str> {
+    let mut way = None;
+    let mut found = None;
+    for s in program.steps().take(index) {
+        match s.op {
+            Op::ToolChange(_) => found = way.take(),
+            op if op.feeds() => way = None,
+            op if op.moves() => {
+                let words = Words::at(sources, s.source.file, s.source.line);
+                let code = [(280, "G28"), (300, "G30"), (530, "G53")].into_iter().find(|(g, _)| words.is_some_and(|w| w.g(*g)));
+                way = code.map(|(_, name)| name).or(way);
+            }
+            _ => {}
+        }
+    }
+    found
+}
+
 fn inside_cycle(program: &Program, index: usize) -> bool {
     let mut depth = 0i32;
     for step in program.steps().take(index) {
@@ -229,24 +269,56 @@ struct From {
     line: u32,
     /// Axes that a block before has brought to a place in the work frame.
     known: [bool; 9],
+    /// The tool stays at the safe height until a block says how high.
+    wait: bool,
+    lathe: bool,
 }
 
-/// Axes whose place a program has said in its work frame before an operation. Of the others, and of those that G28, G30
-/// and G53 brought to a place of the machine, the numbers are only what a simulation takes them for.
-fn known_axes(program: &Program, index: usize, sources: &dyn Sources) -> [bool; 9] {
-    let mut known = [false; 9];
-    for s in program.steps().take(index).filter(|s| s.op.moves()) {
+/// What a program has said about the place of an axis.
+#[derive(Clone, Copy, PartialEq, Debug)]
+enum Place {
+    Never,
+    Named,
+    /// It was named before an offset changed: the axis is where it was, and the number is another.
+    Renamed,
+    /// The machine went to a place of its own.
+    Machine,
+}
+
+/// What a program has said about the places of its axes before an operation. Of axes that it never named, and of those
+/// that G28, G30 and G53 brought to a place of the machine, the numbers are only what a simulation takes them for; and
+/// how high the tool is after a tool change, only the machine knows.
+fn places(program: &Program, index: usize, lathe: bool, sources: &dyn Sources) -> [Place; 9] {
+    let mut places = [Place::Never; 9];
+    for s in program.steps().take(index) {
+        if !s.op.moves() {
+            for (i, place) in places.iter_mut().enumerate().filter(|(_, p)| **p == Place::Named) {
+                if (s.start.axes[i] - s.end.axes[i]).abs() > SAME_HEIGHT {
+                    *place = Place::Renamed;
+                }
+            }
+            if matches!(s.op, Op::ToolChange(_)) && !lathe && places[2] != Place::Never {
+                places[2] = Place::Machine;
+            }
+            continue;
+        }
         let words = Words::at(sources, s.source.file, s.source.line);
         let hidden = words.is_some_and(|w| !w.names_axes()) && is_hidden(program, s.index);
         let fixed = hidden || words.is_some_and(|w| [280, 300, 530].into_iter().any(|g| w.g(g)));
-        let home = fixed && !hidden && words.is_some_and(|w| !w.g(530) && !AXIS_LETTERS.iter().any(|l| w.has(*l)));
+        let home = fixed && !hidden && words.is_some_and(|w| !w.g(530) && !w.names_axes());
         for (i, letter) in AXIS_LETTERS.iter().enumerate() {
             if home || s.start.axes[i] != s.end.axes[i] || words.is_some_and(|w| w.has(*letter)) {
-                known[i] = !fixed;
+                places[i] = if fixed { Place::Machine } else { Place::Named };
             }
         }
     }
-    known
+    places
+}
+
+/// Whether the program cuts, from an operation on, before it says how high.
+fn cuts_first(program: &Program, index: usize, sources: &dyn Sources) -> bool {
+    let mut moves = program.steps().skip(index).filter(|s| s.op.moves());
+    moves.find(|s| s.op.feeds() || says_height(&s.start, &s.end, s.source, sources)).is_some_and(|s| !says_height(&s.start, &s.end, s.source, sources))
 }
 
 const AXIS_LETTERS: [u8; 9] = *b"xyzabcuvw";
@@ -261,8 +333,10 @@ fn build(program: &Program, from: &From, state: &State, pose: &Pose, safe: f64, 
     let index = from.index;
     // A place that no program names, so that every axis of the approach moves and has its word.
     let used = axes_used(program);
-    let approached: [bool; 9] = std::array::from_fn(|i| i == 2 || from.known[i] && (i < 3 || used[i]));
-    let far = Pose::at(std::array::from_fn(|i| if approached[i] { pose.axes[i] + 777.25 } else { pose.axes[i] }));
+    let approached: [bool; 9] = std::array::from_fn(|i| i == 2 && from.wait || from.known[i] && (i < 3 || used[i]));
+    let far: Axes = std::array::from_fn(|i| if approached[i] { pose.axes[i] + 777.25 } else { pose.axes[i] });
+    // It is said before the offsets are, which give it its number.
+    let far = Pose::at(state.machine(&far));
     let mut out = Builder::from_state(far, State::default());
     out.names_of(program);
     let source = Source { line: INSERTED, ..Source::default() };
@@ -279,14 +353,20 @@ fn build(program: &Program, from: &From, state: &State, pose: &Pose, safe: f64, 
         restore.push(Op::Units(state.units));
     }
     restore.modes(state);
-    restore.spindles(state, program.steps().any(|s| matches!(s.op, Op::SpindleMode { surface: Some(_), .. })));
     restore.outputs(program, index);
-    let mut waiting = !from.known[2];
+    let mut waiting = from.wait;
     let mut goal = *pose;
     if waiting {
         goal.axes[2] = safe;
     }
-    approach::Approach { program, index, state, goal, approached, safe }.make(&mut restore);
+    let surface = program.steps().any(|s| matches!(s.op, Op::SpindleMode { surface: Some(_), .. }));
+    let turned = orientations(program, index);
+    let start = |restore: &mut Restore| restore.spindles(state, surface, &turned);
+    if from.lathe && !from.known[2] {
+        start(&mut restore);
+    } else {
+        approach::Approach { program, index, state, goal, approached, safe }.make(&mut restore, start);
+    }
     let mut out = restore.out;
     let mut rest = program.cursor_at(index);
     while let Some(view) = rest.next() {
@@ -366,8 +446,8 @@ impl Restore {
         self.push(Op::Feed { linear: s.feed, angular: s.feed_angular });
     }
 
-    /// `surface`: the program has surface speeds, which outlast its stop.
-    fn spindles(&mut self, s: &State, surface: bool) {
+    /// `surface`: the program has surface speeds, which outlast its stop. `turned`: spindles that are held at an angle.
+    fn spindles(&mut self, s: &State, surface: bool, turned: &BTreeMap<i32, Op<'static>>) {
         for (number, spindle) in (0..).zip(&s.spindles) {
             if spindle.surface.is_some() || surface && spindle.speed != 0.0 {
                 self.push(Op::SpindleMode { spindle: number, surface: spindle.surface });
@@ -379,6 +459,7 @@ impl Restore {
                 self.push(Op::SpindleTurn { spindle: number, turn: spindle.turn });
             }
         }
+        turned.values().for_each(|op| self.push(*op));
         if s.mist {
             self.push(Op::Mist(true));
         }
@@ -400,6 +481,22 @@ impl Restore {
         digital.into_iter().for_each(|(index, on)| self.push(Op::DigitalOut { index, on, synced: false }));
         analog.into_iter().for_each(|(index, value)| self.push(Op::AnalogOut { index, value, synced: false }));
     }
+}
+
+/// Spindles that an operation finds held at an angle (M19): it stays until the spindle is turned on or stopped.
+fn orientations(program: &Program, index: usize) -> BTreeMap<i32, Op<'static>> {
+    let mut held = BTreeMap::new();
+    for step in program.steps().take(index) {
+        match step.op {
+            Op::SpindleOrient { spindle, angle, direction } => {
+                held.insert(spindle, Op::SpindleOrient { spindle, angle, direction });
+            }
+            Op::SpindleTurn { spindle, .. } => drop(held.remove(&spindle)),
+            Op::End => held.clear(),
+            _ => {}
+        }
+    }
+    held
 }
 
 /// Which axes ever move.

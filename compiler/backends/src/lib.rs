@@ -11,5 +11,6 @@ mod sweep;
 mod target;
 
 pub use gr_ir::{NoSources, Sources, Texts};
+pub use sources::Words;
 pub use sweep::Sweep;
 pub use target::{Target, targets};

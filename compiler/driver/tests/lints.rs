@@ -119,3 +119,10 @@ fn a_file_that_is_named_after_its_subroutine_is_called_from_elsewhere() {
     let numbered = "o1000 sub\nG21 G0 X1\no1000 endsub\nM2\n";
     assert_eq!(of("1000.ngc", numbered), Vec::<&str>::new());
 }
+
+/// How high machine zero is in the work frame, only the machine knows.
+#[test]
+fn a_retract_to_the_machine_is_no_dive() {
+    let text = "G21 G43.1 Z150 F100\nM3 S100\nG0 X0 Y0 Z5\nG1 Z-12\nX20\nY20\nX10 Y10\nG53 G0 Z0\nM5\nM2\n";
+    assert_eq!(found(text), Vec::<String>::new());
+}

@@ -27,6 +27,8 @@ struct Ways {
     at: Pose,
     approached: [bool; 9],
     places: Vec<Pose>,
+    /// Before which of them the spindle starts: over the place, and not where the tool stood.
+    start: usize,
 }
 
 impl Ways {
@@ -39,17 +41,20 @@ impl Ways {
 }
 
 impl Approach<'_> {
-    /// Writes the moves behind what is restored.
-    pub fn make(&self, restore: &mut Restore) {
-        let mut ways = Ways { at: *restore.out.pose(), approached: self.approached, places: Vec::new() };
-        if self.approached[0] && self.goal.axes[2] != self.safe && is_lathe(self.program, self.state) {
+    /// Writes the moves behind what is restored; `start` restores spindles and coolant on the way.
+    pub fn make(&self, restore: &mut Restore, start: impl Fn(&mut Restore)) {
+        let mut ways = Ways { at: *restore.out.pose(), approached: self.approached, places: Vec::new(), start: 0 };
+        if self.approached[0] && is_lathe(self.program) {
             self.turning(&mut ways);
         } else {
             self.from_above(&mut ways);
         }
-        for place in ways.places {
-            if place != *restore.out.pose() {
-                restore.out.push_to(Op::Rapid, &place, restore.source);
+        for (i, place) in ways.places.iter().enumerate() {
+            if i == ways.start {
+                start(restore);
+            }
+            if place != restore.out.pose() {
+                restore.out.push_to(Op::Rapid, place, restore.source);
             }
         }
         let mut end = *restore.out.pose();
@@ -63,6 +68,7 @@ impl Approach<'_> {
         let (height, safe) = (self.goal.axes[2], self.safe);
         ways.go([2], |_| safe);
         ways.go((0..9).filter(|i| *i != 2), |i| self.goal.axes[i]);
+        ways.start = ways.places.len();
         let rapids = lowest_crossing(self.program, self.state).unwrap_or(safe);
         ways.go([2], |_| if height < safe { (height + CLEARANCE).max(rapids).min(safe) } else { safe });
     }
@@ -72,11 +78,12 @@ impl Approach<'_> {
         let rapid = last_rapid(self.program, self.index);
         let radius = rapid.map_or(goal(0), |p| p.axes[0]);
         let beside = (1..9).filter(|i| *i != 2);
-        if radius < goal(0) {
-            // In a bore: from the front, at the radius where the program goes by rapid.
+        if is_bore(self.program, self.index) {
+            // From the front, at the radius where the program goes by rapid.
             ways.go([2], |_| self.safe);
             ways.go([0], |_| radius.min(goal(0) - CLEARANCE));
             ways.go(beside, goal);
+            ways.start = ways.places.len();
             ways.go([2], goal);
             return;
         }
@@ -86,6 +93,7 @@ impl Approach<'_> {
         ways.go([0], |_| out);
         ways.go(beside, goal);
         ways.go([2], goal);
+        ways.start = ways.places.len();
         ways.go([0], |i| if there { goal(i) } else { radius.max(goal(i) + CLEARANCE) });
     }
 
@@ -122,9 +130,33 @@ pub(super) fn lowest_crossing(program: &Program, state: &State) -> Option<f64> {
     lowest
 }
 
-/// Turning: the plane of X and Z, and nothing ever moves in Y.
-fn is_lathe(program: &Program, state: &State) -> bool {
-    state.plane == Plane::Xz && !axes_used(program)[1]
+/// Turning: the first cut is in the plane of X and Z, and nothing ever moves in Y.
+pub(super) fn is_lathe(program: &Program) -> bool {
+    let mut cursor = program.cursor();
+    while let Some(view) = cursor.next() {
+        if view.op.feeds() {
+            return view.state.plane == Plane::Xz && !axes_used(program)[1];
+        }
+    }
+    false
+}
+
+/// Turning from within: with the tool of an operation, half way into the part, rapids go at smaller radii than cuts.
+fn is_bore(program: &Program, index: usize) -> bool {
+    let change = |s: &gr_ir::Step<'_>| matches!(s.op, Op::ToolChange(_) | Op::ToolNumber(_));
+    let from = program.steps().take(index).filter(change).last().map_or(0, |s| s.index + 1);
+    let to = program.steps().skip(index).find(change).map_or(program.len(), |s| s.index);
+    let moves = || program.steps().skip(from).take(to - from).filter(|s| s.op.moves());
+    let heights = moves().filter(|s| s.op.feeds()).flat_map(|s| [s.start.axes[2], s.end.axes[2]]);
+    let (low, high) = heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), z| (l.min(z), h.max(z)));
+    let half = (low + high) / 2.0;
+    // Mean radius where moves cross that height.
+    let mean = |feeds: bool| {
+        let crosses = |s: &gr_ir::Step<'_>| s.op.feeds() == feeds && (s.start.axes[2] - half) * (s.end.axes[2] - half) < 0.0;
+        let (n, sum) = moves().filter(crosses).fold((0.0, 0.0), |(n, sum), s| (n + 1.0, sum + s.start.axes[0] + s.end.axes[0]));
+        (n > 0.0).then(|| sum / n)
+    };
+    matches!((mean(false), mean(true)), (Some(rapids), Some(cuts)) if rapids < cuts)
 }
 
 /// Where the last rapid before an operation ended: the program says that nothing is there.

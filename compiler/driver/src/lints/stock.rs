@@ -1,5 +1,6 @@
 //! A rapid that dives deeper than anything cut so far. See the registry row for the rule.
 
+use gr_backends::Words;
 use gr_canon::{At, Plane};
 use gr_spec::code;
 
@@ -75,7 +76,7 @@ pub(super) fn cut(lints: &mut Lints<'_>, from: [f64; 3], end: [f64; 3]) {
 pub(super) fn rapid(lints: &mut Lints<'_>, at: &At<'_>, end: [f64; 3]) {
     let from = lints.position;
     let deeper = end[2] < from[2] && end[2] < 0.0 && end[2] < lints.summary.cuts.lowest;
-    if deeper && lints.plane == Plane::Xy && lints.summary.dives.len() < MOST_PER_CHUNK {
+    if deeper && lints.plane == Plane::Xy && lints.summary.dives.len() < MOST_PER_CHUNK && !to_the_machine(at.now) {
         lints.summary.dives.push(Dive {
             place: at.into(),
             end,
@@ -84,6 +85,13 @@ pub(super) fn rapid(lints: &mut Lints<'_>, at: &At<'_>, end: [f64; 3]) {
             new_frame: lints.summary.new_frame,
         });
     }
+}
+
+/// Whether a block goes to a place of the machine (G28, G30, G53, or what the machine does of itself before a tool
+/// change): how high that is in the work frame, only the machine knows.
+fn to_the_machine(block: &[u8]) -> bool {
+    let words = Words::of(&String::from_utf8_lossy(block));
+    [280, 300, 530].into_iter().any(|g| words.g(g)) || !words.names_axes() && words.has(b'm')
 }
 
 impl Dive {
