@@ -159,6 +159,13 @@ pub fn program(
                 out.program.steps.push(Step { action, source: step.source });
                 from = end;
             }
+            Action::Probe { to, speed, input, on, must } => {
+                let Some(end) = target(*to) else { continue };
+                let to = push(&mut out, &corrector, &at, &end, step).map_err(fail)?;
+                let action = Action::Probe { to, speed: *speed, input: input.clone(), on: *on, must: *must };
+                out.program.steps.push(Step { action, source: step.source });
+                from = end;
+            }
             Action::Linear { to, speed, zone, rapid } => {
                 let Some(end) = target(*to) else { continue };
                 let pieces = if *rapid { 1 } else { straight(&corrector, &at, &from, &end, tolerance).map_err(fail)? };

@@ -350,7 +350,7 @@ pub fn report(
                 let old = std::mem::replace(&mut walk.tool, program.tools.get(usize::from(*i)).map_or(Frame::IDENTITY, |t| t.frame));
                 from = from.retooled(&old, &walk.tool);
             }
-            Action::Joint { to, .. } => from = target(*to).unwrap_or(from),
+            Action::Joint { to, .. } | Action::Probe { to, .. } => from = target(*to).unwrap_or(from),
             Action::Linear { to, rapid, speed, .. } => {
                 let Some(end) = target(*to) else { continue };
                 if let (false, Some(source)) = (*rapid, step.source) {

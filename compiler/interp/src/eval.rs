@@ -187,6 +187,9 @@ fn binary(op: Binary, a: f64, b: f64, tolerance: f64) -> Res<f64> {
     })
 }
 
+/// Where a value comes from.
+const PROBE: &str = "a probe (G38)";
+
 impl<S: Sink> Interp<'_, S> {
     /// Value of an expression.
     pub(crate) fn eval(&mut self, scan: &Scan, id: ExprId) -> Res<f64> {
@@ -241,6 +244,9 @@ impl<S: Sink> Interp<'_, S> {
             }
             Node::Named(name) => {
                 let name = scan.names.get(name as usize).map_or("", |n| n);
+                if self.m.loose != 0 {
+                    self.doubt_place(scan, id, name);
+                }
                 self.read_named(name).map_err(|f| blame(f, scan, id))
             }
             Node::Unary(op, x) => {
@@ -288,15 +294,28 @@ impl<S: Sink> Interp<'_, S> {
     /// Warns, once per place, of a value that only the running machine knows.
     #[cold]
     fn doubt_stand_in(&mut self, scan: &Scan, id: ExprId, index: i32) {
-        let source = match index {
-            5399 if self.m.stand_ins & 1 != 0 => "an input (M66)",
-            5061..=5070 if self.m.stand_ins & 2 != 0 => "a probe (G38)",
+        let (source, what) = match index {
+            5399 if self.m.stand_ins & 1 != 0 => ("an input (M66)", "input"),
+            5061..=5070 if self.m.stand_ins & 2 != 0 => (PROBE, "the result of a probe"),
+            5420..=5425 if self.m.loose >> (index - 5420) & 1 != 0 => (PROBE, "where the probe stopped"),
             _ => return,
         };
-        if index == 5399 {
-            self.mark_runtime("input");
+        self.doubt(scan, id, format!("#{index}"), source, what);
+    }
+
+    /// The same of the named parameters that say where the machine is.
+    #[cold]
+    fn doubt_place(&mut self, scan: &Scan, id: ExprId, name: &str) {
+        let axis = name.strip_prefix("_abs_").or_else(|| name.strip_prefix('_'));
+        let axis = axis.filter(|a| a.len() == 1).and_then(|a| "xyzabc".find(a));
+        if axis.is_some_and(|i| self.m.loose >> i & 1 != 0) {
+            self.doubt(scan, id, format!("#<{name}>"), PROBE, "where the probe stopped");
         }
-        let shown = [format!("#{index}"), source.to_string()];
+    }
+
+    fn doubt(&mut self, scan: &Scan, id: ExprId, name: String, source: &str, what: &str) {
+        self.mark_runtime(what);
+        let shown = [name, source.to_string()];
         let place = self.place;
         let same = |f: &crate::Finding| {
             f.fault.code == code::RUN_VALUE_UNKNOWN && (f.file, f.line) == (place.file, place.line) && f.fault.args == shown

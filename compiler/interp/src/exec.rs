@@ -307,6 +307,10 @@ impl<S: Sink> Interp<'_, S> {
     /// Motion of the block.
     #[inline]
     pub(crate) fn convert_motion(&mut self, motion: i16) -> Res {
+        if self.m.loose != 0 && motion != 800 {
+            // In inverse time the feed comes from the length.
+            self.leaves_probed(motion == 0 || self.m.feed_mode != 1 && matches!(motion, 10 | 382..=385));
+        }
         if self.config.any_indexer && self.index_motion(motion)? {
             return Ok(());
         }

@@ -247,12 +247,35 @@ impl<S: Sink> Interp<'_, S> {
             }
             self.warn(Fault::own(code::PROBE_NO_TRAVEL));
         }
+        for i in (0..6).filter(|i| self.m.current[*i] != end[*i]) {
+            self.m.loose |= 1 << i;
+        }
         self.emit(Call::TurnProbeOn);
         self.emit(Call::StraightProbe(end, kind));
         self.emit(Call::TurnProbeOff);
         self.m.motion = i32::from(motion);
         self.m.probed = 1;
         Ok(())
+    }
+
+    /// A block moves from where a probe stopped: straight moves to named places leave that behind, all others rest on it.
+    #[cold]
+    pub(crate) fn leaves_probed(&mut self, straight: bool) {
+        let b = &self.block;
+        let absolute = self.m.incremental == 0 || b.g(Group::NonModal) == 530;
+        if straight && absolute && !b.has_any_of(POLAR) && self.m.comp_side == 0 {
+            let named = (0..6).filter(|i| b.has(AXIS_LETTERS[*i])).fold(0, |mask, i| mask | 1u8 << i);
+            self.m.loose &= !named;
+        }
+        self.rests_on_probed();
+    }
+
+    /// What follows depends on where a probe stopped, if that still shows.
+    pub(crate) fn rests_on_probed(&mut self) {
+        if self.m.loose != 0 {
+            self.m.loose = 0;
+            self.mark_runtime("where the probe stopped");
+        }
     }
 
     /// Takes down a doubt about the present block.

@@ -221,6 +221,9 @@ impl<S: Sink> Interp<'_, S> {
     pub(crate) fn convert_axis_offsets(&mut self, g: i16) -> Res {
         not_with_comp(self.m.comp_side, rs274::RT_COMP_AXIS_OFFSETS, "a change of the axis offsets")?;
         self.check_wrapped_words()?;
+        if g == 920 {
+            self.rests_on_probed();
+        }
         match g {
             520 | 920 => {
                 self.write_param(5210, 1.0);
@@ -277,6 +280,7 @@ impl<S: Sink> Interp<'_, S> {
         let active = system as i32 == self.m.origin_index;
         if l20 {
             self.check_wrapped_words()?;
+            self.rests_on_probed();
         }
         if active {
             not_with_comp(self.m.comp_side, rs274::RT_COMP_ACTIVE_SYSTEM, "a change of the active work offset")?;
@@ -335,6 +339,12 @@ impl<S: Sink> Interp<'_, S> {
 
     /// G28, G30.
     pub(crate) fn convert_home(&mut self, g: i16) -> Res {
+        match self.m.loose {
+            0 => {}
+            _ if self.has_axes() => self.leaves_probed(true),
+            // The first of its two moves is to where the machine stands.
+            _ => self.rests_on_probed(),
+        }
         let mut end = self.find_ends()?;
         not_with_comp(self.m.comp_side, rs274::RT_COMP_G28, "G28 or G30")?;
         self.index_before(&end);
@@ -360,6 +370,7 @@ impl<S: Sink> Interp<'_, S> {
     /// G28.1, G30.1.
     pub(crate) fn convert_save_home(&mut self, g: i16) -> Res {
         not_with_comp(self.m.comp_side, rs274::RT_COMP_SAVEHOME, "setting a reference point")?;
+        self.rests_on_probed();
         let mut at = self.machine_position();
         for i in 3..6 {
             if self.config.wrapped[i - 3] {

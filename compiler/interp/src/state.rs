@@ -150,8 +150,10 @@ pub struct Modal {
     pub stand_ins: u8,
     /// Fanuc: G68 is on.
     pub turned: u8,
+    /// Axes X Y Z A B C, by bits, that stand where a probe stopped: no word has sent them to a place since.
+    pub loose: u8,
     /// Always 0; keeps the size a multiple of eight.
-    pub pad: [u8; 4],
+    pub pad: [u8; 3],
 }
 
 impl Modal {

@@ -301,6 +301,7 @@ impl<S: Sink> Interp<'_, S> {
 
     /// Offsets such that the present point reads as the words say.
     fn touch_off(&mut self, tool: &mut Tool, to_fixture: bool) {
+        self.rests_on_probed();
         let system = if to_fixture { 9 } else { self.m.origin_index as u32 };
         let mut at = self.current_in_system(system, true);
         if to_fixture && self.read_applied() {

@@ -29,7 +29,7 @@ pub struct Cell {
     pub coupling: Option<Coupling>,
     /// Limits of the controller's files.
     pub controller: Controller,
-    /// What M words do, by word: `M3`, `S`, `M62` …
+    /// What M words do, by word: `M3`, `S`, `M62` … The probe's input is the `wait` of `G38`.
     pub io: BTreeMap<String, Signal>,
     /// How a rapid is made.
     pub rapid: Option<Rapid>,
@@ -259,6 +259,11 @@ impl Controller {
 }
 
 impl Signal {
+    /// As the row of the probe: the level of its input while it touches.
+    pub fn touches_at(&self) -> bool {
+        self.value != Some(0.0)
+    }
+
     fn describe(&self) -> String {
         let mut parts = Vec::new();
         if let Some(r) = &self.routine {

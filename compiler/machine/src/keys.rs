@@ -135,7 +135,7 @@ pub(crate) static ROOT: &[Key] = &[
     key("speed", Table(SPEED), "Speeds where the program says nothing."),
     key("zone", Table(ZONE), "Corner zones, mm."),
     key("controller", Table(CONTROLLER), "Limits of the controller's files."),
-    key("io", Map(SIGNAL), "What M3 M4 M5 S M6 M7 M8 M9 M62 … M68 do."),
+    key("io", Map(SIGNAL), "What M3 M4 M5 S M6 M7 M8 M9 M62 … M68 do, and the input of the probe (G38)."),
     key("accuracy", Table(ACCURACY), "How exactly joints and geometry are made."),
     key("stiffness", Table(STIFFNESS), "What yields under force."),
     key("as_built", Table(AS_BUILT), "Deviations of the geometry that have been measured or identified."),
@@ -279,9 +279,9 @@ static CONTROLLER: &[Key] = &[
 
 static SIGNAL: &[Key] = &[
     key("signal", Text, "Output that is set."),
-    key("value", ANY, "To this value; else 1."),
+    key("value", ANY, "To this value; else 1. `G38`: level of the input while the probe touches, 1 or 0."),
     key("routine", Text, "Routine that is called."),
-    key("wait", Text, "Input that is waited for."),
+    key("wait", Text, "Input that is waited for. `G38`: the probe's."),
     key("seconds", ABOVE, "Time of the wait, s."),
 ];
 
@@ -355,10 +355,10 @@ static SETUP: &[Key] = &[
     key("rotation", Numbers(3), "Turns of the part about the table's fixed X, Y, Z, degrees."),
 ];
 
-/// Words that may stand in `[io]`: `S`, `M3`, and `M62P3` for one output alone.
+/// Words that may stand in `[io]`: `S`, `M3`, `M62P3` for one output alone, and `G38` for the probe.
 fn io_word(word: &str) -> bool {
     let digits = |n: &str| !n.is_empty() && n.len() <= 3 && n.bytes().all(|b| b.is_ascii_digit());
-    let Some(rest) = word.strip_prefix('M') else { return word == "S" };
+    let Some(rest) = word.strip_prefix('M') else { return matches!(word, "S" | "G38") };
     match rest.split_once('P') {
         Some((code, index)) => digits(code) && digits(index),
         None => digits(rest),
@@ -424,7 +424,7 @@ fn value(node: &Node, key: &Key, place: &str, out: &mut Vec<(Range<usize>, Strin
         (Map(keys), Value::Table(entries)) => {
             for e in entries {
                 if !io_word(&e.key) {
-                    out.push((e.key_span.clone(), format!("`{}` is no word of `[{name}]`; words are S, M0 … M999 and such as M62P3", e.key)));
+                    out.push((e.key_span.clone(), format!("`{}` is no word of `[{name}]`; words are S, M0 … M999, such as M62P3, and G38", e.key)));
                 }
                 table(&e.node, keys, &format!("`[{name}.{}]`", e.key), false, out);
             }
@@ -613,7 +613,7 @@ fn property(out: &mut String, k: &Key, depth: usize) {
         Tables(keys) | Map(keys) => {
             let map = matches!(k.kind, Map(_));
             let _ = if map {
-                writeln!(out, "{pad}\"type\": \"object\",\n{pad}\"additionalProperties\": false,\n{pad}\"patternProperties\": {{\n{pad}\"^(S|M[0-9]{{1,3}}(P[0-9]{{1,3}})?)$\": {{")
+                writeln!(out, "{pad}\"type\": \"object\",\n{pad}\"additionalProperties\": false,\n{pad}\"patternProperties\": {{\n{pad}\"^(S|G38|M[0-9]{{1,3}}(P[0-9]{{1,3}})?)$\": {{")
             } else {
                 writeln!(out, "{pad}\"type\": \"array\",\n{pad}\"items\": {{")
             };

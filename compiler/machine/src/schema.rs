@@ -529,6 +529,9 @@ impl Check {
             points: whole(c, "points"),
             bytes: whole(c, "bytes"),
         });
+        if let Some(row) = raw.get("io").and_then(|io| io.get("G38")) {
+            self.probe(row);
+        }
         let number = |table: &str, key: &str| raw.get(table).and_then(|t| t.value_of(key));
         Cell {
             base: frame("base"),
@@ -548,6 +551,23 @@ impl Check {
             joint_speed: number("speed", "joint"),
             zones: self.zones(raw),
             ..Cell::default()
+        }
+    }
+
+    /// The row of the probe names an input and its level, nothing else.
+    fn probe(&mut self, row: &Node) {
+        if row.get("wait").is_none() {
+            self.value(&row.span, "`[io.G38]` needs `wait`: the input that the probe switches");
+        }
+        for key in ["signal", "routine", "seconds"] {
+            if let Some(node) = row.get(key) {
+                self.value(&node.span, format!("`{key}` has no meaning for a probe: `[io.G38]` takes `wait`, its input, and `value`"));
+            }
+        }
+        if let Some(node) = row.get("value")
+            && !matches!(row.value_of("value"), Some(v) if v == 0.0 || v == 1.0)
+        {
+            self.value(&node.span, "`value` of `[io.G38]` is the level of the input while the probe touches: 1 or 0");
         }
     }
 
@@ -784,6 +804,10 @@ mod tests {
             ("[zone]\n", "max = ", &["-1"]),
             ("[io.M3]\nwait = \"di\"\n", "seconds = ", &["-10", "0"]),
             ("[io.M3]\nsignal = \"do\"\n", "value = ", &["nan", "1e300"]),
+            ("[io.G38]\nwait = \"di\"\n", "value = ", &["2", "0.5"]),
+            ("[io.G38]\nwait = \"di\"\n", "seconds = ", &["1"]),
+            ("[io.G38]\nwait = \"di\"\n", "signal = ", &["\"do\""]),
+            ("[io.G38]\n", "value = ", &["1"]),
             (tool, "mass = ", &["-1", "0"]),
             (tool, "diameter = ", &["-10", "0"]),
             (tool, "position = ", &["[0, 0, 1e300]", "[0, -inf, 0]"]),

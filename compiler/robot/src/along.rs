@@ -234,7 +234,7 @@ pub fn at_line(program: &RobotProgram, file: FileId, line: u32) -> Option<[f64; 
     let mut found = None;
     for step in &program.steps {
         let here = step.source.is_some_and(|s| s.file == file && s.line == line);
-        let (Action::Joint { to, .. } | Action::Linear { to, .. } | Action::Arc { to, .. }) = &step.action else { continue };
+        let (Action::Joint { to, .. } | Action::Linear { to, .. } | Action::Arc { to, .. } | Action::Probe { to, .. }) = &step.action else { continue };
         match (here, step.source) {
             (true, _) => found = program.targets.get(*to as usize).map(|t| t.joints),
             // Moves of the planner's own may stand in between.

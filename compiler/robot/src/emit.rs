@@ -28,6 +28,8 @@ pub(crate) struct Emit<'a> {
     summary: Summary,
     /// Values of external axes: they stand still.
     external: Vec<f64>,
+    /// The probe's input.
+    probe: String,
 }
 
 /// Sag of a joint move that is worth a word, mm.
@@ -61,11 +63,13 @@ impl<'a> Emit<'a> {
             steps: Vec::new(),
             summary: Summary::default(),
             external: external.collect(),
+            probe: String::new(),
         }
     }
 
     pub fn run(mut self, g: &mut Gathered, list: &[Chain], nodes: &[Node], home: &Joints, findings: &mut Findings<'_>) -> (RobotProgram, Summary) {
         let items = std::mem::take(&mut g.items);
+        self.probe = crate::gather::probing::input(&items, self.machine).unwrap_or_default();
         self.steps.reserve(items.len() + 2);
         self.targets.reserve(items.len() + 2);
         self.summary.wait_seconds = g.wait_seconds;
@@ -166,7 +170,10 @@ impl<'a> Emit<'a> {
                 self.summary.arcs += 1;
                 Action::Arc { via, to, center: a.center, normal: a.normal, angle: a.angle, speed: m.speed, zone: m.zone }
             }
-            _ => Action::Linear { to, speed: m.speed, zone: m.zone, rapid: m.rapid },
+            _ => match m.probe {
+                Some(c) => Action::Probe { to, speed: m.speed, input: self.probe.clone(), on: c.on, must: c.must },
+                None => Action::Linear { to, speed: m.speed, zone: m.zone, rapid: m.rapid },
+            },
         };
         self.steps.push(Step { action, source: m.source });
         *h = Here { at: Frame { turn: g.turns[m.turn as usize], position: m.position }, by: *m, joints, branch };

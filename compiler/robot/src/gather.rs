@@ -2,6 +2,7 @@
 //! values yet. Frames, tools, tool directions, speeds, signals and the words a robot has no meaning for are settled
 //! here.
 
+pub(crate) mod probing;
 mod setups;
 mod signals;
 
@@ -53,7 +54,18 @@ pub(crate) struct Move {
     pub free: bool,
     /// Approach or retract: may be left out.
     pub ours: bool,
+    /// Ends where the probe switches.
+    pub probe: Option<Contact>,
     pub source: Option<Source>,
+}
+
+/// How a probe move ends.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(crate) struct Contact {
+    /// State of the input that ends it.
+    pub on: bool,
+    /// Without it the program stops.
+    pub must: bool,
 }
 
 pub(crate) enum Item {
@@ -158,6 +170,8 @@ pub(crate) struct Gather<'a> {
     exchanged: bool,
     /// The program had a rapid since the last move.
     rapids: bool,
+    /// The last move was a probe's.
+    probed: Option<probing::Probed>,
     /// The tool offset moved the program's coordinates while the tool stood still.
     offset: bool,
     /// That was told.
@@ -222,6 +236,7 @@ impl<'a> Gather<'a> {
             starts: machine.kind == Kind::Mill,
             exchanged: false,
             rapids: false,
+            probed: None,
             offset: false,
             offset_told: false,
             placed: None,
@@ -251,8 +266,8 @@ impl<'a> Gather<'a> {
                 break;
             }
             self.source = view.source;
-            // Errors of their own; where the tool is afterwards nobody knows.
-            self.rapids |= matches!(view.op, Op::Probe(_) | Op::RigidTap { .. });
+            // An error of its own; where the tool is afterwards nobody knows.
+            self.rapids |= matches!(view.op, Op::RigidTap { .. });
             if !self.options.setups.is_empty() {
                 self.main_line = main_line(program, view.source);
             }
@@ -273,13 +288,19 @@ impl<'a> Gather<'a> {
         match view.op {
             Op::Rapid => self.rapid(view),
             Op::Linear | Op::Arc(_) | Op::Nurbs { .. } => self.cut(view),
-            Op::Probe(_) => self.cannot("a probe move"),
+            Op::Probe(kind) => self.probe(view, kind),
             Op::RigidTap { .. } => self.cannot("rigid tapping (G33.1)"),
             Op::SyncStart(s) if !s.velocity => self.cannot("a motion locked to the spindle's angle (G33)"),
             Op::IndexerLock(..) => self.cannot("an indexing axis"),
             Op::SpindleOrient { .. } | Op::SpindleWait { .. } if self.control == Control::Position => self.yaws(view),
             Op::SpindleOrient { spindle, angle, direction } => self.orient(spindle, angle, direction),
             Op::SpindleWait { timeout, .. } => self.oriented(timeout),
+            // Whoever says so knows which words are there: what rests on where it stopped has an operation of its own.
+            Op::RunTime("probe") => {
+                if let Some(probed) = &mut self.probed {
+                    probed.loose = [false; 3];
+                }
+            }
             Op::RunTime(what) => self.findings.say(code::ROBOT_RUN_TIME, Some(view.source), &[what.to_string()]),
             Op::ToolOffset(_) => self.tool_offset(view),
             Op::PathMode(_) => self.path_said = true,
@@ -294,6 +315,10 @@ impl<'a> Gather<'a> {
     /// The machine stands still, the program's coordinates change. Where the tool stands is known, or it is said anew.
     fn tool_offset(&mut self, view: &View<'_, '_>) {
         let same = |i: usize| view.start.axes[i] == view.end.axes[i];
+        if let Some(probed) = &mut self.probed {
+            (0..3).for_each(|i| probed.loose[i] |= !same(i));
+            return;
+        }
         if self.at.is_some() && !self.exchanged {
             if !(0..3).all(same) {
                 (self.offset, self.offset_told) = (true, false);
@@ -315,6 +340,9 @@ impl<'a> Gather<'a> {
             Op::ToolChange(_) => {
                 // On a mill the tool changer brings no other place.
                 self.exchanged = self.machine.kind != Kind::Mill;
+                if let Some(probed) = &mut self.probed {
+                    probed.loose = [true; 3];
+                }
                 self.change(state.tool);
             }
             // What is on is on the first spindle; the others are only told to stop.
@@ -412,6 +440,11 @@ impl<'a> Gather<'a> {
             }
         };
         if self.frame != Some(index) {
+            if let (Some(probed), Some(old)) = (&mut self.probed, self.frame)
+                && !same_turn(&self.out.frames[usize::from(old)].frame.turn, &frame.turn)
+            {
+                probed.loose = [true; 3];
+            }
             self.act(Action::UseFrame(index));
             self.frame = Some(index);
         }
@@ -555,7 +588,7 @@ impl<'a> Gather<'a> {
         }
         self.starts = false;
         self.at = Some(self.base(m.frame, m.position, m.turn));
-        self.at_change = None;
+        (self.at_change, self.probed) = (None, None);
         (self.exchanged, self.rapids) = (false, false);
         self.out.items.push(Item::Move(m));
     }
@@ -563,7 +596,7 @@ impl<'a> Gather<'a> {
     /// How far the tool stands from where the program believes it, in the work frame, where the tool offset was changed
     /// while it stood still.
     fn lag(&mut self, frame: u16, believed: [f64; 3]) -> [f64; 3] {
-        let Some(at) = self.at.filter(|_| self.offset) else { return [0.0; 3] };
+        let Some(at) = self.at.filter(|_| self.offset && self.probed.is_none()) else { return [0.0; 3] };
         let here = self.out.frames[usize::from(frame)].frame.inverse().apply(at.position);
         let lag = sub(here, believed).map(|v| if v.abs() < NEAR { 0.0 } else { v });
         self.offset = lag != [0.0; 3];
@@ -644,6 +677,7 @@ impl<'a> Gather<'a> {
             rapid: true,
             free: self.free(tool),
             ours: false,
+            probe: None,
             source: Some(self.source),
         };
         if first && self.comes_from_above() {
@@ -651,7 +685,9 @@ impl<'a> Gather<'a> {
             self.push(Move { position: above, ours: true, source: None, zone: Zone::Stop, ..m });
             return self.push(Move { way: Way::Line, speed: self.rapid_speed(), length: self.options.approach, ..m });
         }
-        let linear = self.at.is_some_and(|at| same_turn(&at.turn, &here.turn) && self.straight(at.position, &here));
+        // Away from what was touched it goes straight.
+        let probed = self.probed.is_some();
+        let linear = self.at.is_some_and(|at| same_turn(&at.turn, &here.turn) && (probed || self.straight(at.position, &here)));
         if linear {
             self.push(Move { way: Way::Line, speed: self.rapid_speed(), ..m });
         } else {
@@ -700,6 +736,9 @@ impl<'a> Gather<'a> {
         let (Some(frame), Some(tool)) = (self.work(state), self.tool(state)) else { return };
         let Some(turn) = self.turn(end, state) else { return };
         let turn = self.turn_index(turn);
+        if !self.leaves_probed(start, end) {
+            return;
+        }
         let mut to = end.xyz();
         let lag = self.lag(frame, start.xyz());
         if lag != [0.0; 3] {
@@ -710,7 +749,21 @@ impl<'a> Gather<'a> {
         if self.machine.kind == Kind::Mill && words > 0.0 && self.at.is_some() {
             let from = self.turn(start, state).map(|t| self.turn_index(t)).unwrap_or(turn);
             let length = norm(sub(to, add(start.xyz(), lag)));
-            let m = Move { way: Way::Line, position: to, turn: from, frame, tool, speed: self.rapid_speed(), zone: self.zone_of_rapid(), length, rapid: true, free: false, ours: false, source: Some(self.source) };
+            let m = Move {
+                way: Way::Line,
+                position: to,
+                turn: from,
+                frame,
+                tool,
+                speed: self.rapid_speed(),
+                zone: self.zone_of_rapid(),
+                length,
+                rapid: true,
+                free: false,
+                ours: false,
+                probe: None,
+                source: Some(self.source),
+            };
             let [mut start, mut end] = [*start, *end];
             for i in 0..3 {
                 start.axes[i] += lag[i];
@@ -719,7 +772,7 @@ impl<'a> Gather<'a> {
             return self.turning(&View { index: 0, op: Op::Rapid, start: &start, end: &end, state, source: self.source }, m, words);
         }
         let here = self.base(frame, to, turn);
-        if self.at.is_none_or(|at| norm(sub(at.position, here.position)) > TINY || !same_turn(&at.turn, &here.turn)) {
+        if self.probed.is_some() || self.at.is_none_or(|at| norm(sub(at.position, here.position)) > TINY || !same_turn(&at.turn, &here.turn)) {
             self.come(frame, tool, to, turn);
         }
     }
@@ -794,6 +847,9 @@ impl<'a> Gather<'a> {
         self.cutting = false;
         let (Some(frame), Some(tool)) = places else { return };
         let (Some(from), Some(to)) = (self.turn(view.start, state), self.turn(view.end, state)) else { return };
+        if !self.leaves_probed(view.start, view.end) {
+            return;
+        }
         let lag = self.lag(frame, view.start.xyz());
         let (op, first, last);
         let view = if lag == [0.0; 3] {
@@ -817,7 +873,11 @@ impl<'a> Gather<'a> {
         let asked = if on_the_spot && mill { self.turn_speed(state, self.words(view.start, view.end)) } else { self.speed(state, length) };
         let Some(speed) = asked else { return };
         let start = self.turn_index(from);
-        self.come_to_cut(frame, tool, view.start.xyz(), start);
+        if self.probed.is_none() {
+            self.come_to_cut(frame, tool, view.start.xyz(), start);
+        } else if angle.max(words) > 1e-12 || !matches!(view.op, Op::Linear) || state.feed_mode == FeedMode::Inverse {
+            return self.rests_on_probed();
+        }
         if on_the_spot && !mill {
             self.findings.once(code::ROBOT_TURN_SPEED, Some(self.source), &[]);
         }
@@ -829,10 +889,12 @@ impl<'a> Gather<'a> {
             tool,
             speed,
             zone: self.zone(state),
-            length,
+            // From where the probe stopped its length is not known: no corner.
+            length: if self.probed.is_some() { 0.0 } else { length },
             rapid: false,
             free: self.free(tool),
             ours: false,
+            probe: None,
             source: Some(self.source),
         };
         match view.op {
@@ -934,6 +996,7 @@ impl<'a> Gather<'a> {
     fn retract(&mut self) {
         let last = self.out.items.iter().rev().find_map(|i| if let Item::Move(m) = i { Some(*m) } else { None });
         if let Some(m) = last.filter(|_| self.comes_from_above()) {
+            let m = self.back_from_probed(m);
             let above = self.above(m.position, m.turn);
             let speed = self.rapid_speed();
             let length = self.options.approach;
@@ -950,7 +1013,9 @@ impl<'a> Gather<'a> {
                 next = (0.0, false, false);
                 continue;
             };
-            let (length, rapid, joint) = std::mem::replace(&mut next, (m.length, m.rapid, m.way == Way::Joint));
+            let probe = m.probe.is_some();
+            let this = if probe { (0.0, false, false) } else { (m.length, m.rapid, m.way == Way::Joint) };
+            let (length, rapid, joint) = std::mem::replace(&mut next, this);
             if let Zone::Blend(size) = m.zone {
                 let fits = m.rapid == rapid && (m.way == Way::Joint) == joint;
                 let size = size.min(m.length / 2.0).min(length / 2.0);

@@ -146,6 +146,7 @@ impl Run<'_> {
                 self.here = to;
             }
             Action::Linear { to, speed, zone, rapid } => self.path(*to, None, *speed, *zone, *rapid, source)?,
+            Action::Probe { to, speed, .. } => self.path(*to, None, *speed, Zone::Stop, false, source)?,
             Action::Arc { via, to, center, normal, angle, speed, zone } => {
                 let via = self.program.targets[*via as usize].position;
                 let arc = ArcPiece { center: *center, normal: *normal, via, angle: *angle };
@@ -223,6 +224,7 @@ impl Run<'_> {
             rapid,
             free: false,
             ours: false,
+            probe: None,
             source,
         };
         let path = Path::new(&self.g, &self.solver, &Frame { turn: turns.0, position: self.here.position }, &m);
@@ -434,7 +436,7 @@ impl Words<'_> {
             Action::Signal { word, .. } => self.line(&word.to_string(), from),
             Action::WaitInput { name, on, timeout } => self.wait(name, *on, *timeout, step.source),
             // Points are written as such; tool and frame are in them, and the end stands at the end.
-            Action::Joint { .. } | Action::Linear { .. } | Action::Arc { .. } => {}
+            Action::Joint { .. } | Action::Linear { .. } | Action::Arc { .. } | Action::Probe { .. } => {}
             Action::UseTool(_) | Action::UseFrame(_) | Action::End => {}
         }
     }

@@ -231,6 +231,8 @@ impl Planner<'_> {
     fn divided(&mut self, chain: Chain, fault: &Fault) -> bool {
         let Some(height) = self.options.reconfigure else { return false };
         let before = (chain.first..fault.item).rev().find(|i| matches!(self.g.items[*i], Item::Move(_)));
+        // Nobody can come back to where a probe stopped.
+        let before = before.filter(|i| !matches!(&self.g.items[*i], Item::Move(m) if m.probe.is_some()));
         // Without a cut since the last change another one would be the same again.
         let cuts = (chain.first..fault.item).any(|i| matches!(&self.g.items[i], Item::Move(m) if !m.rapid));
         let Some(at) = before.filter(|at| cuts && *at > chain.first) else { return false };

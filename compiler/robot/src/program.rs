@@ -171,6 +171,19 @@ pub enum Action {
         /// At its end.
         zone: Zone,
     },
+    /// The tool point goes in a straight line until the probe's input has a state. Where it stops only the machine knows.
+    Probe {
+        /// Where it stops at the latest.
+        to: u32,
+        /// Of the tool point, mm/s.
+        speed: f64,
+        /// Name of the input.
+        input: String,
+        /// The state that ends the move; at its start the input has the other.
+        on: bool,
+        /// A move that comes to its end without it stops the program.
+        must: bool,
+    },
     /// From here on this tool (index into [`RobotProgram::tools`]) is the tool point.
     UseTool(u16),
     /// From here on targets are in this frame (index into [`RobotProgram::frames`]).

@@ -239,6 +239,7 @@ impl<'a> Maker<'a> {
                 Action::Linear { to, speed, zone, .. } => {
                     here = self.cut(&mut g, here, *to, None, *speed, *zone, (tool, frame));
                 }
+                Action::Probe { to, speed, .. } => here = self.cut(&mut g, here, *to, None, *speed, Zone::Stop, (tool, frame)),
                 Action::Arc { via, to, center, normal, angle, speed, zone } => {
                     let via = self.program.targets[*via as usize].position;
                     let arc = ArcPiece { center: *center, normal: *normal, via, angle: *angle };
@@ -292,6 +293,7 @@ impl<'a> Maker<'a> {
             rapid: false,
             free: false,
             ours: false,
+            probe: None,
             source: None,
         };
         let path = Path::new(g, &self.solver, &Frame { turn: g.turns[0], position: here.position }, &m);

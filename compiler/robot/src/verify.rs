@@ -187,7 +187,7 @@ impl Walk<'_> {
             Action::UseTool(t) => self.tool = self.program.tools[usize::from(*t)].frame,
             Action::UseFrame(f) => self.frame = self.program.frames[usize::from(*f)].frame,
             Action::Joint { to, .. } => self.point(*to, None, None, source),
-            Action::Linear { to, speed, .. } => self.point(*to, Some(*speed), None, source),
+            Action::Linear { to, speed, .. } | Action::Probe { to, speed, .. } => self.point(*to, Some(*speed), None, source),
             Action::Arc { via, to, angle, center, speed, .. } => {
                 let radius = gr_machine::math::norm(gr_machine::math::sub(self.program.targets[*to as usize].position, *center));
                 let half = radius * angle / 2.0;

@@ -440,3 +440,69 @@ fn a_turned_work_frame_turns_no_tool() {
         }
     }
 }
+
+/// The cell with a probe on an input.
+fn probing() -> Machine {
+    let text = include_str!("../../../docs/examples/irb2400-cell.toml").to_string() + "\n[io.G38]\nwait = \"diProbe\"\n";
+    gr_machine::parse(FileId(0), &text).unwrap_or_else(|e| panic!("{}", messages(&e, &text)))
+}
+
+#[test]
+fn probe_moves() {
+    let text = "G21 G90\nT1 M6\nG43 H1\nG0 X10 Y10 Z20\nG38.2 Z-5 F120\nG0 Z5\nG38.3 X40 F60\nG1 X20 Y20 F600\nG38.5 Z9\nM30\n";
+    insta::assert_snapshot!(told(&planned(text, &probing()).unwrap_or_else(|e| panic!("{}", messages(&e, text)))));
+    // Without a row, and as joint positions.
+    assert_eq!(faults(text, &cell()), "E0557 line 5: the machine file doesn't say which input the probe switches\n");
+    let texts = Texts::new([(FileId(0), text)]);
+    let found = plan(&motion(text), &probing(), &texts, &Options { own_words: true, ..Options::default() }).expect_err("no joint positions");
+    assert!(messages(&found, text).starts_with("E0523 line 5: a probe move in joint positions"), "{found:?}");
+}
+
+/// What depends on the place where a probe stopped is told at its line; what doesn't, is not.
+#[test]
+fn nothing_rests_on_where_a_probe_stopped() {
+    let head = "G21 G90\nT1 M6\nG43 H1\nG0 X10 Y10 Z20\nG1 Z15 F600\nG38.2 Z-5 F120\n";
+    let tail = "\nG0 X10 Y10 Z20\nM30\n";
+    for bad in [
+        "G0 X20", "G1 X20 F600", "G91 G0 Z5\nG90", "G91 G1 X5\nG90", "G2 X20 I5 F600", "G10 L20 P1 Z0", "G92 Z0", "G10 L20 P2 Z0", "#1=#5063", "#1=#5422", "#1=#<_z>",
+        "#1=#<_abs_z>", "G93 G1 Z5 F10\nG94", "G38.3 X20 F60", "G28.1", "G28", "G28 X5", "G10 L10 P1 Z0", "G5.2 X20 Y0 P1 L3\nX30 Y10\nX40 Y0\nG5.3", "G10 L2 P1 R10\nG1 Z5 X20 F600", "G81 X20 Z0 R5 F600",
+    ] {
+        let text = format!("{head}{bad}{tail}");
+        let found = planned(&text, &probing()).map(|p| told(&p)).map_err(|e| messages(&e, &text));
+        let told = found.expect_err(bad);
+        assert!(told.contains("E0533 line 7") || told.contains("E0533 line 8"), "{bad}: {told}");
+    }
+    for good in ["G0 Z5\nG1 X20", "G1 Z5 F600\nG2 X20 I5", "G38.3 Z-9 F60", "G1 X20 Y20 Z5 F600", "G53 G0 Z1000\nG0 Z5", "G28 Z5", "G10 L2 P2 X5", "G4 P1\nM8\nG0 Z-5", "#1=#5420", "G43 H1\nG0 Z5", "M3 S5000\nG0 Z5"] {
+        let text = format!("{head}{good}{tail}");
+        if let Err(e) = planned(&text, &probing()) {
+            let told = messages(&e, &text);
+            assert!(!told.contains("E0533"), "{good}: {told}");
+        }
+    }
+}
+
+/// A program that ends with a probe goes back from there before it lifts, and never down to its height of approach.
+#[test]
+fn the_way_home_after_a_probe() {
+    let lines = |last: &str| {
+        let text = format!("G21 G90\nT1 M6\nG43 H1\nG0 X10 Y10 Z90\n{last}\nM30\n");
+        let p = planned(&text, &probing()).unwrap_or_else(|e| panic!("{}", messages(&e, &text)));
+        let place = |s: &gr_robot::Step| match s.action {
+            Action::Linear { to, .. } if s.source.is_none() => Some(p.program.targets[to as usize].position.map(|v| (v * 1e6).round() / 1e6)),
+            _ => None,
+        };
+        p.program.steps.iter().filter_map(place).collect::<Vec<_>>()
+    };
+    assert_eq!(lines("G38.2 Z-5 F120"), [[10.0, 10.0, 90.0], [10.0, 10.0, 140.0]]);
+    assert_eq!(lines("G38.2 X30 F120"), [[10.0, 10.0, 90.0], [10.0, 10.0, 140.0]]);
+    assert_eq!(lines("G38.4 Z99 F120"), [[10.0, 10.0, 99.0], [10.0, 10.0, 149.0]]);
+}
+
+/// The rapid after a probe is a line, however rapids are made.
+#[test]
+fn away_from_a_probe_in_a_line() {
+    let text = "G21 G90\nT1 M6\nG43 H1\nG0 X10 Y10 Z20\nG64 P1\nG38.3 X40 F120\nG0 X39\nG38.3 X60\nG0 X30 Y60 Z40\nM30\n";
+    let p = planned(text, &probing()).unwrap_or_else(|e| panic!("{}", messages(&e, text)));
+    let after: Vec<_> = p.program.steps.iter().filter(|s| matches!(s.source.map(|s| s.line), Some(6 | 8))).map(|s| matches!(s.action, Action::Linear { rapid: true, .. })).collect();
+    assert_eq!(after, [true, true], "{}", told(&p));
+}

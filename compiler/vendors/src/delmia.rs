@@ -195,6 +195,7 @@ impl Body for Writer {
                 self.motion(cx, "CircularVia", via, &profile, zone);
                 self.motion(cx, "Circular", to, &profile, zone);
             }
+            Op::Probe { .. } => cx.no_probe(),
             Op::Tool(_) | Op::Frame(_) => self.angles = [0.0; 3],
             Op::Set { name, value, .. } => {
                 let value = match value {

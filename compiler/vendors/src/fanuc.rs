@@ -8,6 +8,7 @@
 use crate::name::{Names, Rule};
 use crate::number::{fix, num};
 use crate::parts::Parts;
+use crate::probe::{NOT_READY, NOT_TRIPPED};
 use crate::walk::{Arms, Body, Cx, Op, Traits, Value, any_error, walk, wrapped};
 use crate::{Language, Options, Output, OutputFile, orient};
 use gr_ir::Sources;
@@ -233,6 +234,7 @@ impl Body for Writer {
                 let speed = speed_term(cx, speed);
                 self.line(&format!("C P[{via}]    \r\n    :  P[{to}] {speed} {}   ", stop(zone)));
             }
+            Op::Probe { to, speed, input, on, must } => self.probe(cx, (to, speed), input, on, must),
             Op::Tool(i) => {
                 self.room(4);
                 self.line(&format!("  UTOOL_NUM={}", i + 1));
@@ -301,6 +303,33 @@ impl Writer {
         self.line("  UTOOL_NUM=1");
         let n = self.joint_point(cx, home);
         self.line(&format!("J P[{n}] 20% FINE   "));
+    }
+
+    /// Ends the program with a message unless the input has this state.
+    fn demand(&mut self, input: u32, on: bool, message: &str) {
+        self.label += 1;
+        let go = self.label;
+        self.line(&format!("  IF DI[{input}]={},JMP LBL[{go}]   ", if on { "ON" } else { "OFF" }));
+        self.line(&format!("  MESSAGE[{message}]"));
+        self.line("  ABORT");
+        self.line(&format!("  LBL[{go}]   "));
+    }
+
+    /// Where the skip leads is the next line in any case: what came of it is read from the input.
+    fn probe(&mut self, cx: &mut Cx, (to, speed): (&Target, f64), input: &str, on: bool, must: bool) {
+        self.room(16);
+        let input = cx.number(input, "G38");
+        self.demand(input, !on, NOT_READY);
+        self.label += 1;
+        let after = self.label;
+        self.line(&format!("  SKIP CONDITION DI[{input}]={}   ", if on { "ON" } else { "OFF" }));
+        let n = self.pose_point(cx, to);
+        let speed = speed_term(cx, speed);
+        self.line(&format!("L P[{n}] {speed} FINE Skip,LBL[{after}]   "));
+        self.line(&format!("  LBL[{after}]   "));
+        if must {
+            self.demand(input, on, NOT_TRIPPED);
+        }
     }
 
     fn wait(&mut self, cx: &mut Cx, name: &str, on: bool, timeout: Option<f64>) {

@@ -207,6 +207,7 @@ impl Body for Writer {
                 }
                 self.arc = true;
             }
+            Op::Probe { .. } => cx.no_probe(),
             Op::Tool(i) => {
                 self.room(12);
                 let tool = &cx.program.tools[i];

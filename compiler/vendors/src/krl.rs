@@ -7,6 +7,7 @@
 use crate::name::{Names, Rule};
 use crate::number::{num, real, single};
 use crate::parts::Parts;
+use crate::probe::{NOT_READY, NOT_TRIPPED};
 use crate::walk::{Arms, Body, Cx, Op, Traits, Value, any_error, walk, wrapped};
 use crate::{Language, Options, Output, OutputFile, orient};
 use gr_ir::Sources;
@@ -27,6 +28,9 @@ const RESERVED: &[&str] = &[
     "E6POS", "BAS", "SPTP", "SLIN", "SCIRC", "SPL", "SPLINE", "ENDSPLINE",
 ];
 
+/// Characters of a program's name: four less than the control allows, which its parts' names need.
+const NAME: usize = 20;
+
 /// Lines of a file: what reference post processors keep to on a KR C4.
 const LINES: u64 = 1400;
 
@@ -36,18 +40,21 @@ impl Language for Krl {
     }
 
     fn emit(&self, program: &RobotProgram, sources: &dyn Sources, options: &Options) -> Output {
-        let mut names = Names::new(Rule { longest: 20, reserved: RESERVED, upper: false });
+        let mut names = Names::new(Rule { longest: NAME, reserved: RESERVED, upper: false });
         let name = names.give(&program.name, "p");
+        names.longer(NAME + 4);
         let limits = &program.machine.cell.controller;
         let most = limits.lines.unwrap_or(LINES);
         let mut w = Writer {
             most,
-            parts: Parts::new(most.saturating_sub(4), limits.points, limits.bytes, "\r\n"),
+            parts: Parts::new(most.saturating_sub(if probes(program) { 5 } else { 4 }), limits.points, limits.bytes, "\r\n"),
             home: String::new(),
             angles: [0.0; 3],
             set: [String::new(), String::new(), String::new()],
             first: String::new(),
+            probe: None,
         };
+        w.probe = probes(program).then(|| [names.fresh(&format!("{name}_prb")), names.fresh(&format!("{name}_hit"))]);
         let mut out = walk(program, sources, options, &TRAITS, &mut w);
         if !any_error(&out.findings) {
             names.tell(&mut out, TRAITS.title);
@@ -67,17 +74,40 @@ struct Writer {
     set: [String; 3],
     /// Axis speed of the first joint move: the way to the home position before it is no faster.
     first: String,
+    /// Names of the programs that probe and that are called when the probe switches, where the program probes.
+    probe: Option<[String; 2]>,
+}
+
+/// Where a probe is sent.
+const GOAL: &str = "DECL FRAME GOAL\r\n";
+/// Number, and so priority, of the interrupt of the probe.
+const INTERRUPT: u32 = 20;
+
+fn probes(program: &RobotProgram) -> bool {
+    program.steps.iter().any(|s| matches!(s.action, gr_robot::Action::Probe { .. }))
+}
+
+/// The program that moves while the probe is looked at, and the one that the control calls when it switches. `RESUME` leaves
+/// both, and goes on behind the call. `WAIT SEC 0` keeps the advance run from leaving before the move is done.
+fn searching([probe, hit]: &[String; 2], head: &str) -> Vec<OutputFile> {
+    let n = INTERRUPT;
+    let programs = [
+        (probe, format!("{head}DEF {probe}(GOAL:IN)\r\n{GOAL}INTERRUPT ON {n}\r\nLIN GOAL\r\nWAIT SEC 0\r\nINTERRUPT OFF {n}\r\nEND\r\n")),
+        (hit, format!("{head}DEF {hit}()\r\nINTERRUPT OFF {n}\r\nBRAKE F\r\nRESUME\r\nEND\r\n")),
+    ];
+    programs.into_iter().map(|(name, text)| OutputFile::new(format!("{name}.src"), text)).collect()
 }
 
 impl Writer {
     fn files(self, name: &str) -> Vec<OutputFile> {
-        let mut files = Vec::new();
         let head = "&ACCESS RVP\r\n&REL 1\r\n";
+        let mut files = self.probe.as_ref().map_or(Vec::new(), |names| searching(names, head));
+        let goal = if self.probe.is_some() { GOAL } else { "" };
         // INITMOV puts speeds and accelerations of the axes to what the control was set up with, 100 % mostly.
         let speed = if self.first.is_empty() { axis_speed(SLOW) } else { self.first.clone() };
         let start = format!("BAS(#INITMOV,0)\r\n$ADVANCE=3\r\n$ORI_TYPE=#VAR\r\n$CIRC_TYPE=#PATH\r\n{speed}\r\nPTP XHOME\r\n");
         let parts = self.parts.finish();
-        let mut main = format!("{head}DEF {name}()\r\n{start}");
+        let mut main = format!("{head}DEF {name}()\r\n{goal}{start}");
         let lines = |text: &str| text.matches('\n').count() as u64;
         if let [one] = parts.as_slice()
             && lines(&main) + lines(one) < self.most
@@ -87,7 +117,7 @@ impl Writer {
             for (i, part) in parts.iter().enumerate() {
                 let inner = format!("{name}_{:03}", i + 1);
                 main += &format!("{inner}()\r\n");
-                files.push(OutputFile::new(format!("{inner}.src"), format!("{head}DEF {inner}()\r\n{part}END\r\n")));
+                files.push(OutputFile::new(format!("{inner}.src"), format!("{head}DEF {inner}()\r\n{goal}{part}END\r\n")));
             }
         }
         main += "END\r\n";
@@ -175,6 +205,10 @@ impl Writer {
     }
 }
 
+fn truth(on: bool) -> &'static str {
+    if on { "TRUE" } else { "FALSE" }
+}
+
 /// Per cent of the axis speed to the home position where no joint move says one.
 const SLOW: f64 = 10.0;
 
@@ -213,6 +247,7 @@ impl Body for Writer {
                 self.parts.points(2);
                 self.end(cx, format!("CIRC {{{via}}},{{{to}}}{blend}"));
             }
+            Op::Probe { to, speed, input, on, must } => self.probe(cx, (to, speed), input, on, must),
             Op::Tool(i) => {
                 let tool = &cx.program.tools[i];
                 let note = cx.ascii(&tool.name);
@@ -257,6 +292,30 @@ impl Body for Writer {
 }
 
 impl Writer {
+    /// Goes no further where the input has this state. The line that the program stands at says why.
+    fn forbid(&mut self, input: u32, on: bool, message: &str) {
+        self.parts.line(&format!("IF $IN[{input}]=={} THEN", truth(on)));
+        self.parts.line("LOOP");
+        self.parts.line(&format!("HALT ; {message}"));
+        self.parts.line("ENDLOOP");
+        self.parts.line("ENDIF");
+    }
+
+    fn probe(&mut self, cx: &mut Cx, (to, speed): (&Target, f64), input: &str, on: bool, must: bool) {
+        let Some([probe, hit]) = self.probe.clone() else { return };
+        let input = cx.number(input, "G38");
+        self.path(speed, None);
+        self.forbid(input, on, NOT_READY);
+        self.parts.line(&format!("INTERRUPT DECL {INTERRUPT} WHEN $IN[{input}]=={} DO {hit}()", truth(on)));
+        let goal = self.pose(&to.position, &turn_of(to.quaternion), cx.decimals());
+        self.parts.points(1);
+        self.parts.line(&format!("GOAL={{{goal}}}"));
+        self.end(cx, format!("{probe}(GOAL)"));
+        if must {
+            self.forbid(input, !on, NOT_TRIPPED);
+        }
+    }
+
     fn wait(&mut self, cx: &mut Cx, name: &str, on: bool, timeout: Option<f64>) {
         let input = format!("$IN[{}]", cx.number(name, "wait"));
         let (wanted, other) = if on { ("TRUE", "FALSE") } else { ("FALSE", "TRUE") };

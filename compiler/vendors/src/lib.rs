@@ -7,6 +7,7 @@
 //! | `orient` | how makers write a turn, as mathematics |
 //! | `posture` | how an arm stands, by geometry |
 //! | `name`, `number` | names and numbers as text |
+//! | `probe` | what the operator reads at a probe move |
 //! | `marks` | which step of the program a line is written for |
 //! | `parts` | programs cut to what a controller takes |
 //! | one file per language | its text |
@@ -27,6 +28,7 @@ mod parts;
 mod pdl2;
 mod plain;
 mod posture;
+mod probe;
 mod rapid;
 pub mod read;
 mod spel;

@@ -94,6 +94,7 @@ impl Body for Writer {
                 self.motion(cx, "C1", &via, speed, zone);
                 self.motion(cx, "C2", &to, speed, zone);
             }
+            Op::Probe { .. } => cx.no_probe(),
             Op::Tool(i) => {
                 let p = cx.program.tools[i].frame.position.map(|v| num(v, 3));
                 let args = [format!("tool {}", i + 1), format!("X {} Y {} Z {}", p[0], p[1], p[2])];

@@ -60,6 +60,11 @@ impl Names {
         self.fresh(&format!("{start}{}{number:03}", digest(program)))
     }
 
+    /// From here on names may be so long.
+    pub(crate) fn longer(&mut self, longest: usize) {
+        self.rule.longest = longest;
+    }
+
     /// A name for something of our own.
     pub(crate) fn fresh(&mut self, wanted: &str) -> String {
         self.find(wanted, "x")

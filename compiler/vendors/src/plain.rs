@@ -58,6 +58,7 @@ impl<W: Plain> Body for W {
             Op::Joint { to, share, .. } => self.joint(cx, to, share),
             Op::Linear { to, speed, zone } => self.linear(cx, to, speed, zone),
             Op::Arc { via, to, speed, zone } => self.arc(cx, via, to, speed, zone),
+            Op::Probe { .. } => cx.no_probe(),
             Op::Tool(i) => {
                 let frame = cx.program.tools[i].frame;
                 self.tool(cx, i, &frame);

@@ -7,11 +7,13 @@
 use crate::name::{Names, Rule};
 use crate::number::{down, num, short, single};
 use crate::parts::Parts;
+use crate::probe::{NOT_READY, NOT_TRIPPED};
 use crate::walk::{Arms, Body, Cx, Op, Traits, Value, any_error, walk, wrapped};
 use crate::{Language, Options, Output, OutputFile};
 use gr_ir::Sources;
 use gr_machine::math::{Frame, quaternion_of};
 use gr_robot::{RobotProgram, Target};
+use gr_text::code;
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
@@ -55,6 +57,7 @@ impl Language for Rapid {
             speeds: BTreeMap::new(),
             zones: BTreeMap::new(),
             turn: (([0.0; 4]), String::new()),
+            probe: String::new(),
         };
         let mut out = walk(program, sources, options, &TRAITS, &mut w);
         if !any_error(&out.findings) {
@@ -79,6 +82,33 @@ struct Writer {
     zones: BTreeMap<String, String>,
     /// The last quaternion and its text.
     turn: ([f64; 4], String),
+    /// Name of the routine that probes; empty = the program doesn't probe.
+    probe: String,
+}
+
+/// Faster than this a stiff stop bends the path (*RAPID Instructions*, SearchL).
+const SEARCH: f64 = 100.0;
+
+/// The routine that probes: `SearchL` with a stiff stop at the first edge of the input. The place found is in a variable.
+fn search(name: &str, found: &str) -> String {
+    let lines = [
+        &format!("  PROC {name}(VAR signaldi input,num before,bool must,robtarget goal,speeddata speed,PERS tooldata tool,PERS wobjdata frame)"),
+        "    IF DInput(input)<>before THEN",
+        &format!("      TPWrite \"{NOT_READY}\";"),
+        "      EXIT;",
+        "    ENDIF",
+        &format!("    SearchL\\Stop,input\\Flanks,{found},goal,speed,tool\\WObj:=frame;"),
+        "  ERROR",
+        "    IF ERRNO=ERR_WHLSEARCH THEN",
+        "      IF must THEN",
+        &format!("        TPWrite \"{NOT_TRIPPED}\";"),
+        "        EXIT;",
+        "      ENDIF",
+        "      TRYNEXT;",
+        "    ENDIF",
+        "  ENDPROC",
+    ];
+    lines.map(|l| format!("{l}\r\n")).concat()
 }
 
 impl Writer {
@@ -110,6 +140,13 @@ impl Writer {
             let _ = write!(head, "  CONST zonedata {name}:={value};\r\n");
         }
         let mut names = self.names;
+        let mut tail = "  ENDPROC\r\n".to_string();
+        if !self.probe.is_empty() {
+            let found = names.fresh("pFound");
+            let _ = write!(head, "  VAR robtarget {found};\r\n");
+            tail += &search(&self.probe, &found);
+        }
+        tail += "ENDMODULE\r\n";
         let parts = self.parts.finish();
         let start = "    ConfJ\\On;\r\n    ConfL\\Off;\r\n    SingArea\\Wrist;\r\n";
         let mut files = Vec::new();
@@ -117,7 +154,7 @@ impl Writer {
         head += &format!("  PROC main()\r\n{start}");
         let lines = |text: &str| text.matches('\n').count() as u64;
         if let [one] = parts.as_slice()
-            && lines(&head) + lines(one) + 2 <= self.most
+            && lines(&head) + lines(one) + lines(&tail) <= self.most
         {
             head += one;
         } else {
@@ -130,7 +167,7 @@ impl Writer {
                 files.push(OutputFile::new(format!("{inner}.mod"), text));
             }
         }
-        head += "  ENDPROC\r\nENDMODULE\r\n";
+        head += &tail;
         files.push(OutputFile::new(format!("{module}.mod"), head));
         let modules: String = list.iter().map(|m| format!("\t<Module>{m}</Module>\r\n")).collect();
         let index = format!("<?xml version=\"1.0\" encoding=\"ISO-8859-1\" ?>\r\n<Program>\r\n{modules}</Program>\r\n");
@@ -248,6 +285,7 @@ impl Body for Writer {
                 let (speed, zone) = (self.speed(speed, 500.0, "F"), self.zone(zone));
                 self.motion(cx, "MoveC", &[via, to], &speed, &zone);
             }
+            Op::Probe { to, speed, input, on, must } => self.probe(cx, (to, speed), input, on, must),
             // Tool and frame are arguments of every move.
             Op::Tool(_) | Op::Frame(_) | Op::End => {}
             Op::Set { name, value, word } => {
@@ -288,6 +326,28 @@ impl Body for Writer {
 }
 
 impl Writer {
+    fn probe(&mut self, cx: &mut Cx, (to, speed): (&Target, f64), input: &str, on: bool, must: bool) {
+        let input = cx.known(input, "G38");
+        if speed > SEARCH {
+            cx.say(code::VENDOR_FEED_RANGE, &[num(speed, 4), format!("at most {SEARCH} mm/s for a probe"), TRAITS.title.into()]);
+        }
+        if self.probe.is_empty() {
+            self.probe = self.names.fresh("Probe");
+        }
+        let speed = self.speed(speed, 500.0, "F");
+        let must = if must { "TRUE" } else { "FALSE" };
+        let _ = write!(self.parts.text, "    {} {input},{},{must},", self.probe, u8::from(!on));
+        self.target(cx, to);
+        self.parts.points(1);
+        let tool = self.tools.get(cx.tool).map_or("tool0", String::as_str);
+        let frame = self.frames.get(cx.frame).map_or("wobj0", String::as_str);
+        let _ = write!(self.parts.text, ",{speed},{tool},{frame};");
+        if let Some(line) = cx.remark {
+            let _ = write!(self.parts.text, " ! {line}");
+        }
+        self.parts.end_line();
+    }
+
     fn home(&mut self, cx: &Cx, t: &Target, share: f64) {
         let speed = self.joint_speed(cx, share);
         let mut text = format!("    MoveAbsJ [{},", list(&cx.degrees(t), 5));

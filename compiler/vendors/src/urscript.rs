@@ -6,6 +6,7 @@
 
 use crate::name::{Names, Rule};
 use crate::number::{num, single};
+use crate::probe::{NOT_READY, NOT_TRIPPED};
 use crate::walk::{Arms, Body, Cx, Op, Traits, Value, any_error, walk, wrapped};
 use crate::{Language, Options, Output, OutputFile, orient};
 use gr_ir::Sources;
@@ -21,7 +22,7 @@ static TRAITS: Traits =
 
 const RESERVED: &[&str] = &[
     "AND", "BREAK", "CONTINUE", "DEF", "ELIF", "ELSE", "END", "FALSE", "FOR", "GLOBAL", "HALT", "IF", "IN", "LOCAL", "NOT", "OR", "PASS",
-    "RETURN", "SEC", "THREAD", "TRUE", "WHILE", "XOR", "MOVEJ", "MOVEL", "MOVEP", "MOVEC", "SLEEP", "SYNC", "TEXTMSG", "POPUP", "LATE",
+    "RETURN", "SEC", "THREAD", "TRUE", "WHILE", "XOR", "MOVEJ", "MOVEL", "MOVEP", "MOVEC", "SLEEP", "SYNC", "TEXTMSG", "POPUP", "LATE", "KILL", "RUN", "JOIN",
 ];
 
 /// Reports of scripts of this size that did not run: visose/Robots #55.
@@ -55,6 +56,7 @@ struct Writer {
     /// Bytes of marks in `text`.
     marks: usize,
     waits: u32,
+    probes: u32,
     /// Lines, points and bytes of one script at most.
     most: (u64, u64, u64),
     /// Scripts before the one in work.
@@ -69,6 +71,8 @@ struct Writer {
 
 /// Lines around a part: definition, guard, tool, call.
 const AROUND: u64 = 8;
+/// Lines of a probe move.
+const PROBE: u64 = 26;
 /// Lines kept for what may come after a move without stopping it, and for one statement.
 const ROOM: u64 = 10;
 
@@ -84,6 +88,7 @@ impl Writer {
             all: 0,
             marks: 0,
             waits: 0,
+            probes: 0,
             most,
             done: Vec::new(),
             blended: false,
@@ -206,6 +211,7 @@ impl Body for Writer {
                 let (via, to) = (point(cx, via), point(cx, to));
                 self.line(cx, &format!("movec({via},{to},a=1.2,v={},r=0,mode=0)", single(speed / 1000.0)));
             }
+            Op::Probe { to, speed, input, on, must } => self.probe(cx, (to, speed), input, on, must),
             Op::Tool(i) => {
                 let tool = &cx.program.tools[i];
                 let mut words = vec![format!("set_tcp({})", pose(&tool.frame, 7))];
@@ -259,6 +265,53 @@ impl Body for Writer {
 }
 
 impl Writer {
+    /// Ends the program with a message where this is so.
+    fn forbid(&mut self, cx: &Cx, condition: &str, message: &str) {
+        self.line(cx, &format!("if {condition}:"));
+        self.line(cx, &format!("  popup(\"{message}\",\"program stop\",False,True,blocking=True)"));
+        self.line(cx, "  halt");
+        self.line(cx, "end");
+    }
+
+    /// A thread moves while the program looks at the input, as PolyScope writes a move with *until*.
+    fn probe(&mut self, cx: &mut Cx, (to, speed): (&Target, f64), input: &str, on: bool, must: bool) {
+        self.part(PROBE);
+        let remark = cx.remark.take();
+        let input = format!("get_standard_digital_in({})", cx.number(input, "G38"));
+        let (ends, open) = if on { (input.clone(), format!("not {input}")) } else { (format!("not {input}"), input) };
+        self.probes += 1;
+        let n = self.probes;
+        self.forbid(cx, &ends, NOT_READY);
+        let goal = point(cx, to);
+        let lines = [
+            format!("global probed_{n} = 0"),
+            format!("thread probe_{n}():"),
+            "  enter_critical".into(),
+            format!("  movel({goal},a=1.2,v={},t=0,r=0){}", single(speed / 1000.0), remark.map_or(String::new(), |l| format!("  # {l}"))),
+            format!("  probed_{n} = 1"),
+            "  exit_critical".into(),
+            "end".into(),
+            format!("probing_{n} = run probe_{n}()"),
+            format!("while probed_{n} == 0 and {open}:"),
+            "  sync()".into(),
+            "end".into(),
+            format!("if probed_{n} == 0:"),
+            format!("  kill probing_{n}"),
+            "  stopl(1.2)".into(),
+            "else:".into(),
+            format!("  join probing_{n}"),
+            "end".into(),
+        ];
+        lines.iter().for_each(|l| self.line(cx, l));
+        if must {
+            self.forbid(cx, &open, NOT_TRIPPED);
+        }
+        (self.points, self.all) = (self.points + 1, self.all + 1);
+        // Nobody knows where it stands: no script ends here.
+        self.last.clear();
+        self.blended = false;
+    }
+
     fn wait(&mut self, cx: &mut Cx, name: &str, on: bool, timeout: Option<f64>) {
         let n = cx.number(name, "wait");
         let input = format!("get_standard_digital_in({n})");

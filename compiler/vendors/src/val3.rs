@@ -267,6 +267,7 @@ impl Body for Writer {
                 self.line(cx, &format!("movec(points[{via}],points[{to}],{tool},speeds[{speed}])"));
                 self.moving = true;
             }
+            Op::Probe { .. } => cx.no_probe(),
             Op::Tool(_) | Op::Frame(_) => self.angles = [0.0; 3],
             Op::Set { name, value, .. } => {
                 self.arrive(cx);

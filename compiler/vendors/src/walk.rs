@@ -25,6 +25,8 @@ pub(crate) enum Op<'p> {
     Linear { to: &'p Target, speed: f64, zone: Option<f64> },
     /// An arc through a point.
     Arc { via: &'p Target, to: &'p Target, speed: f64, zone: Option<f64> },
+    /// A straight line until an input has a state; `must`: the program stops where it never has.
+    Probe { to: &'p Target, speed: f64, input: &'p str, on: bool, must: bool },
     /// The tool point changes.
     Tool(usize),
     /// The work frame changes.
@@ -200,7 +202,7 @@ impl<'p> Cx<'p> {
             last = line.or(last);
             self.remark = None;
             if new && let Some((file, line)) = line {
-                let motion = matches!(step.action, Action::Joint { .. } | Action::Linear { .. } | Action::Arc { .. });
+                let motion = matches!(step.action, Action::Joint { .. } | Action::Linear { .. } | Action::Arc { .. } | Action::Probe { .. });
                 if motion && self.traits.trailing {
                     self.remark = Some(line + 1);
                 } else if !matches!(step.action, Action::End | Action::Comment(_)) {
@@ -232,6 +234,16 @@ impl<'p> Cx<'p> {
                 let Some(to) = self.target(*to) else { return };
                 self.look_ahead(index, to);
                 self.line(body, to, *speed, radius(*zone));
+            }
+            Action::Probe { to, speed, input, on, must } => {
+                let Some(to) = self.target(*to) else { return };
+                self.length = self.before.map_or(0.0, |b| norm(sub(to.position, b.position)));
+                if speed.is_finite() && *speed > 0.0 {
+                    body.op(self, Op::Probe { to, speed: *speed, input, on: *on, must: *must });
+                } else {
+                    self.say(code::VENDOR_FEED_RANGE, &[num(*speed, 6), "more than 0".into(), self.traits.title.into()]);
+                }
+                (self.before, self.moved) = (Some(*to), true);
             }
             Action::Arc { via, to, center, normal, angle, speed, zone } => {
                 let (Some(via), Some(to)) = (self.target(*via), self.target(*to)) else { return };
@@ -468,6 +480,11 @@ impl<'p> Cx<'p> {
     /// What the language can't say.
     pub fn cannot(&mut self, what: &str) {
         self.say(code::VENDOR_CANNOT, &[what.into(), self.traits.title.into()]);
+    }
+
+    /// The language has no probe move whose form is sure.
+    pub fn no_probe(&mut self) {
+        self.cannot("a probe move (G38)");
     }
 
     /// The configuration can't be written.

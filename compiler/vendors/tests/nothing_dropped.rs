@@ -63,6 +63,8 @@ signal = "DO[21]"
 signal = "AO[2]"
 [io.M66P2]
 signal = "DI[2]"
+[io.G38]
+wait = "DI[9]"
 [io.M101]
 routine = "USER101"
 "#;

@@ -114,6 +114,13 @@ impl Compare<'_> {
                 }
                 other => Err(format!("{other:?} for a line")),
             },
+            Action::Probe { to, speed, input, on, must } => match self.next()? {
+                Event::Probe(place, v, i, o, m) if (o, m) == (*on, *must) && input.ends_with(&i) => {
+                    self.speed(v, *speed)?;
+                    self.arrives(&place, &self.program.targets[*to as usize])
+                }
+                other => Err(format!("{other:?} for a probe move")),
+            },
             Action::Arc { via, to, center, normal, angle, speed, zone } => {
                 let (via, to) = (self.program.targets[*via as usize], self.program.targets[*to as usize]);
                 let from = from.ok_or("an arc from nowhere")?;
@@ -266,7 +273,7 @@ fn compare(target: &str, program: &RobotProgram) -> Check {
     let mut from = Some(program.home);
     for (i, step) in program.steps.iter().enumerate() {
         c.step(&step.action, from).map_err(|e| format!("step {i} {:?}: {e}", step.action))?;
-        if let Action::Joint { to, .. } | Action::Linear { to, .. } | Action::Arc { to, .. } = &step.action {
+        if let Action::Joint { to, .. } | Action::Linear { to, .. } | Action::Arc { to, .. } | Action::Probe { to, .. } = &step.action {
             from = Some(program.targets[*to as usize]);
         }
         // Targets stand in their frame.
@@ -321,6 +328,8 @@ fn moves() -> impl Strategy<Value = Vec<Move>> {
         .prop_map(|(to_center, normal, radius, angle, speed, zone)| Move::Arc { to_center, normal, radius, angle, speed, zone });
     let helix = (2.0f64..10.0, 30.0f64..180.0, 0.5f64..4.0, speed).prop_map(|(radius, angle, rise, speed)| Move::Helix { radius, angle, rise, speed });
     let joint = (prop::array::uniform6(-12.0f64..12.0), 0.05f64..1.0).prop_map(|(by, share)| Move::Joint { by, share });
+    let probe = (prop::array::uniform3(-30.0f64..30.0), 2.0f64..50.0, any::<bool>(), any::<bool>())
+        .prop_map(|(shift, speed, on, must)| Move::Probe { shift, speed, on, must });
     let other = prop_oneof![
         Just(Move::Other(Action::Signal { word: "M3".into(), value: None, signal: signal("DO[5]") })),
         Just(Move::Other(Action::Signal {
@@ -333,7 +342,7 @@ fn moves() -> impl Strategy<Value = Vec<Move>> {
         Just(Move::Other(Action::Message("tool \"mill\"".into()))),
     ];
     let one = prop_oneof![
-        6 => line, 4 => arc, 1 => helix, 3 => joint, 1 => (0u16..2).prop_map(Move::Frame), 1 => (0u16..2).prop_map(Move::Tool), 2 => other
+        6 => line, 1 => probe, 4 => arc, 1 => helix, 3 => joint, 1 => (0u16..2).prop_map(Move::Frame), 1 => (0u16..2).prop_map(Move::Tool), 2 => other
     ];
     prop::collection::vec(one, 1..40)
 }
@@ -349,6 +358,13 @@ fn program(target: &str, robot: usize, moves: &[Move], lines: Option<u64>) -> Ro
         let mut m = m.clone();
         if let (Move::Other(Action::Signal { signal, .. }), "rapid") = (&mut m, target) {
             signal.signal = Some("doSpindle".into());
+        }
+        if let Move::Probe { shift, speed, .. } = m {
+            // Two probes after each other, the second of which asks whether the first has found something, read as one that must.
+            let twice = matches!(b.program.steps.last(), Some(s) if matches!(s.action, Action::Probe { .. }));
+            if twice || !matches!(target, "rapid" | "krl" | "fanuc-ls" | "urscript") {
+                m = Move::Line { shift, turn: [0.0; 3], speed, zone: None };
+            }
         }
         b.add(&m);
     }

@@ -11,6 +11,10 @@ struct Controller {
     frames: BTreeMap<u32, Frame>,
     tools: BTreeMap<u32, Frame>,
     used: (u32, u32),
+    /// Input and state of the skip condition.
+    skip: Option<(String, bool)>,
+    /// The last skipping move's input, and the label behind it.
+    probed: Option<(String, String)>,
 }
 
 /// Reads `.LS` files; the last one is the main program.
@@ -77,6 +81,27 @@ fn step(
     let point = |n: usize, c: &Controller| place(points.get(&(numbers(fields.get(n)?)[0] as u32))?, c);
     match word {
         _ if line.starts_with('!') || line.starts_with("MESSAGE[") || line == "PAUSE" => {}
+        "SKIP" => c.skip = Some((signal(rest), rest.ends_with("=ON"))),
+        "ABORT" => {}
+        "IF" => {
+            let (condition, label) = rest.split_once(",JMP ")?;
+            // Asked behind a probe move it is whether the program may go on.
+            if let Some((input, _)) = c.probed.take().filter(|(i, _)| *i == signal(condition))
+                && let Some(Event::Probe(_, _, name, on, must)) = s.events.last_mut()
+                && *name == input
+                && *on == condition.ends_with("=ON")
+            {
+                *must = true;
+            }
+            *skip_to = Some(label.trim().to_string());
+        }
+        "L" if fields.last()?.starts_with("Skip,") => {
+            s.speed = speed(fields.get(2)?)?;
+            let (input, on) = c.skip.clone()?;
+            let label = fields.last()?.strip_prefix("Skip,")?.to_string();
+            c.probed = Some((input.clone(), label));
+            s.events.push(Event::Probe(point(1, c)?, s.speed, input, on, false));
+        }
         "J" => s.events.push(Event::Joint(point(1, c)?)),
         "L" | "C" => {
             let n = if word == "C" { 3 } else { 2 };
@@ -106,7 +131,8 @@ fn step(
 
 fn assign(line: &str, s: &mut State, c: &mut Controller) -> Option<()> {
     if line.starts_with("LBL[") {
-        return Some(());
+        // The skip leads to the very next line.
+        return c.probed.as_ref().is_none_or(|p| p.1 == line).then_some(());
     }
     let (left, right) = line.split_once('=')?;
     let index = || numbers(left);

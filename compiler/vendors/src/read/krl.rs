@@ -27,7 +27,31 @@ fn axes(text: &str) -> Option<Vec<f64>> {
     (1..=6).map(|i| field(text, &format!("A{i}"))).collect()
 }
 
+/// Input and state of an interrupt, and where a probe is sent.
+#[derive(Default)]
+struct Search {
+    input: String,
+    on: bool,
+    goal: Option<Frame>,
+    /// The statement before was the probe's move.
+    made: bool,
+}
+
+/// Whether a program moves to its argument while an interrupt looks at an input.
+fn searches(text: &str) -> bool {
+    let lines: Vec<&str> = text.lines().map(str::trim).collect();
+    let at = |line: &str| lines.iter().position(|l| *l == line);
+    let wanted = ["INTERRUPT ON 20", "LIN GOAL", "WAIT SEC 0", "INTERRUPT OFF 20"].map(at);
+    text.contains("(GOAL:IN)") && wanted[0].is_some() && wanted.is_sorted() && !wanted.contains(&None)
+}
+
+/// Whether a program stops the arm and leaves what it was called from.
+fn hits(text: &str) -> bool {
+    text.contains("BRAKE") && text.contains("RESUME")
+}
+
 fn run(files: &[File], text: &str, home: &str, s: &mut State, depth: u32) -> Result<(), Fault> {
+    let mut search = Search::default();
     let mut skip = false;
     for raw in text.lines() {
         let line = raw.split(';').next().unwrap_or("").trim();
@@ -37,7 +61,7 @@ fn run(files: &[File], text: &str, home: &str, s: &mut State, depth: u32) -> Res
             continue;
         }
         let zone = line.ends_with("C_DIS").then_some(s.distance);
-        if line.is_empty() || line.starts_with('&') || line.starts_with("DEF ") || line == "END" || line == "HALT" {
+        if line.is_empty() || line.starts_with('&') || line.starts_with("DEF ") || line.starts_with("DECL ") || line == "END" || line == "HALT" {
         } else if line == "PTP XHOME" {
             s.joint(axes(home).ok_or_else(fault)?);
         } else if let Some(t) = line.strip_prefix("PTP ") {
@@ -75,7 +99,28 @@ fn run(files: &[File], text: &str, home: &str, s: &mut State, depth: u32) -> Res
             s.events.push(Event::Wait(signal(line), line.contains("TRUE")));
         } else if let Some(t) = line.strip_prefix("WAIT SEC ") {
             s.events.push(Event::Dwell(t.parse().map_err(|_| fault())?));
+        } else if let Some(t) = line.strip_prefix("INTERRUPT DECL 20 WHEN ") {
+            let (condition, call) = t.split_once(" DO ").ok_or_else(fault)?;
+            let file = super::named(files, &format!("{}.src", call.trim_end_matches("()"))).ok_or_else(fault)?;
+            if !hits(&file.1) {
+                return Err(fault());
+            }
+            (search.input, search.on) = (signal(condition), condition.contains("TRUE"));
+        } else if line.starts_with("GOAL={") {
+            search.goal = Some(pose(line).ok_or_else(fault)?);
+        } else if let Some(name) = line.strip_suffix("(GOAL)") {
+            let file = super::named(files, &format!("{name}.src")).ok_or_else(fault)?;
+            if !searches(&file.1) {
+                return Err(fault());
+            }
+            let place = s.place(search.goal.take().ok_or_else(fault)?, Configuration::Same);
+            s.events.push(Event::Probe(place, s.speed, search.input.clone(), search.on, false));
+            search.made = true;
+            continue;
         } else if line.starts_with("IF ") {
+            if let (true, Some(Event::Probe(.., must))) = (search.made && signal(line) == search.input, s.events.last_mut()) {
+                *must = line.contains("TRUE") != search.on;
+            }
             skip = true;
         } else if line.starts_with("BAS(") || line.starts_with('$') {
         } else if let Some((name, rest)) = line.split_once('(') {
@@ -86,6 +131,7 @@ fn run(files: &[File], text: &str, home: &str, s: &mut State, depth: u32) -> Res
         } else {
             return Err(fault());
         }
+        search.made = false;
     }
     Ok(())
 }

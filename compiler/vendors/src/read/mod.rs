@@ -67,6 +67,8 @@ pub enum Event {
     Linear(Place, f64, Option<f64>),
     /// An arc through the first place to the second.
     Arc(Place, Place, f64, Option<f64>),
+    /// A straight line that ends where an input has a state; with the last, the program stops where it never has.
+    Probe(Place, f64, String, bool, bool),
     /// An output takes a value.
     Set(String, f64),
     /// A routine is called, with a number.

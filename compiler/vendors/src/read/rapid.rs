@@ -10,12 +10,17 @@ struct Module {
     zones: BTreeMap<String, f64>,
     /// Lines of each routine.
     routines: BTreeMap<String, Vec<String>>,
+    /// The routine that searches with what it is given.
+    search: Option<String>,
 }
+
+/// A search whose data are arguments: to an edge of the input, with a stiff stop; between them the place it finds.
+const SEARCH: [&str; 2] = ["SearchL\\Stop,input\\Flanks,", ",goal,speed,tool\\WObj:=frame;"];
 
 /// Reads the modules of a program; it starts in `main`.
 pub fn read(files: &[File]) -> Result<Vec<Event>, Fault> {
     let index = super::main_file(files, ".pgf")?;
-    let mut all = Module { frames: BTreeMap::new(), speeds: BTreeMap::new(), zones: BTreeMap::new(), routines: BTreeMap::new() };
+    let mut all = Module { frames: BTreeMap::new(), speeds: BTreeMap::new(), zones: BTreeMap::new(), routines: BTreeMap::new(), search: None };
     for part in index.1.split("<Module>").skip(1) {
         let name = part.split("</Module>").next().unwrap_or("").trim();
         let file = super::named(files, name).ok_or_else(|| format!("{name} is missing"))?;
@@ -36,6 +41,8 @@ fn declare(all: &mut Module, text: &str) -> Result<(), Fault> {
             routine = Some(name);
         } else if line == "ENDPROC" {
             routine = None;
+        } else if line.starts_with(SEARCH[0]) && line.ends_with(SEARCH[1]) {
+            all.search.clone_from(&routine);
         } else if let Some(name) = &routine {
             if let Some(lines) = all.routines.get_mut(name).filter(|_| !line.is_empty()) {
                 lines.push(line.to_string());
@@ -124,6 +131,15 @@ fn run(all: &Module, routine: &str, events: &mut Vec<Event>, depth: u32) -> Resu
             }
             "WaitTime\\InPos,0" => events.push(Event::Dwell(0.0)),
             w if w.starts_with("WaitTime\\InPos,") => events.push(Event::Dwell(numbers(between(line, ",", ";").ok_or_else(fault)?)[0])),
+            name if all.search.as_deref() == Some(name) => {
+                let fields: Vec<&str> = rest.splitn(4, ',').collect();
+                let [input, before, must, rest] = fields.as_slice() else { return Err(fault()) };
+                let (goal, rest) = target(rest).ok_or_else(fault)?;
+                let [speed, tool, frame] = *rest.trim_start_matches(',').split(',').collect::<Vec<_>>() else { return Err(fault()) };
+                let place = place(all, goal, tool, frame).ok_or_else(fault)?;
+                let speed = *all.speeds.get(speed).ok_or_else(fault)?;
+                events.push(Event::Probe(place, speed, input.to_string(), *before == "0", *must == "TRUE"));
+            }
             "TPWrite" | "Stop" | "ConfJ\\On" | "ConfL\\Off" | "SingArea\\Wrist" => {}
             name if rest.is_empty() && all.routines.contains_key(name) && depth < 4 => run(all, name, events, depth + 1)?,
             name if name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_') => {

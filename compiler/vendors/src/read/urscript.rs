@@ -18,9 +18,44 @@ pub fn read(files: &[File]) -> Result<Vec<Event>, Fault> {
 
 fn script(s: &mut State, text: &str) -> Result<(), Fault> {
     let mut depth = 0;
+    // Inside of a thread; just behind a probe move.
+    let (mut thread, mut probed) = (false, false);
     for raw in text.lines() {
         let line = without_remark(raw, "#");
         let fault = || raw.to_string();
+        if thread {
+            if line.starts_with("movel(") {
+                s.speed = after(line, ",v=").ok_or_else(fault)? * 1000.0;
+                let goal = line.split("p[").nth(1).and_then(pose).ok_or_else(fault)?;
+                let place = s.place(goal, Configuration::Same);
+                s.events.push(Event::Probe(place, s.speed, String::new(), false, false));
+            }
+            thread = line != "end";
+            continue;
+        }
+        if line.starts_with("thread ") {
+            thread = true;
+            continue;
+        }
+        if line.starts_with("global ") || line.contains(" = run ") {
+            continue;
+        }
+        // The thread's move ends where this loop does.
+        if let Some(condition) = line.strip_prefix("while probed_") {
+            let Some(Event::Probe(_, _, input, on, _)) = s.events.last_mut() else { return Err(fault()) };
+            (*input, *on) = (signal(between(condition, "in(", ")").ok_or_else(fault)?), condition.contains("not "));
+            (depth, probed) = (depth + 1, true);
+            continue;
+        }
+        if let (true, 0, Some(condition)) = (probed, depth, line.strip_prefix("if ")) {
+            let input = between(condition, "in(", ")").map(signal);
+            if let (Some(asked), Some(Event::Probe(_, _, input, on, must))) = (input, s.events.last_mut()) {
+                *must = asked == *input && condition.contains("not ") == *on;
+                probed = false;
+            }
+        } else if depth == 0 && !line.is_empty() {
+            probed &= line == "end";
+        }
         if line.starts_with("while ") || line.starts_with("if ") {
             depth += 1;
             if line.starts_with("while ") {

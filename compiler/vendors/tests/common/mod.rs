@@ -19,6 +19,8 @@ pub enum Move {
     Helix { radius: f64, angle: f64, rise: f64, speed: f64 },
     /// All joints by these angles, degrees.
     Joint { by: [f64; 6], share: f64 },
+    /// A line until an input has a state.
+    Probe { shift: [f64; 3], speed: f64, on: bool, must: bool },
     /// Another of the two frames.
     Frame(u16),
     /// Another of the two tools.
@@ -206,6 +208,12 @@ impl Builder {
                 }
                 let to = self.push(t);
                 self.step(Action::Joint { to, speed: *share, zone: Zone::Stop });
+            }
+            Move::Probe { shift, speed, on, must } => {
+                let here = self.pose();
+                let Some(t) = self.solve(&Frame { position: add(here.position, *shift), ..here }) else { return false };
+                let to = self.push(t);
+                self.step(Action::Probe { to, speed: *speed, input: "di_3".into(), on: *on, must: *must });
             }
             Move::Frame(i) => {
                 self.frame = usize::from(*i);
