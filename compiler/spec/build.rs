@@ -13,6 +13,7 @@ fn main() {
     rs274(&root.join("rs274"), &mut code);
     dialects(&root.join("dialects"), &mut code);
     targets(&root.join("targets"), &mut code);
+    ini(&root.join("ini"), &mut code);
     std::fs::write(out.join("tables.rs"), code).expect("OUT_DIR is writable");
 }
 
@@ -315,6 +316,36 @@ fn parameters(t: &toml::Table, at: &str, code: &mut String) {
         }
         writeln!(code, "];").expect("string");
     }
+}
+
+fn ini(dir: &Path, code: &mut String) {
+    let mut seen = std::collections::BTreeSet::new();
+    writeln!(code, "pub(crate) static INI_KEYS: &[crate::IniKey] = &[").expect("string");
+    for (path, t) in tables(dir) {
+        let at = path.display().to_string();
+        for row in rows(&t, "key") {
+            let (section, name) = (field(row, "section", &at), field(row, "name", &at));
+            assert!(seen.insert((section.to_string(), name.to_string())), "{at}: [{section}] {name} stands twice");
+            let kind = match field(row, "kind", &at) {
+                "text" => "Text",
+                "number" => "Number",
+                "integer" => "Integer",
+                "flag" => "Flag",
+                "switch" => "Switch",
+                other => panic!("{at}: kind {other}"),
+            };
+            let bound = |key| row.get(key).and_then(toml::Value::as_integer);
+            writeln!(
+                code,
+                "crate::IniKey {{ section: {section:?}, name: {name:?}, kind: crate::IniKind::{kind}, least: {:?}, most: {:?}, what: {:?} }},",
+                bound("least"),
+                bound("most"),
+                field(row, "what", &at),
+            )
+            .expect("string");
+        }
+    }
+    writeln!(code, "];").expect("string");
 }
 
 fn targets(dir: &Path, code: &mut String) {

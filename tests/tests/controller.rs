@@ -75,7 +75,7 @@ fn feeds(canon: &str) -> Vec<(String, Vec<f64>)> {
     canon.lines().filter_map(call).collect()
 }
 
-/// With the tool's diameter in the table LinuxCNC makes of contours (G41, G42) the path of the tool's center; with another
+/// With the tool's diameter in the table LinuxCNC makes of contours (G41, G42) the path of the tool's centre; with another
 /// diameter it comes nearer to the wall.
 #[test]
 fn the_control_keeps_the_tool_beside_walls() {

@@ -44,7 +44,7 @@ fn dialect(out: &mut String, d: &Dialect) {
         let _ = writeln!(out, "| `{}` | {} | {} | {} |", c.code, cell(c.title), args(c), cell(c.what));
     }
     if !d.facts.is_empty() {
-        out.push_str("\n| behavior | value | |\n|---|---|---|\n");
+        out.push_str("\n| behaviour | value | |\n|---|---|---|\n");
         for f in d.facts {
             let _ = writeln!(out, "| {} | {} | {} |", cell(f.title), cell(f.value), cell(f.what));
         }

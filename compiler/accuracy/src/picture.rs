@@ -66,7 +66,7 @@ fn number(v: f64, span: f64) -> String {
 }
 
 /// The values that the colors tell apart. Where a few places take nearly all of the range the rest would be one color: then
-/// the colors end before them, which is said.
+/// the colours end before them, which is said.
 fn told_apart(map: &Map, (low, high): (f64, f64)) -> ((f64, f64), Option<String>) {
     const FEW: f64 = 0.02;
     const LEAST: f64 = 0.4;
@@ -93,7 +93,7 @@ fn told_apart(map: &Map, (low, high): (f64, f64)) -> ((f64, f64), Option<String>
     if below > 0 {
         parts.push(format!("{below} of {count} nodes are below {}", number(bottom, wide)));
     }
-    ((bottom, top), Some(format!("colors end where only a few nodes are: {}", parts.join(", "))))
+    ((bottom, top), Some(format!("colours end where only a few nodes are: {}", parts.join(", "))))
 }
 
 impl Picture {

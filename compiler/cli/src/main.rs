@@ -45,8 +45,28 @@ pub fn called_as_rs274(name: Option<&std::ffi::OsString>) -> bool {
     name.is_some_and(|n| std::path::Path::new(n).file_stem().is_some_and(|s| s == "rs274"))
 }
 
+/// An option that does nothing for the files that are named.
+fn idle(command: &Command) -> Option<String> {
+    use commands::idle_for;
+    match command {
+        Command::Check(a) => idle_for(&a.setup, &a.paths),
+        Command::Build(a) => idle_for(&a.setup, &a.files),
+        Command::Preview(a) => idle_for(&a.setup, std::slice::from_ref(&a.file)),
+        Command::Diff(a) => idle_for(&a.setup, &[a.a.clone(), a.b.clone()]),
+        Command::Verify(a) => idle_for(&a.setup, std::slice::from_ref(&a.file)),
+        Command::Accuracy(a) => idle_for(&a.setup, std::slice::from_ref(&a.file)),
+        Command::Place(a) => idle_for(&a.setup, a.file.as_slice()),
+        Command::Filter(a) => idle_for(&a.setup, std::slice::from_ref(&a.file)),
+        _ => None,
+    }
+}
+
 fn run(cli: Cli) -> ExitCode {
     let global = &cli.global;
+    if let Some(why) = idle(&cli.command) {
+        eprintln!("{why}");
+        return Exit::Usage.into();
+    }
     match cli.command {
         Command::Check(args) => commands::check::run(global, &args).into(),
         Command::Build(args) => commands::build::run(global, &args).into(),

@@ -25,7 +25,7 @@ pub struct Global {
     /// How diagnostics are written
     #[arg(long, global = true, value_enum, default_value_t, value_name = "FORMAT")]
     pub message_format: MessageFormat,
-    /// When to use colors
+    /// When to use colours
     #[arg(long, global = true, value_enum, default_value_t, value_name = "WHEN")]
     pub color: When,
     /// No summary and no progress
@@ -33,7 +33,7 @@ pub struct Global {
     pub quiet: bool,
 }
 
-/// When to use colors.
+/// When to use colours.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum, Default)]
 pub enum When {
     /// On a terminal, unless NO_COLOR is set

@@ -116,7 +116,9 @@ pub fn assembled(args: &SetupArgs, lints: &LintArgs, from: &Path, sources: &mut 
     setup.block_delete = args.block_delete || section.is_some_and(|s| s.block_delete);
     subs(args, project.as_ref(), &mut setup);
     reader.blamed = None;
-    let dialect = args.dialect.as_deref().and_then(|name| reader.dialect(name));
+    // A reference mode has its own language.
+    let reference = section.and_then(|s| s.reference).filter(|r| *r == crate::emit::Reference::Ufmg2008).map(|_| "ufmg2008");
+    let dialect = args.dialect.as_deref().or(reference).and_then(|name| reader.dialect(name));
     reader.named_as(args.machine.is_none(), "machine");
     let machine = args.machine.clone().or_else(|| section.and_then(|s| s.machine.clone()));
     let machine = machine.and_then(|name| reader.machine(&name));

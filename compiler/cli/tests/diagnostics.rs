@@ -102,7 +102,8 @@ fn tables_and_settings() {
     let (found, status) = codes(&[part.clone(), ini], "check --strict -i a.ini a.ngc");
     assert_eq!((found.iter().filter(|c| *c == "E0852").count(), status), (1, Some(1)), "{found:?}");
     let many: String = (1..=1100).map(|n| format!("T{n} P{n} Z1\n")).collect();
-    told("E0837", &[part, file("a.tbl", &many)], "check --tools a.tbl a.ngc");
+    told("E0837", &[part.clone(), file("a.tbl", &many)], "check --tools a.tbl a.ngc");
+    told("E0853", &[part, file("a.tbl", "T1 P1 Z50\nT2 P2 Z60\nT1 P3 Z70\n")], "check --tools a.tbl a.ngc");
     let ini = file("a.ini", "[EMCIO]\nTOOL_TABLE = a.tbl\n[TRAJ]\nLINEAR_UNITS = mm\n");
     let tools = file("a.tbl", "T1 P1 Z50 D6\nT2 P2 Z60 D6\nT3 P3 Z60 D5\n");
     told("E0844", &[ini.clone(), tools, file("a.p21", &plan(&[]))], "filter -i a.ini a.p21");

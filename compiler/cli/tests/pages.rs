@@ -35,6 +35,109 @@ fn shown(folder: &Path, words: &[&str], what: &str) -> String {
     text.lines().skip(skip).take(count).map(|l| format!("{}\n", l.trim_end())).collect()
 }
 
+/// What stands behind a key of a schema, in words.
+fn kind(schema: &serde_json::Value) -> String {
+    let list = |key: &str| schema[key].as_array().map(|a| a.iter().map(|v| format!("`{}`", v.as_str().unwrap_or("?"))).collect::<Vec<_>>().join(", "));
+    if let Some(values) = list("enum") {
+        return values;
+    }
+    if let Some(forms) = schema["anyOf"].as_array() {
+        return forms.iter().map(kind).collect::<Vec<_>>().join(", or ");
+    }
+    let least = [("minimum", "at least "), ("exclusiveMinimum", "above "), ("maximum", "at most ")];
+    let bounds: Vec<String> = least.iter().filter_map(|(key, word)| Some(format!("{word}{}", schema[*key].as_f64()?))).collect();
+    let with = |what: &str| if bounds.is_empty() { what.to_string() } else { format!("{what} {}", bounds.join(", ")) };
+    match schema["type"].as_str() {
+        Some("number") => with("number"),
+        Some("integer") => with("whole number"),
+        Some("boolean") => "true or false".into(),
+        Some("array") => {
+            let of = if schema["items"]["type"] == "array" { format!("lists of {}", kind(&schema["items"])) } else { format!("{}s", kind(&schema["items"])) };
+            match schema["minItems"].as_u64().filter(|n| schema["maxItems"].as_u64() == Some(*n)) {
+                Some(n) => format!("{n} {of}"),
+                None => of,
+            }
+        }
+        Some("string") => schema["pattern"].as_str().map_or("text".into(), |p| format!("text `{}…`", p.trim_matches(['^', '.', '+']))),
+        _ => schema["const"].to_string(),
+    }
+}
+
+/// The table that a key of a schema opens: one of its kind, or several.
+fn table_of(schema: &serde_json::Value) -> Option<(&serde_json::Value, bool)> {
+    match schema["type"].as_str() {
+        Some("object") => Some((schema, false)),
+        Some("array") if schema["items"]["type"] == "object" => Some((&schema["items"], true)),
+        _ => None,
+    }
+}
+
+/// Tables of the keys of a machine file, as its schema has them.
+fn keys(schema: &serde_json::Value, name: &str, out: &mut String) {
+    let (mut rows, mut below) = (String::new(), Vec::new());
+    // Words of a dialect have tables of one form.
+    let pattern = schema["patternProperties"].as_object().and_then(|p| p.values().next());
+    if let Some(one) = pattern {
+        return keys(one, name, out);
+    }
+    let needed = |key: &str| schema["required"].as_array().is_some_and(|r| r.iter().any(|k| k == key));
+    for (key, of) in schema["properties"].as_object().expect("keys") {
+        let what = of["description"].as_str().expect("a description");
+        if let Some((table, several)) = table_of(of) {
+            // The reference mode's tables are those of the file.
+            if !name.starts_with("[reference") {
+                below.push((key, what, table, several));
+                continue;
+            }
+            rows.push_str(&format!("| `{key}` | as in the file | {what} |\n"));
+            continue;
+        }
+        rows.push_str(&format!("| `{key}` | {}{} | {what} |\n", kind(of).replace('|', "\\|"), if needed(key) { ", **needed**" } else { "" }));
+    }
+    if !rows.is_empty() {
+        out.push_str(&format!("| key | value | |\n|---|---|---|\n{rows}"));
+    }
+    for (key, what, table, several) in below {
+        let inner = name.trim_matches(['[', ']']);
+        let path = if inner.is_empty() { key.clone() } else { format!("{inner}.{key}") };
+        let path = if several { format!("[[{path}]]") } else { format!("[{path}]") };
+        let words = if table["patternProperties"].is_object() { format!("[{key}.M3]") } else { path };
+        out.push_str(&format!("\n**`{words}`** {what}\n\n"));
+        keys(table, &words, out);
+    }
+}
+
+#[test]
+fn keys_of_machine_files() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let schema: serde_json::Value = serde_json::from_str(include_str!("../../../spec/machines/machine.schema.json")).unwrap();
+    let (page, mut now) = (root.join("docs/machines.md"), String::from("\n"));
+    keys(&schema, "", &mut now);
+    let text = std::fs::read_to_string(&page).unwrap().replace('\r', "");
+    let (head, rest) = text.split_once("<!-- keys -->\n").expect("the mark");
+    let (old, tail) = rest.split_once("<!-- end of keys -->").expect("the other mark");
+    if std::env::var_os("UPDATE_DOCS").is_some() && old != now {
+        std::fs::write(&page, format!("{head}<!-- keys -->\n{now}<!-- end of keys -->{tail}")).unwrap();
+    } else {
+        assert!(old == now, "UPDATE_DOCS=1 brings docs/machines.md up to date:\n{now}");
+    }
+}
+
+/// The cell of the page on machine files makes a program for the shipped part.
+#[test]
+fn the_cell_of_the_page_builds_the_shipped_part() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let page = std::fs::read_to_string(root.join("docs/machines.md")).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("cell.toml"), block(&page, "toml").expect("the cell").1).unwrap();
+    let from = page.find("`gcc-robot build docs/examples/bracket.ngc").expect("the command") + 1;
+    let words = page[from..].split('`').next().expect("its end").split_whitespace().skip(1);
+    let words = words.map(|w| if w == "docs/examples/bracket.ngc" { root.join(w).display().to_string() } else { w.to_string() });
+    let made = Command::new(env!("CARGO_BIN_EXE_gcc-robot")).args(words).current_dir(folder.path()).output().unwrap();
+    assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
+    assert!(folder.path().join("out/bracket.mod").is_file());
+}
+
 #[test]
 fn every_robot_language_has_a_page() {
     for language in gr_vendors::languages() {

@@ -102,6 +102,18 @@ fn fixes_mend_what_they_are_offered_for() {
     insta::assert_snapshot!(mended.join("\n"));
 }
 
+/// A subroutine is missing at its call, wherever the search for it ends.
+#[test]
+fn a_missing_subroutine_is_told_at_its_call() {
+    for (text, call) in [("%\nG21 G90\no<no> call [1]\nG0 X1\nM2\n%\n", 2), ("%\nG21\nM98 P77\nM2\n%\n", 2), ("G21\nM98 P77\nM2\n", 1), ("%\no<a> sub\no<no> call\no<a> endsub\nG21\no<a> call\nM2\n%\n", 2)] {
+        let mut session = Session::new();
+        let file = session.open("part.ngc", text, Options::new(Setup::default()));
+        let found = session.check(file).diagnostics;
+        let d = found.iter().find(|d| d.code == gr_text::code::SUB_NOT_FOUND).unwrap_or_else(|| panic!("{found:?}"));
+        assert_eq!(text[..d.primary().1.start as usize].matches('\n').count(), call, "{text}: {d:?}");
+    }
+}
+
 #[test]
 fn a_file_that_is_named_after_its_subroutine_is_called_from_elsewhere() {
     let of = |name: &str, text: &str| {

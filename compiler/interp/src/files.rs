@@ -3,10 +3,12 @@
 //! Text in, tables out; what is wrong with a line becomes a diagnostic. Only [`save_parameters`] touches the
 //! disk.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::path::Path;
 
 use gr_canon::Version;
+use gr_spec::{IniKey, IniKind};
 use gr_text::{Diagnostic, FileId, Span, code};
 
 use crate::{Ini, Tool, ToolTable};
@@ -59,8 +61,8 @@ fn empty_row() -> Tool {
 /// changer; a tool without P goes into row 0.
 pub fn read_tools(text: &str, file: FileId) -> (ToolTable, Vec<Diagnostic>) {
     let mut table = no_tools();
-    let mut found = Vec::new();
-    for (start, line) in lines(text) {
+    let (mut found, mut rows) = (Vec::new(), BTreeMap::new());
+    for (number, (start, line)) in lines(text).enumerate() {
         let body = line.split(';').next().unwrap_or("");
         if line.starts_with(';') || body.trim().is_empty() {
             continue;
@@ -83,7 +85,15 @@ pub fn read_tools(text: &str, file: FileId) -> (ToolTable, Vec<Diagnostic>) {
                 found.push(Diagnostic::new(code::TOOL_TABLE_TOO_MANY, file, span, &[(POCKETS - 1).to_string()]));
                 break;
             }
-            Ok(tool) => table.rows.push(tool),
+            Ok(tool) => {
+                // Of two rows with one number the first is found.
+                let first = rows.entry(tool.number).or_insert(number + 1);
+                if *first != number + 1 {
+                    let args = [tool.number.to_string(), first.to_string()];
+                    found.push(Diagnostic::new(code::TOOL_TABLE_TWICE, file, span_of(start, body.trim_end()), &args));
+                }
+                table.rows.push(tool);
+            }
         }
     }
     (table, found)
@@ -314,64 +324,30 @@ pub fn read_ini(text: &str, file: FileId, folder: Option<&Path>, load: Option<Lo
 const ON: [&str; 3] = ["yes", "true", "on"];
 const OFF: [&str; 3] = ["no", "false", "off"];
 
-/// Switches that only 0 and 1 turn.
-const NARROW: [&str; 5] = ["RETAIN_G43", "OWORD_NARGS", "INI_VARS", "HAL_PIN_VARS", "NO_DOWNCASE_OWORD"];
-
-/// Keys whose value has to be an integer as a whole, in capitals; `?` in the section of an axis.
-const INTEGERS: [(&str, &str); 13] = [
-    ("EMCIO", "RANDOM_TOOLCHANGER"),
-    ("EMCIO", "TOOL_CHANGE_AT_G30"),
-    ("EMCIO", "TOOL_CHANGE_QUILL_UP"),
-    ("EMCIO", "TOOL_CHANGE_WITH_SPINDLE_ON"),
-    ("RS274NGC", "RETAIN_G43"),
-    ("RS274NGC", "OWORD_NARGS"),
-    ("RS274NGC", "INI_VARS"),
-    ("RS274NGC", "HAL_PIN_VARS"),
-    ("RS274NGC", "NO_DOWNCASE_OWORD"),
-    ("RS274NGC", "DISABLE_G92_PERSISTENCE"),
-    ("RS274NGC", "DISABLE_FANUC_STYLE_SUB"),
-    ("AXIS_?", "WRAPPED_ROTARY"),
-    ("TRAJ", "SPINDLES"),
-];
-
-/// Keys whose value has to be a number as a whole.
-const NUMBERS: [(&str, &str); 11] = [
-    ("RS274NGC", "ORIENT_OFFSET"),
-    ("RS274NGC", "PARAMETER_G73_PECK_CLEARANCE"),
-    ("RS274NGC", "PARAMETER_G83_PECK_CLEARANCE"),
-    ("RS274NGC", "CENTER_ARC_RADIUS_TOLERANCE_INCH"),
-    ("RS274NGC", "CENTER_ARC_RADIUS_TOLERANCE_MM"),
-    ("TRAJ", "MAX_LINEAR_VELOCITY"),
-    ("TRAJ", "MAX_VELOCITY"),
-    ("AXIS_?", "MIN_LIMIT"),
-    ("AXIS_?", "MAX_LIMIT"),
-    ("AXIS_?", "MAX_VELOCITY"),
-    ("AXIS_?", "MAX_ACCELERATION"),
-];
-
 /// What the controller would have to find where it finds this value; nothing where it takes it. A value that it does not
 /// take is as good as none: it says nothing and goes on with its own.
-fn wanted(section: &str, key: &str, value: &str) -> Option<&'static str> {
-    let section = if section.starts_with("axis_") { "AXIS_?" } else { section };
-    let is = |row: &(&str, &str)| row.0.eq_ignore_ascii_case(section) && row.1 == key;
+fn wanted(section: &str, key: &str, value: &str) -> Option<Cow<'static, str>> {
+    let known = IniKey::find(&section.to_ascii_uppercase(), key)?;
     let word = ON.iter().chain(&OFF).any(|w| value.eq_ignore_ascii_case(w));
-    if INTEGERS.iter().any(is) {
-        match value.parse::<i32>() {
-            Ok(n) if key == "SPINDLES" && !(1..=8).contains(&n) => Some("1 to 8 spindles are possible"),
-            Ok(n) if NARROW.contains(&key) && !(0..=1).contains(&n) => Some("it has to be 1 or 0"),
-            Ok(_) => None,
-            Err(_) if word && key != "SPINDLES" => Some("LinuxCNC 2.9 wants 1 or 0, words are read from 2.10 on"),
-            Err(_) => Some("it has to be a whole number, with nothing behind it"),
+    let inside = |n: i64| known.least.is_none_or(|l| l <= n) && known.most.is_none_or(|m| n <= m);
+    match (known.kind, value.parse::<i32>()) {
+        (IniKind::Text, _) => None,
+        (IniKind::Number, _) => {
+            let limits = crate::arc::spiral_limits_of(key);
+            match value.parse::<f64>() {
+                Ok(v) if limits.is_some_and(|l| !l.contains(&v)) => Some("it is too small or too large".into()),
+                Ok(v) if v.is_finite() => None,
+                _ => Some("it has to be a number, with nothing behind it".into()),
+            }
         }
-    } else if NUMBERS.iter().any(is) {
-        let limits = crate::arc::spiral_limits_of(key);
-        match value.parse::<f64>() {
-            Ok(v) if limits.is_some_and(|l| !l.contains(&v)) => Some("it is too small or too large"),
-            Ok(v) if v.is_finite() => None,
-            _ => Some("it has to be a number, with nothing behind it"),
+        (IniKind::Switch, Ok(n)) if !(0..=1).contains(&n) => Some("it has to be 1 or 0".into()),
+        (_, Ok(n)) if !inside(n.into()) => {
+            let [least, most] = [known.least, known.most].map(|b| b.map_or(String::new(), |b| b.to_string()));
+            Some(format!("it has to be from {least} to {most}").into())
         }
-    } else {
-        None
+        (_, Ok(_)) => None,
+        (IniKind::Flag | IniKind::Switch, Err(_)) if word => Some("LinuxCNC 2.9 wants 1 or 0, words are read from 2.10 on".into()),
+        (_, Err(_)) => Some("it has to be a whole number, with nothing behind it".into()),
     }
 }
 
@@ -484,11 +460,12 @@ impl Ini {
     pub fn integer(&self, section: &str, key: &str) -> Option<i32> {
         self.get(section, key)?.parse().ok()
     }
-    /// A switch: 0 is off, 1 is on, other integers too where the key is not one of [`NARROW`]; words switch from 2.10 on.
+    /// A switch: 0 is off, 1 is on, other integers too where the key is no [`IniKind::Switch`]; words switch from 2.10 on.
     /// Nothing where the value is none that the controller takes.
     pub fn switch(&self, section: &str, key: &str, version: Version) -> Option<bool> {
         let is = |words: &[&str]| self.get(section, key).is_some_and(|v| words.iter().any(|w| v.eq_ignore_ascii_case(w)));
-        let narrow = NARROW.iter().any(|k| key.eq_ignore_ascii_case(k));
+        let known = IniKey::find(&section.to_ascii_uppercase(), &key.to_ascii_uppercase());
+        let narrow = known.is_some_and(|k| k.kind == IniKind::Switch);
         match self.integer(section, key) {
             Some(n) if (0..=1).contains(&n) || !narrow => Some(n != 0),
             None if version == Version::V2_10 && is(&ON) => Some(true),

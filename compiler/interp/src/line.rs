@@ -142,8 +142,9 @@ impl<S: Sink> Interp<'_, S> {
             if let Some(skip) = &self.skip {
                 let name = self.symbols.name(skip.label.name).to_string();
                 // The call is what has to be mended. Told to go on, the run does so from here.
-                if let Some(from) = skip.from.filter(|_| !self.setup.keep_going) {
-                    self.place = from;
+                match skip.from {
+                    Some(from) if !self.setup.keep_going => self.place = from,
+                    from => self.blamed = from,
                 }
                 return Err(Fault::new(code::SUB_NOT_FOUND, rs274::RT_O_EOF_SUB).arg(name));
             }

@@ -131,6 +131,8 @@ pub struct Interp<'a, S: Sink> {
     /// The codes that the dialect has, when it is a closed list.
     pub(crate) closed: Option<&'static crate::closed::Closed>,
     pub(crate) place: Place,
+    /// What the next finding is about, when that is not the present line.
+    pub(crate) blamed: Option<Place>,
     pub(crate) reading: Reading,
     pub(crate) files: &'a mut dyn Files,
     pub(crate) opened: Opened,
@@ -235,6 +237,7 @@ impl<'a, S: Sink> Interp<'a, S> {
             config: Arc::new(Config::new(setup)),
             closed: crate::closed::list_of(setup.dialect),
             place: Place::default(),
+            blamed: None,
             reading: Reading::default(),
             files,
             opened: Opened::default(),

@@ -324,7 +324,7 @@ impl Planner<'_> {
             self.e.say(code::PLAN_MISSING_VALUE, o.technology.origin, &[technology, if lathe { "spindle_speed" } else { "spindle" }, "nothing is cut with a spindle that stands"]);
         }
         if o.technology.contact_feed && o.toolpaths.is_empty() {
-            self.e.say(code::PLAN_NO_EFFECT, o.technology.origin, &["feedrate_reference .CCP.", "the operation", "the feed is that of the tool center"]);
+            self.e.say(code::PLAN_NO_EFFECT, o.technology.origin, &["feedrate_reference .CCP.", "the operation", "the feed is that of the tool centre"]);
         }
         if o.technology.synchronised && !matches!(o.keyword.as_str(), "TAPPING") {
             self.e.say(code::PLAN_NO_EFFECT, o.technology.origin, &["synchronize_spindle_with_feed", "the operation", "only a tap goes in step with the spindle"]);

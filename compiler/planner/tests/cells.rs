@@ -13,7 +13,7 @@ use judge::cells::features;
 
 const DOCS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/stepnc.md");
 
-const NAMES: [&str; 8] = ["not given", "unidirectional", "bidirectional", "contour parallel", "bidirectional contour", "contour bidirectional", "contour spiral", "center milling"];
+const NAMES: [&str; 8] = ["not given", "unidirectional", "bidirectional", "contour parallel", "bidirectional contour", "contour bidirectional", "contour spiral", "centre milling"];
 const WAYS: [&str; 7] = ["not given", "plunge along the axis", "plunge ramp", "plunge helix", "plunge zigzag", "approach at an angle", "approach on an arc"];
 
 /// Planned, and judged unless its surface is elsewhere.

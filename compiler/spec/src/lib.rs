@@ -136,6 +136,56 @@ impl TargetDef {
     }
 }
 
+/// What a controller reads behind a key of its INI file.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum IniKind {
+    /// Anything.
+    Text,
+    /// A number.
+    Number,
+    /// A whole number.
+    Integer,
+    /// A whole number: on, unless it is 0.
+    Flag,
+    /// 1 or 0.
+    Switch,
+}
+
+/// One row of `spec/ini`: a key of LinuxCNC's INI file that programs depend on.
+#[derive(Debug, PartialEq, Eq)]
+pub struct IniKey {
+    /// In capitals; `?` is the letter of an axis.
+    pub section: &'static str,
+    /// In capitals.
+    pub name: &'static str,
+    /// What stands behind it.
+    pub kind: IniKind,
+    /// Smallest value.
+    pub least: Option<i64>,
+    /// Largest value.
+    pub most: Option<i64>,
+    /// What it means to programs.
+    pub what: &'static str,
+}
+
+impl IniKey {
+    /// All keys.
+    pub fn all() -> &'static [IniKey] {
+        INI_KEYS
+    }
+    /// By section and name, in capitals.
+    pub fn find(section: &str, name: &str) -> Option<&'static IniKey> {
+        INI_KEYS.iter().find(|k| k.name == name && k.stands_in(section))
+    }
+    /// Whether it belongs into a section.
+    pub fn stands_in(&self, section: &str) -> bool {
+        match self.section.strip_suffix('?') {
+            Some(head) => section.strip_prefix(head).is_some_and(|axis| axis.len() == 1),
+            None => self.section == section,
+        }
+    }
+}
+
 /// Which grammar and interpretation rules a dialect follows.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Default)]
 pub enum Family {

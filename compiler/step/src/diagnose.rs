@@ -128,9 +128,14 @@ impl Out<'_> {
         }
         if c == code::STEP_UNKNOWN_CHOICE {
             let choices = f.args.get(3).map_or("", String::as_str);
-            let names: Vec<&str> = choices.split([' ', ',']).map(str::trim).filter(|n| n.starts_with('.') && n.ends_with('.') && word(n.trim_matches('.'))).collect();
-            let some = if names.len() <= MOST_CHOICES { names.as_slice() } else { &[] };
-            return some.iter().map(|n| fix(format!("write {n}"), f.span, (*n).to_string())).collect();
+            let found = f.args.first().map_or("", String::as_str).to_ascii_uppercase();
+            let away = |name: &str| crate::schema::distance(found.as_bytes(), name.as_bytes(), usize::MAX);
+            let mut names: Vec<&str> = choices.split([' ', ',']).map(str::trim).filter(|n| word(n)).collect();
+            // What is misspelt is meant; else any of a few.
+            names.sort_by_key(|n| away(n));
+            let near = names.first().is_some_and(|n| away(n) <= 1 + n.len() / 4);
+            let some = if near { &names[..1] } else if names.len() <= MOST_CHOICES { &names[..] } else { &[] };
+            return some.iter().map(|n| fix(format!("write .{n}."), f.span, format!(".{n}."))).collect();
         }
         if c == code::STEP_SHORT_CUTTING_COMPONENT {
             let end = self.statement(f.span.start).map_or(f.span.end, |n| self.exchange.instances[n].end) as usize;
@@ -288,9 +293,9 @@ impl Out<'_> {
             code::STEP_SPINDLE_UNIT => &[(v / 60.0, "rpm was meant")],
             code::STEP_CUTSPEED_UNIT => &[(v / 60.0, "m/min was meant")],
             code::STEP_SPINDLE_SIGN => &[(-v, "the tool turns clockwise (M3)")],
-            code::STEP_OVERLAP => &[(of_tool.unwrap_or(0.0), "millimeters were meant"), (v / 100.0, "percent was meant")],
+            code::STEP_OVERLAP => &[(of_tool.unwrap_or(0.0), "millimetres were meant"), (v / 100.0, "percent was meant")],
             code::STEP_RATIO => &[(v / 100.0, "percent was meant")],
-            code::STEP_TOLERANCE => &[(v / 1000.0, "micrometers were meant")],
+            code::STEP_TOLERANCE => &[(v / 1000.0, "micrometres were meant")],
             code::STEP_RADIANS => &[(v.to_degrees(), "radians were meant")],
             _ => &[],
         };

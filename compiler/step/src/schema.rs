@@ -273,7 +273,7 @@ fn inner(text: &'static str) -> Vec<&'static str> {
 }
 
 /// Edit distance, given up at `limit`.
-fn distance(a: &[u8], b: &[u8], limit: usize) -> usize {
+pub(crate) fn distance(a: &[u8], b: &[u8], limit: usize) -> usize {
     if a.len().abs_diff(b.len()) >= limit {
         return limit;
     }

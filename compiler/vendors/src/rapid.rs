@@ -120,7 +120,7 @@ impl Writer {
             let center = if center.iter().all(|v| v.abs() < 0.001) { [0.0, 0.0, 0.001] } else { center };
             let mass = tool.mass.unwrap_or(0.001).max(0.001);
             if tool.mass.is_none() {
-                let _ = write!(head, "  ! {name}: mass and center of gravity are not known, set them before running\r\n");
+                let _ = write!(head, "  ! {name}: mass and centre of gravity are not known, set them before running\r\n");
             }
             let _ = write!(
                 head,

@@ -69,19 +69,19 @@
 
 (check "definition by xref"
   (goto-char (point-min))
-  (search-forward "O<contour> call")
+  (search-forward "o<contour> call")
   (goto-char (+ (line-beginning-position) 3))
   (xref-find-definitions "contour")
-  (has (buffer-substring (line-beginning-position) (line-end-position)) "O<contour> sub"))
+  (has (buffer-substring (line-beginning-position) (line-end-position)) "o<contour> sub"))
 
 (check "rename"
   (goto-char (point-min))
-  (search-forward "O<contour> call")
+  (search-forward "o<contour> call")
   (goto-char (+ (line-beginning-position) 3))
   (let ((eglot-confirm-server-initiated-edits nil)) (eglot-rename "outline"))
   (goto-char (point-min))
-  (cl-assert (= 4 (how-many "O<outline>")))
-  (cl-assert (= 0 (how-many "O<contour>"))))
+  (cl-assert (= 4 (how-many "o<outline>")))
+  (cl-assert (= 0 (how-many "o<contour>"))))
 
 (check "formatting"
   (goto-char (point-min))

@@ -184,8 +184,8 @@ end)
 
 test("definition of a subprogram", function()
   local buffer = open("docs/examples/flange.ngc")
-  local line, column = line_of(buffer, "O<contour> call [8]")
-  local wanted = line_of(buffer, "O<contour> sub")
+  local line, column = line_of(buffer, "o<contour> call [8]")
+  local wanted = line_of(buffer, "o<contour> sub")
   local answer = request(buffer, "textDocument/definition", at(line, column + 3))
   local place = answer[1] or answer
   local range = place.range or place.targetSelectionRange
@@ -198,16 +198,16 @@ end)
 
 test("rename of a subprogram changes the definition and every call", function()
   local buffer = open("docs/examples/flange.ngc")
-  local line, column = line_of(buffer, "O<contour> call [8]")
+  local line, column = line_of(buffer, "o<contour> call [8]")
   at(line, column + 3)
   vim.lsp.buf.rename("outline")
   wait("the new name", function()
-    return vim.api.nvim_buf_get_lines(buffer, line - 1, line, false)[1] == "O<outline> call [8]"
+    return vim.api.nvim_buf_get_lines(buffer, line - 1, line, false)[1] == "o<outline> call [8]"
   end)
   local text = table.concat(vim.api.nvim_buf_get_lines(buffer, 0, -1, false), "\n")
-  local _, new = text:gsub("O<outline>", "")
+  local _, new = text:gsub("o<outline>", "")
   equal(new, 4, "number of new names")
-  assert(not text:find("O<contour>", 1, true))
+  assert(not text:find("o<contour>", 1, true))
   assert(text:find("#<_contour_safe>", 1, true), "parameters keep their names")
 end)
 

@@ -1,6 +1,6 @@
 //! Contours for the radius compensation of the control: passes that follow a wall become the contour beside which
 //! LinuxCNC (G41, G42) keeps the tool, so that it makes exactly the motion of the plan. This is not compensation
-//! itself, that is the control's; what it would do another way stays the path of the tool's center.
+//! itself, that is the control's; what it would do another way stays the path of the tool's centre.
 //!
 //! LinuxCNC enters compensation on a straight move that is longer than the radius and ends beside its end, square to it;
 //! joins moves of the same direction as they are (turns below 0.05 rad count as none); cuts inside corners to where

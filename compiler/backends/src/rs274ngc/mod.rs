@@ -55,7 +55,7 @@ impl Language {
     pub fn title(self) -> &'static str {
         match self {
             Language::Linuxcnc => "LinuxCNC",
-            Language::FanucMill => "a Fanuc machining center",
+            Language::FanucMill => "a Fanuc machining centre",
             Language::Grbl => "grbl",
         }
     }
@@ -162,7 +162,7 @@ impl Options {
     /// What does not go together.
     fn mistakes(&self) -> Option<String> {
         if self.arcs == Arcs::IjkAbsolute && self.language != Language::Linuxcnc {
-            return Some(format!("{} has no absolute arc centers", self.language.title()));
+            return Some(format!("{} has no absolute arc centres", self.language.title()));
         }
         if self.change_at.is_some() && self.language != Language::Linuxcnc {
             return Some("a place for tool changes can be chosen for LinuxCNC only".into());

@@ -497,7 +497,7 @@ fn lawless(found: &mut Vec<Diagnostic>, row: &Row, machine: &Machine, motion: &M
     for (source, why) in &row.unforced {
         let why = match why {
             Unforced::Axial => "the tool is fed along its axis, and the force law is that of milling across it (a drill is known by its cycle: G73 G81 G82 G83)",
-            Unforced::NoLaw => "the force law is that of milling and drilling, not of center drilling, tapping, threading, boring, reaming and countersinking",
+            Unforced::NoLaw => "the force law is that of milling and drilling, not of centre drilling, tapping, threading, boring, reaming and countersinking",
             Unforced::Across => "a drill is fed another way than along its axis, and the law of its thrust is that along it",
             Unforced::Turning => "only rotary axes move: the tool turns about its point, which stays where it is on the part, and no force law is about that",
             Unforced::TooWide => "the width of cut is more than the diameter of the tool",

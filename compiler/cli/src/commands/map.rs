@@ -26,7 +26,7 @@ pub fn run(global: &Global, args: &MapArgs) -> Exit {
             let mut renderer = global.renderer(true);
             found.iter().for_each(|d| renderer.show(&sources, d));
             renderer.finish(false);
-            return Exit::Findings;
+            return renderer.failed();
         }
     };
     let refuse = |what: &str, why: &str| {

@@ -18,13 +18,13 @@ pub mod preview_serve;
 pub mod rs274;
 pub mod target;
 
-use std::io::IsTerminal as _;
+use std::io::{IsTerminal as _, Read as _};
 use std::path::{Path, PathBuf};
 
 use gr_text::{Code, code};
 
 use crate::exit::Exit;
-use crate::options::{Global, When};
+use crate::options::{Global, SetupArgs, When};
 use crate::output::same_file;
 use crate::render::Renderer;
 use crate::sources::{Sources, about_file, reason};
@@ -77,7 +77,20 @@ pub fn refuse(global: &Global, name: &Path, code: Code, args: &[String]) -> Exit
     let mut renderer = global.renderer(false);
     complain(&mut renderer, &mut Sources::default(), &name.display().to_string(), code, args);
     renderer.finish(false);
-    if code.def().slug.starts_with("file/") { Exit::Io } else { Exit::Findings }
+    if code.def().slug.starts_with("file/") { Exit::Io } else { Exit::of(code, true) }
+}
+
+/// Why an option about STEP-NC files does nothing: all files that are named are G-code.
+pub fn idle_for(setup: &SetupArgs, files: &[PathBuf]) -> Option<String> {
+    let option = setup.step_units.map(|_| "--step-units").or(setup.step_overlap.map(|_| "--step-overlap"))?;
+    // What can't be looked into here, or is not there, is told by the command itself.
+    let is_gcode = |path: &PathBuf| {
+        let mut head = Vec::new();
+        let read = std::fs::File::open(path).and_then(|f| f.take(4096).read_to_end(&mut head));
+        path.is_file() && read.is_ok() && !crate::exchange::is_exchange(path, &String::from_utf8_lossy(&head))
+    };
+    let first = files.first()?.display();
+    files.iter().all(is_gcode).then(|| format!("{option} says how STEP-NC files are meant; {first} is G-code"))
 }
 
 /// Prints text; only a broken disk behind standard output makes this fail.

@@ -8,7 +8,7 @@ mod short;
 
 use std::io::Write;
 
-use gr_text::{Diagnostic, Severity, code};
+use gr_text::{Diagnostic, Severity};
 
 use crate::exit::Exit;
 
@@ -92,8 +92,8 @@ pub struct Renderer {
     collected: Option<Vec<Diagnostic>>,
     /// What was written so far.
     pub tally: Tally,
-    /// A file could not be read or written.
-    unreadable: bool,
+    /// What a run ends with that could not begin: a file could not be read or written, or the command line is wrong.
+    ends: Exit,
 }
 
 impl Renderer {
@@ -108,12 +108,12 @@ impl Renderer {
             positions: Positions::default(),
             collected: None,
             tally: Tally::default(),
-            unreadable: false,
+            ends: Exit::Findings,
         }
     }
     /// How a run ends that could not begin.
     pub fn failed(&self) -> Exit {
-        if self.unreadable { Exit::Io } else { Exit::Findings }
+        self.ends
     }
     /// Writes nothing; [`Renderer::into_collected`] gives what was found.
     pub fn collecting() -> Renderer {
@@ -126,7 +126,9 @@ impl Renderer {
     /// One finding.
     pub fn show(&mut self, sources: &Sources, d: &Diagnostic) {
         self.tally.count(d.severity);
-        self.unreadable |= matches!(d.code, code::FILE_MISSING | code::FILE_UNREADABLE | code::FILE_DIRECTORY | code::FILE_TOO_BIG);
+        // What stands in no text was said on the command line.
+        let said = sources.get(d.primary().0).is_none_or(|f| f.text.is_empty());
+        self.ends = self.ends.max(Exit::of(d.code, said));
         if let Some(list) = &mut self.collected {
             list.push(d.clone());
             return;

@@ -238,6 +238,27 @@ fn dialect_fixes_are_offered() {
 }
 
 #[test]
+fn choices_are_put_right() {
+    for (wrong, titles) in [(".RIGTH.", vec!["write .RIGHT."]), (".UP.", vec!["write .LEFT.", "write .RIGHT.", "write .NEUTRAL."])] {
+        let text = PLAN.replace(".RIGHT.", wrong);
+        let mut c = Client::new(&[("plate.p21", &text)], json!({}));
+        let uri = c.open("plate.p21", None);
+        let _ = c.diagnostics(&uri);
+        let position = c.position(&uri, "#46=TWIST_DRILL(#47,2,.|");
+        let params = json!({ "textDocument": { "uri": uri }, "range": { "start": position, "end": position }, "context": { "diagnostics": [], "only": ["quickfix"] } });
+        let actions = c.request("textDocument/codeAction", params);
+        let mut offered: Vec<&str> = actions.as_array().into_iter().flatten().filter_map(|a| a["title"].as_str()).collect();
+        offered.sort_unstable();
+        let mut titles = titles;
+        titles.sort_unstable();
+        assert_eq!(offered, titles);
+        let right = actions.as_array().and_then(|a| a.iter().find(|a| a["title"] == "write .RIGHT.")).expect("the right one");
+        assert_eq!(c.edited(&uri, &right["edit"]), PLAN);
+        c.shut_down();
+    }
+}
+
+#[test]
 fn units_are_put_right() {
     let text = include_str!("../../../../docs/examples/stepnc/mistakes.p21");
     let mut c = Client::new(&[("a.p21", text)], json!({}));

@@ -1,44 +1,12 @@
 //! Files of a LinuxCNC machine: its INI file, of which those keys are explained that programs depend on here, and its
 //! parameter file (`.var`). Facts: LinuxCNC 2.9 documentation, INI configuration, and G-code overview, parameters.
 
+use gr_spec::{IniKey, IniKind};
 use gr_text::Span;
 
 use super::lines;
 use crate::gcode::doc::number;
 use crate::{Completion, CompletionKind, Fold, Hover, Item, ItemKind};
-
-/// What a key of an INI file means to programs. `AXIS_?`: the section of an axis.
-const KEYS: &[(&str, &str, &str)] = &[
-    ("RS274NGC", "PARAMETER_FILE", "File with parameters that outlast a program: work offsets, home positions."),
-    ("RS274NGC", "SUBROUTINE_PATH", "Folders in which files of subroutines are looked for, with `:` between them."),
-    ("RS274NGC", "RS274NGC_STARTUP_CODE", "Block that is run before every program."),
-    ("RS274NGC", "REMAP", "Makes a code call a subroutine: `M400 modalgroup=10 argspec=Pq ngc=myprocedure`."),
-    ("RS274NGC", "ORIENT_OFFSET", "Degrees added to R of M19."),
-    ("RS274NGC", "CENTER_ARC_RADIUS_TOLERANCE_INCH", "How far the radii at both ends of an arc may differ, in inch programs."),
-    ("RS274NGC", "CENTER_ARC_RADIUS_TOLERANCE_MM", "How far the radii at both ends of an arc may differ, in mm programs."),
-    ("RS274NGC", "PARAMETER_G73_PECK_CLEARANCE", "Lift that breaks the chip in G73, machine units (2.10)."),
-    ("RS274NGC", "PARAMETER_G83_PECK_CLEARANCE", "Height above the last peck at which the rapid ends in G83, machine units (2.10)."),
-    ("EMCIO", "TOOL_TABLE", "The tool table."),
-    ("TRAJ", "LINEAR_UNITS", "The machine's unit of length: `mm` or `inch`."),
-    ("TRAJ", "SPINDLES", "How many spindles the machine has."),
-    ("TRAJ", "MAX_LINEAR_VELOCITY", "Largest speed along the path, machine units per second."),
-    ("TRAJ", "MAX_VELOCITY", "Largest speed along the path, machine units per second."),
-    ("TRAJ", "ARC_BLEND_ENABLE", "Whether corners are rounded by arcs: 1 or 0."),
-    ("TRAJ", "ARC_BLEND_OPTIMIZATION_DEPTH", "Blocks that are looked ahead."),
-    ("TRAJ", "ARC_BLEND_GAP_CYCLES", "Shortest piece between two blends, in cycles of the servo."),
-    ("TRAJ", "ARC_BLEND_RAMP_FREQ", "How fast the acceleration may change, Hz."),
-    ("TRAJ", "ARC_BLEND_KINK_RATIO", "Share of the acceleration that a kink may take."),
-    ("EMCMOT", "SERVO_PERIOD", "Cycle of the servo, ns."),
-    ("DISPLAY", "PROGRAM_PREFIX", "Folder of programs; subroutines are looked for there first."),
-    ("DISPLAY", "MAX_FEED_OVERRIDE", "Largest override of the feed: 1.2 is 120 %."),
-    ("WIZARD", "WIZARD_ROOT", "Folder in which subroutines are looked for last."),
-    ("AXIS_?", "MIN_LIMIT", "Smallest position of the axis, machine units or degrees."),
-    ("AXIS_?", "MAX_LIMIT", "Largest position of the axis, machine units or degrees."),
-    ("AXIS_?", "MAX_VELOCITY", "Largest speed of the axis, per second."),
-    ("AXIS_?", "MAX_ACCELERATION", "Largest acceleration of the axis, per second squared."),
-    ("AXIS_?", "WRAPPED_ROTARY", "A rotary axis that knows 0 to 360 degrees only."),
-    ("AXIS_?", "LOCKING_INDEXER_JOINT", "Joint that is unlocked for G0 moves of this axis."),
-];
 
 /// Whether an INI file is one of LinuxCNC: others are none of ours.
 pub fn is_machine_ini(text: &str) -> bool {
@@ -59,14 +27,11 @@ fn place(text: &str, offset: u32) -> (&str, u32, &str) {
         section = section_of(line).unwrap_or(section);
         here = (start, line);
     }
-    (section, here.0, here.1)
-}
-
-fn fits(pattern: &str, section: &str) -> bool {
-    match pattern.strip_suffix('?') {
-        Some(head) => section.strip_prefix(head).is_some_and(|axis| axis.len() == 1),
-        None => pattern == section,
+    // Behind the last line break a line is about to begin.
+    if offset as usize >= text.len() && (text.is_empty() || text.ends_with('\n')) {
+        here = (text.len() as u32, "");
     }
+    (section, here.0, here.1)
 }
 
 /// Explains the key of the line at a byte.
@@ -78,8 +43,8 @@ pub fn ini_hover(text: &str, offset: u32) -> Option<Hover> {
     if offset > start + line.len() as u32 {
         return None;
     }
-    let known = KEYS.iter().find(|(s, k, _)| *k == key && fits(s, section));
-    let what = known.map_or("Programs do not depend on it here, unless they read it as `#<_ini[section]key>`.", |k| k.2);
+    let known = IniKey::find(section, key);
+    let what = known.map_or("Programs do not depend on it here, unless they read it as `#<_ini[section]key>`.", |k| k.what);
     Some(Hover { span, text: format!("**[{section}] {key}**\n\n{what}\n\n*LinuxCNC 2.9 documentation, INI configuration*") })
 }
 
@@ -87,24 +52,43 @@ pub fn ini_hover(text: &str, offset: u32) -> Option<Hover> {
 pub fn ini_complete(text: &str, offset: u32) -> Vec<Completion> {
     let (section, start, line) = place(text, offset);
     let before = line.get(..(offset.saturating_sub(start)) as usize).unwrap_or(line);
-    if before.contains(['=', '#', ';', '[']) {
-        return Vec::new();
-    }
     let typed = before.trim_start();
     let replace = Span::new(offset - typed.len() as u32, offset);
-    let known = KEYS.iter().filter(|(s, k, _)| fits(s, section) && k.starts_with(&typed.to_uppercase()));
+    if let Some(name) = typed.strip_prefix('[').filter(|n| !n.contains(']')) {
+        return sections(name, replace, line.get(before.len()..).is_some_and(|rest| rest.starts_with(']')));
+    }
+    if let Some((key, value)) = typed.split_once('=').filter(|_| !typed.starts_with(['#', ';'])) {
+        return values(section, key.trim(), value.trim_start(), offset);
+    }
+    if typed.contains(['#', ';', '[']) {
+        return Vec::new();
+    }
+    let known = IniKey::all().iter().filter(|k| k.stands_in(section) && k.name.starts_with(&typed.to_uppercase()));
     known
-        .map(|(_, key, what)| Completion {
-            label: (*key).into(),
-            insert: format!("{key} = "),
-            snippet: false,
-            detail: String::new(),
-            documentation: (*what).into(),
-            kind: CompletionKind::Word,
-            rank: 0,
-            replace,
-        })
+        .map(|k| item(k.name, format!("{} = ", k.name), k.what, replace))
         .collect()
+}
+
+fn item(label: &str, insert: String, documentation: &str, replace: Span) -> Completion {
+    Completion { label: label.into(), insert, snippet: false, detail: String::new(), documentation: documentation.into(), kind: CompletionKind::Word, rank: 0, replace }
+}
+
+/// Sections that have keys of the table; `closed`: the bracket behind them is there.
+fn sections(typed: &str, mut replace: Span, closed: bool) -> Vec<Completion> {
+    replace.end += u32::from(closed);
+    let mut names: Vec<&str> = IniKey::all().iter().map(|k| k.section).collect();
+    names.dedup();
+    let shown = |name: &str| name.replace('?', "X");
+    let fits = names.into_iter().map(shown).filter(|n| n.starts_with(&typed.to_uppercase()));
+    fits.map(|n| item(&n, format!("[{n}]"), "", replace)).collect()
+}
+
+/// What a switch can be.
+fn values(section: &str, key: &str, typed: &str, offset: u32) -> Vec<Completion> {
+    let replace = Span::new(offset - typed.len() as u32, offset);
+    let known = IniKey::find(section, key).filter(|k| matches!(k.kind, IniKind::Flag | IniKind::Switch));
+    let choices = known.into_iter().flat_map(|k| ["1", "0"].map(|v| (v, k.what)));
+    choices.filter(|(v, _)| v.starts_with(typed)).map(|(v, what)| item(v, v.into(), what, replace)).collect()
 }
 
 /// Its sections.
@@ -158,6 +142,11 @@ mod tests {
         assert_eq!(ini_folds(ini), [Fold { first: 1, last: 3, comment: false }, Fold { first: 5, last: 7, comment: false }]);
         let keys: Vec<String> = ini_complete(&ini.replace("HOME = 0", "MAX_"), at("HOME") + 4).into_iter().map(|c| c.label).collect();
         assert_eq!(keys, ["MAX_LIMIT", "MAX_VELOCITY", "MAX_ACCELERATION"]);
+        let labels = |text: &str| ini_complete(text, text.len() as u32).into_iter().map(|c| c.label).collect::<Vec<_>>();
+        assert_eq!(labels("[EMCIO]\nTOOL_CHANGE_Q"), ["TOOL_CHANGE_QUILL_UP"]);
+        assert!(labels("[EMCIO]\n").contains(&"TOOL_TABLE".to_string()) && labels("[EMCIO]\n# T").is_empty());
+        assert_eq!(labels("[EMCIO]\nTOOL_CHANGE_AT_G30 = "), ["1", "0"]);
+        assert_eq!(labels("[EMCIO]\n[RS"), ["RS274NGC"]);
         assert!(is_machine_ini(ini) && !is_machine_ini("[core]\nx = 1\n"));
         let vars = "5161\t0.0\n5221\t12.5\n";
         let h = vars_hover(vars, 12).expect("a parameter");

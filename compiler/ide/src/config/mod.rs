@@ -100,11 +100,24 @@ fn place(text: &str, offset: u32) -> Option<Place<'_>> {
 /// The schema of a table or key, by names.
 fn node<'v>(mut at: &'v Value, path: &[String]) -> Option<&'v Value> {
     for name in path {
-        at = inner(at);
-        at = at.get("properties").and_then(|p| p.get(name)).or_else(|| at.get("additionalProperties").filter(|v| v.is_object()))?;
+        at = child(inner(at), name)?;
     }
     Some(inner(at))
 }
+
+/// What a table holds under a name: a key of its own, or one of many alike.
+fn child<'v>(table: &'v Value, name: &str) -> Option<&'v Value> {
+    table.get("properties").and_then(|p| p.get(name)).or_else(|| alike(table))
+}
+
+/// What all tables are that a table holds under any name.
+fn alike(table: &Value) -> Option<&Value> {
+    let patterns = table.get("patternProperties").and_then(Value::as_object).and_then(|p| p.values().next());
+    patterns.or_else(|| table.get("additionalProperties")).filter(|v| v.is_object())
+}
+
+/// Words that `[io]` mostly has tables for.
+const IO_WORDS: [&str; 9] = ["M3", "M4", "M5", "S", "M6", "M7", "M8", "M9", "G38"];
 
 /// What the members of a list of tables look like.
 fn inner(at: &Value) -> &Value {
@@ -152,8 +165,7 @@ pub fn hover(schema: Schema, text: &str, offset: u32) -> Option<Hover> {
 /// As [`node`], but a list of tables stays what it is.
 fn raw_node<'v>(root: &'v Value, path: &[String]) -> Option<&'v Value> {
     let (last, above) = path.split_last()?;
-    let table = node(root, above)?;
-    table.get("properties").and_then(|p| p.get(last)).or_else(|| table.get("additionalProperties").filter(|v| v.is_object()))
+    child(node(root, above)?, last)
 }
 
 fn kind_text(v: &Value) -> String {
@@ -162,7 +174,9 @@ fn kind_text(v: &Value) -> String {
 }
 
 fn choices(v: &Value) -> Option<Vec<String>> {
-    let list = v.get("enum").and_then(Value::as_array)?;
+    let Some(list) = v.get("enum").and_then(Value::as_array) else {
+        return v.get("anyOf").and_then(Value::as_array)?.iter().find_map(choices);
+    };
     Some(list.iter().map(|c| c.as_str().map_or_else(|| c.to_string(), str::to_string)).collect())
 }
 
@@ -212,6 +226,11 @@ pub fn complete(schema: Schema, text: &str, offset: u32) -> Vec<Completion> {
         path.push(key.trim().to_string());
         let Some(v) = raw_node(schema.json(), &path) else { return Vec::new() };
         let typed = typed.trim_start();
+        // Of a list, the member that is written.
+        let (typed, v) = match typed.starts_with('[') {
+            true => (typed.rsplit(['[', ',']).next().unwrap_or(typed).trim_start(), v.get("items").unwrap_or(v)),
+            false => (typed, v),
+        };
         let quoted = typed.starts_with('"');
         let start = typed.trim_start_matches('"');
         let behind = u32::from(quoted && p.line.get(p.column..).is_some_and(|r| r.starts_with('"')));
@@ -234,7 +253,7 @@ pub fn complete(schema: Schema, text: &str, offset: u32) -> Vec<Completion> {
         .collect();
     let required: Vec<&str> = table.get("required").and_then(Value::as_array).into_iter().flatten().filter_map(Value::as_str).collect();
     let Some(properties) = table.get("properties").and_then(Value::as_object) else { return Vec::new() };
-    let leaf = |v: &Value| inner(v).get("properties").is_none();
+    let leaf = |v: &Value| inner(v).get("properties").is_none() && alike(inner(v)).is_none();
     properties
         .iter()
         .filter(|(k, v)| k.starts_with(typed) && !present.contains(&k.as_str()) && leaf(v))
@@ -252,11 +271,15 @@ fn tables(root: &Value) -> Vec<(String, bool, String)> {
         let Some(properties) = at.get("properties").and_then(Value::as_object) else { return };
         for (k, v) in properties {
             let table = inner(v);
-            if table.get("properties").is_none() && table.get("additionalProperties").is_none_or(|a| !a.is_object()) {
+            if table.get("properties").is_none() && alike(table).is_none() {
                 continue;
             }
             let name = if prefix.is_empty() { k.clone() } else { format!("{prefix}.{k}") };
             let what = v.get("description").and_then(Value::as_str).unwrap_or("").to_string();
+            if table.get("patternProperties").is_some() {
+                out.extend(IO_WORDS.iter().map(|w| (format!("{name}.{w}"), false, format!("What {w} does."))));
+                continue;
+            }
             out.push((name.clone(), v.get("items").is_some(), what));
             if depth < 4 {
                 walk(table, &name, depth + 1, out);
@@ -281,6 +304,11 @@ fn values(schema: Schema, path: &[String], v: &Value) -> Vec<(String, String)> {
     match (schema, path.last().map(String::as_str)) {
         (Schema::Project, Some("machine")) | (Schema::Machine, Some("extends")) => machines(),
         (Schema::Project, Some("dialect")) => gr_spec::Dialect::all().iter().map(|d| (quote(d.id), d.title.to_string())).collect(),
+        (Schema::Project, Some(list @ ("allow" | "warn" | "deny"))) => {
+            let may = |d: &gr_spec::DiagnosticDef| d.lint && (list == "deny" || d.severity != gr_spec::Severity::Error);
+            let all = gr_spec::Code::all().map(|c| c.def()).filter(|d| may(d));
+            all.map(|d| (quote(d.slug), gr_spec::open(d.message))).collect()
+        }
         (Schema::Project, Some("target")) => gr_spec::TargetDef::all().iter().map(|t| (quote(t.id), t.title.to_string())).collect(),
         _ => Vec::new(),
     }
@@ -351,6 +379,16 @@ mod tests {
         let text = TEXT.replace("\"dh\"", "\"");
         let kinds = labels(&text, text.find("kind = \"").unwrap() + 8);
         assert!(kinds.contains(&"scara".to_string()), "{kinds:?}");
+        let text = format!("{TEXT}orientation = \"").replace("[[joint]]\nname = \"X\"\n\n", "").replace("[kinematics]\nkind = \"dh\"\n\n", "");
+        assert_eq!(labels(&text, text.len()), ["fixed", "abc-euler-xyz"]);
+        let text = format!("{TEXT}[io.M");
+        assert!(labels(&text, text.len()).contains(&"io.M8".to_string()));
+        let text = format!("{TEXT}[io.M3]\nsi");
+        assert_eq!(labels(&text, text.len()), ["signal"]);
+        assert!(hover(Schema::Machine, &text, text.len() as u32 - 7).is_some());
+        let text = "schema = 1\n[lints]\nallow = [\"spindle/stopped\", \"feed/";
+        let lints: Vec<String> = complete(Schema::Project, text, text.len() as u32).into_iter().map(|c| c.label).collect();
+        assert!(!lints.is_empty() && lints.iter().all(|l| l.starts_with("feed/")), "{lints:?}");
         let text = format!("{TEXT}[fr");
         assert!(labels(&text, text.len()).contains(&"frames".to_string()));
         assert_eq!(outline(TEXT).iter().map(|i| (i.name.as_str(), i.detail.as_str())).collect::<Vec<_>>(), [("kinematics", ""), ("joint", "X")]);

@@ -245,6 +245,7 @@ fn label(doc: Doc<'_>, line: &LineOf<'_>, before: &str, offset: u32, around: &Ar
     }
     let replace = Span::new(offset - typed.len() as u32, offset);
     let typed = typed.to_lowercase();
+    let first = go_on(doc, line.line, &rest[..end], around);
     let fits = gr_spec::controls().iter().filter(|c| c.name.to_lowercase().starts_with(&typed));
     let items = fits.map(|c| Completion {
         label: c.name.into(),
@@ -253,10 +254,36 @@ fn label(doc: Doc<'_>, line: &LineOf<'_>, before: &str, offset: u32, around: &Ar
         detail: c.form.into(),
         documentation: c.what.into(),
         kind: CompletionKind::Keyword,
-        rank: 1,
+        rank: u8::from(!first.contains(&c.name.to_lowercase().as_str())),
         replace,
     });
-    Some(items.collect())
+    let mut items: Vec<Completion> = items.collect();
+    items.sort_by_key(|c| c.rank);
+    Some(items)
+}
+
+/// Keywords that go on with what a label has begun above a line, or call what it names.
+fn go_on(doc: Doc<'_>, line: u32, label: &str, around: &Around<'_>) -> &'static [&'static str] {
+    const MOST_LINES: u32 = 2_000;
+    let wanted = format!("o{}", label.to_lowercase());
+    let word = |l: LineOf<'_>| {
+        let text = l.text().trim_start().to_lowercase();
+        let behind = text.strip_prefix(&wanted)?;
+        let word: String = behind.trim_start().chars().take_while(char::is_ascii_alphabetic).collect();
+        (!word.is_empty()).then_some(word)
+    };
+    let last = (line.saturating_sub(MOST_LINES)..line).rev().filter_map(|n| word(doc.line(n)?)).next();
+    match last.as_deref() {
+        Some("sub") => &["endsub", "return"],
+        Some("if" | "elseif") => &["elseif", "else", "endif"],
+        Some("else") => &["endif"],
+        Some("while") => &["endwhile", "break", "continue"],
+        Some("do") => &["while", "break", "continue"],
+        Some("repeat") => &["endrepeat", "break", "continue"],
+        Some("break" | "continue" | "return") => &["endwhile", "while", "endrepeat", "endsub"],
+        _ if names::subs(doc).iter().map(|s| label_text(&s.label)).chain(around.subs.iter().map(|s| s.0.clone())).any(|name| name == wanted) => &["call"],
+        _ => &["sub", "if", "while", "do", "repeat", "call"],
+    }
 }
 
 fn functions(typed: &str, replace: Span, open: bool) -> Vec<Completion> {

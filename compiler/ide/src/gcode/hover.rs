@@ -207,7 +207,13 @@ fn parameter(p: &Parameter, facts: &Facts<'_>) -> String {
     if let Some(def) = def {
         text.push_str(&format!("\n\n{}", def.what));
     } else if let Parameter::Named(n) = p {
-        let scope = if n.starts_with('_') { "Global: the same in all subroutines." } else { "Local to its subroutine." };
+        let bare = n.to_ascii_lowercase();
+        let scope = match () {
+            () if bare.starts_with("_ini[") => "A value of the machine's INI file, where `[RS274NGC] INI_VARS` allows it.",
+            () if bare.starts_with("_hal[") => "A value of the machine's HAL, where `[RS274NGC] HAL_PIN_VARS` allows it: known at run time alone.",
+            () if n.starts_with('_') => "Global: the same in all subroutines.",
+            () => "Local to its subroutine.",
+        };
         text.push_str(&format!("\n\n{scope}"));
     }
     if let Some(run) = facts.run

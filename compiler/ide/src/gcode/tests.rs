@@ -74,6 +74,10 @@ fn codes_and_parameters() {
     assert!(!labels("G90 G9").contains(&"G91".to_string()), "a second code of a group is an error");
     assert!(labels("G1 X#<_x").contains(&"#<_x>".to_string()));
     assert!(labels("").len() > 50);
+    let first = |text: &str, n: usize| labels(text).into_iter().take(n).collect::<Vec<_>>();
+    assert_eq!(first("o1 if [1]\no1 ", 3), ["elseif", "else", "endif"]);
+    assert_eq!(first("o1 while [1]\n o2 if [1]\n o2 endif\nO1 ", 1), ["endwhile"]);
+    assert_eq!(first("o<a> sub\no<a> endsub\no<a> ", 1), ["call"]);
 }
 
 /// A program after a proposal was accepted at the mark.

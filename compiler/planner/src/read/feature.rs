@@ -459,7 +459,7 @@ impl<'m> Reader<'m> {
         let Some(number) = node.node(attribute).filter(|n| n.attr("its_parameter_unit").is_some()) else { return };
         let unit = number.string("its_parameter_unit").trim().to_lowercase();
         if !["", "mm", "millimetre", "millimeter"].contains(&unit.as_str()) {
-            self.no_effect(number, "its_parameter_unit", "lengths are millimeters");
+            self.no_effect(number, "its_parameter_unit", "lengths are millimetres");
         }
     }
 
