@@ -361,7 +361,8 @@ fn program(target: &str, robot: usize, moves: &[Move], lines: Option<u64>) -> Ro
         }
         if let Move::Probe { shift, speed, .. } = m {
             // Two probes after each other, the second of which asks whether the first has found something, read as one that must.
-            let twice = matches!(b.program.steps.last(), Some(s) if matches!(s.action, Action::Probe { .. }));
+            let moved = |s: &&gr_robot::Step| matches!(s.action, Action::Probe { .. } | Action::Joint { .. } | Action::Linear { .. } | Action::Arc { .. });
+            let twice = matches!(b.program.steps.iter().rev().find(moved), Some(s) if matches!(s.action, Action::Probe { .. }));
             if twice || !matches!(target, "rapid" | "krl" | "fanuc-ls" | "urscript") {
                 m = Move::Line { shift, turn: [0.0; 3], speed, zone: None };
             }
