@@ -731,7 +731,7 @@ fn spread_joints(machine: &Machine, n: u32) -> Vec<f64> {
     machine.joints.iter().zip(BASES.iter().cycle()).map(one).collect()
 }
 
-fn halton(mut n: u32, base: u32) -> f64 {
+pub(crate) fn halton(mut n: u32, base: u32) -> f64 {
     let (mut share, mut out) = (1.0, 0.0);
     while n > 0 {
         share /= f64::from(base);

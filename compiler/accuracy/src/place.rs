@@ -8,7 +8,7 @@ pub use arm::{Arm, Part, around};
 pub use mill::Mill;
 
 use crate::error::Budget;
-use crate::map::Probe;
+use crate::map::{Probe, halton};
 use gr_machine::math::{V3, dot};
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
@@ -26,6 +26,8 @@ pub struct Found {
     /// The greatest error of the cuts (rule sum), mm, at the points that are looked at; none = the machine file has no accuracy
     /// data. A report says it along the whole path.
     pub error: Option<f64>,
+    /// Distances of the grid that the search began on, mm, and from how many of its best places it went on.
+    pub looked: (V3, usize),
 }
 
 /// What is best.
@@ -58,6 +60,8 @@ pub trait Reach: Sync {
     fn fits(&self, at: V3) -> bool;
     /// How far the part may be moved any way from a place that fits, and how finely that was looked at, mm; it is about `about`.
     fn margin(&self, at: V3, about: f64) -> (f64, f64);
+    /// From how many of the best places of a grid a search for the least error goes on: as many as take some seconds.
+    fn starts(&self) -> usize;
     /// Whether [`Reach::free`] is exact, and no more in the middle between two places than the less of theirs.
     fn exact(&self) -> bool;
     /// The greatest error there, mm, of the points looked at; none when one is out of reach or it is more than `most`.
@@ -109,6 +113,21 @@ struct Best {
     at: V3,
     /// About how far it is free any way, mm.
     free: f64,
+}
+
+/// Rounds of the search for the least error, at most, and the step at which it ends, mm.
+const ROUNDS: usize = 90;
+const FINE: f64 = 0.02;
+/// From a place that was refused so much of the way back.
+const BACK: f64 = 0.3;
+
+/// Ways along the axes, edges and diagonals of a cube, and for a round some others.
+fn ways(round: Option<usize>) -> impl Iterator<Item = V3> {
+    const OTHERS: usize = 12;
+    let cube = (0..27).map(|n| [n % 3, n / 3 % 3, n / 9].map(|v| f64::from(v) - 1.0));
+    let first = round.map_or(0, |r| u32::try_from(r * OTHERS + 1).unwrap_or(1));
+    let others = (first..first + if round.is_some() { OTHERS as u32 } else { 0 }).map(|n| [2, 3, 5].map(|base| 2.0 * halton(n, base) - 1.0));
+    cube.chain(others)
 }
 
 struct Search<'a> {
@@ -185,24 +204,40 @@ impl Search<'_> {
         out
     }
 
-    /// Places about a good one, nearer and nearer to the best of them.
+    /// Places about a good one, nearer and nearer to the best of them. The largest of many errors has creases along which only
+    /// some ways lead down: for it other ways are tried each time, and once more the way that was good.
     fn refined(&self, from: Best) -> Best {
         let mut best = from;
         let mut step = self.step().map(|s| s / 2.0);
-        for _ in 0..24 {
+        for round in 0..if self.by_error { ROUNDS } else { 24 } {
             let around = best.at;
-            for way in 0..27 {
-                let by = [way % 3, way / 3 % 3, way / 9].map(|v| f64::from(v) - 1.0);
-                let at = [0, 1, 2].map(|i| around[i] + by[i] * step[i]);
-                if let Some(better) = self.worth(at, best.worth + if self.by_error { 1e-14 } else { 1e-9 }).filter(|_| self.reach.fits(at)) {
-                    best = better;
-                }
+            for by in ways(if self.by_error { Some(round) } else { None }) {
+                self.better(&mut best, [0, 1, 2].map(|i| around[i] + by[i] * step[i]));
             }
             if best.at == around {
                 step = step.map(|s| s / 2.0);
+                if self.by_error && step.iter().all(|s| *s < FINE) {
+                    break;
+                }
+            } else if self.by_error {
+                let on = [0, 1, 2].map(|i| 2.0 * best.at[i] - around[i]);
+                self.better(&mut best, on);
             }
         }
         best
+    }
+
+    /// Takes a place that is worth more.
+    fn better(&self, best: &mut Best, at: V3) {
+        let least = best.worth + if self.by_error { 1e-14 } else { 1e-9 };
+        if let Some(found) = self.worth(at, least).filter(|_| self.reach.fits(at)) {
+            *best = found;
+        }
+    }
+
+    /// From how many places of the grid the search goes on: the largest margin has few hills.
+    fn starts(&self) -> usize {
+        if self.by_error { self.reach.starts() } else { 1 }
     }
 
     /// The same worth in the middle of where it is that much, axis by axis: of many places that are as free the one that people
@@ -246,6 +281,11 @@ fn told(at: V3, reach: &dyn Reach) -> V3 {
     if reach.fits(round) { round } else { at }
 }
 
+/// Whether a place is within a step of one of them.
+fn near_any(places: &[V3], at: V3, step: V3) -> bool {
+    places.iter().any(|r| (0..3).all(|i| (r[i] - at[i]).abs() <= step[i] * 1.01))
+}
+
 /// The best place of a part: looked for on a grid of the work space, by the distance of its points from what is out of
 /// reach or by its error, then refined; there every point is looked at. A place that is not `allowed` is left, and the search
 /// goes on with the next best away from it, at most `tries` times. None that is allowed: the best of those that were not.
@@ -269,35 +309,56 @@ pub fn place(
     }
     let step = search.step();
     let mut refused: Vec<V3> = Vec::new();
-    while let Some(candidate) = heap.pop() {
-        let at = search.node(candidate.node);
-        let known = |at: V3| refused.iter().any(|r| (0..3).all(|i| (r[i] - at[i]).abs() <= step[i] * 1.01));
-        if known(at) {
-            continue;
+    // What the search went on to from the best places of the grid, and from where.
+    let mut pool: Vec<(Best, V3)> = Vec::new();
+    let mut looked = 0;
+    // Beside a refused place of much margin there is little to find; the least error may be just beside one.
+    let beside = if by_error { [1.0; 3] } else { step };
+    loop {
+        while (looked < search.starts() || pool.is_empty())
+            && let Some(candidate) = heap.pop()
+        {
+            let at = search.node(candidate.node);
+            if near_any(&refused, at, beside) {
+                continue;
+            }
+            if !candidate.exact {
+                let exact =
+                    search.worth(at, f64::NEG_INFINITY).map(|b| Candidate { worth: b.worth, exact: true, ..candidate });
+                heap.extend(exact);
+                continue;
+            }
+            if !reach.fits(at) {
+                continue;
+            }
+            let free = reach.free(at, Look::All, 0.0).unwrap_or(0.0);
+            let here = Best { worth: candidate.worth, at, free };
+            let best = Some(search.centred(search.refined(here))).filter(|b| !near_any(&refused, b.at, beside));
+            pool.push((best.unwrap_or(here), at));
+            looked += 1;
+            progress(looked, search.starts().max(looked));
         }
-        if !candidate.exact {
-            let exact =
-                search.worth(at, f64::NEG_INFINITY).map(|b| Candidate { worth: b.worth, exact: true, ..candidate });
-            heap.extend(exact);
-            continue;
-        }
-        if !reach.fits(at) {
-            continue;
-        }
-        let free = reach.free(at, Look::All, 0.0).unwrap_or(0.0);
-        let here = Best { worth: candidate.worth, at, free };
-        let best = Some(search.centred(search.refined(here))).filter(|b| !known(b.at)).unwrap_or(here);
+        let Some(n) = (0..pool.len()).max_by(|a, b| pool[*a].0.worth.total_cmp(&pool[*b].0.worth).then(b.cmp(a))) else { break };
+        let (best, from) = pool.swap_remove(n);
         let position = told(best.at, reach);
+        if near_any(&refused, position, beside) {
+            continue;
+        }
         if allowed(position) {
             let (margin, apart) = reach.margin(position, best.free);
             // Never more than there is.
             let margin = (libm::floor((margin - 1e-3) * 10.0) / 10.0).max(0.0);
             let error = reach.error(budget, position, Look::All, f64::INFINITY);
-            return Ok(Found { position, margin, apart, error });
+            return Ok(Found { position, margin, apart, error, looked: (step, looked) });
         }
         refused.push(position);
         if refused.len() >= tries {
             break;
+        }
+        if by_error {
+            // Back to where it came from: the least error tends to the border of what can be done.
+            let back = [0, 1, 2].map(|i| best.at[i] + BACK * (from[i] - best.at[i]));
+            pool.extend(search.worth(back, f64::NEG_INFINITY).filter(|_| reach.fits(back)).map(|b| (b, from)));
         }
     }
     Err(refused.first().copied())

@@ -933,3 +933,19 @@ fn labels_and_boxes() {
     let svg = std::fs::read_to_string(folder.path().join("s.svg")).unwrap();
     assert!(svg.contains("tool upright") && svg.contains("turned table") && svg.contains("rotary1.tilt-a (mrad)"), "{svg}");
 }
+
+/// The least error of a path along which an arm's tool turns is next to what can be planned; the text says how fine it
+/// was looked at. Of 439 random places the best has 302.8 µm.
+#[test]
+fn least_error_with_a_turning_tool() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = "format = 1\nid = \"test/irb\"\nextends = \"abb/irb2400\"\n[accuracy]\nsource = \"made up\"\njoints = [0.01, 0.01, 0.01, 0.01, 0.01, 0.01]\ngrade = 7\n";
+    std::fs::write(folder.path().join("irb.toml"), file).unwrap();
+    std::fs::write(folder.path().join("one.tbl"), "T1 P1 Z60 D10\n").unwrap();
+    let program = "G21 G90 G94 F600\nT1 M6\nG43 H1\nS1000 M3\nG0 X0 Y0 Z0\nG1 X30 Y10\nG1 X60 B20 C40\nG1 Y20 Z-5 B-30 C180\nG1 X-30 Y5 C90 B0\nM5\nM2\n";
+    std::fs::write(folder.path().join("p.ngc"), program).unwrap();
+    let o = whole(&run(folder.path(), &["place", "p.ngc", "--machine=irb.toml", "-tone.tbl", "--aim=error", "-q"]));
+    assert!(o.contains("from its 12 best places"), "{o}");
+    let error: f64 = o.split("largest error of the path there: ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
+    assert!(error < 310.0, "{o}");
+}

@@ -307,6 +307,11 @@ impl Reach for Arm<'_> {
             .fold((f64::INFINITY, 0.0f64), |(m, a), (margin, apart)| (m.min(margin), a.max(apart)))
     }
 
+    fn starts(&self) -> usize {
+        let quick = self.parts.first().is_some_and(|p| crate::closed_form(p.probe.machine()));
+        if quick { 12 } else { 2 }
+    }
+
     fn exact(&self) -> bool {
         false
     }

@@ -381,6 +381,10 @@ impl Reach for Mill<'_> {
         (self.free(at, Look::All, f64::NEG_INFINITY).unwrap_or(0.0).max(0.0), 0.0)
     }
 
+    fn starts(&self) -> usize {
+        8
+    }
+
     fn exact(&self) -> bool {
         true
     }

@@ -101,9 +101,10 @@ pub fn run(global: &Global, args: &PlaceArgs) -> Exit {
     let Some(found) = found else { return Exit::Findings };
     let [x, y, z] = found.position;
     let error = error.map(|e| e * 1e3);
+    let error_known = error.is_some();
     super::print(&match args.format {
         TableFormat::Json => {
-            format!("{:#}\n", json!({ "machine": machine.id, "position": [x, y, z], "margin": found.margin, "margin_looked_at_every": found.apart, "error_um": error, "error_of": parts_of_error }))
+            format!("{:#}\n", json!({ "machine": machine.id, "position": [x, y, z], "margin": found.margin, "margin_looked_at_every": found.apart, "grid": found.looked.0, "starts": found.looked.1, "error_um": error, "error_of": parts_of_error }))
         }
         TableFormat::Csv => {
             format!("x mm,y mm,z mm,margin mm,error um\n{x},{y},{z},{:.3},{}\n", found.margin, error.map_or(String::new(), |e| format!("{e:.3}")))
@@ -115,8 +116,13 @@ pub fn run(global: &Global, args: &PlaceArgs) -> Exit {
                 None => "its machine file has no accuracy data: only reach was looked at\n".to_string(),
             };
             let how = if found.apart > 0.0 { format!("looked at every {:.1} mm", found.apart) } else { "by the limits of its axes".to_string() };
+            let ([dx, dy, dz], starts) = found.looked;
+            let looked = match aim {
+                Aim::Error if error_known => format!("the least error that was found: on a grid of {dx:.0} × {dy:.0} × {dz:.0} mm, then from its {starts} best places to 0.02 mm\n"),
+                _ => String::new(),
+            };
             format!(
-                "part's origin at X {x} Y {y} Z {z} mm in the base of {}{} (--part {x},{y},{z})\nfree to move {:.1} mm any way: every point of the path stays within reach ({how})\n{error}every move of the program can be made there, rapids too\n",
+                "part's origin at X {x} Y {y} Z {z} mm in the base of {}{} (--part {x},{y},{z})\nfree to move {:.1} mm any way: every point of the path stays within reach ({how})\n{error}{looked}every move of the program can be made there, rapids too\n",
                 machine.id,
                 if turns_part(&machine) { ", its table at zero" } else { "" },
                 found.margin
