@@ -19,7 +19,7 @@ pub fn format(text: &[u8]) -> Vec<u8> {
         let blank = white(text, at);
         let breaks = text[at..blank].iter().filter(|b| **b == b'\n').count();
         // A comment behind a statement stays on its line; one empty line between statements is kept.
-        let comment = text[blank..].starts_with(b"/*");
+        let comment = lex::comment(text, blank).is_some();
         if blank >= text.len() {
             break;
         }
@@ -94,7 +94,7 @@ pub fn renumber(text: &[u8]) -> Result<Vec<u8>, Vec<Fault>> {
                 end
             }
             b'\'' => lex::string(text, at).unwrap_or(at + 1),
-            b'/' if text[at..].starts_with(b"/*") => skip_comment(text, at),
+            b'/' if lex::comment(text, at).is_some() => skip_comment(text, at),
             b'<' => memchr::memchr2(b'>', b';', &text[at..]).map_or(at + 1, |n| at + n + 1),
             _ => at + 1,
         };
@@ -113,7 +113,7 @@ fn white(text: &[u8], mut at: usize) -> usize {
 }
 
 fn skip_comment(text: &[u8], at: usize) -> usize {
-    memchr::memmem::find(&text[at + 2..], b"*/").map_or(text.len(), |n| at + n + 4)
+    lex::comment(text, at).flatten().unwrap_or(text.len())
 }
 
 /// One past the `;`. A statement with a fault ends where the next one begins on a line of its own.
@@ -126,7 +126,7 @@ fn statement_end(text: &[u8], start: usize, faults: &[u32]) -> usize {
                 Some(end) => end,
                 None => return line_end(text, at),
             },
-            b'/' if text[at..].starts_with(b"/*") => skip_comment(text, at),
+            b'/' if lex::comment(text, at).is_some() => skip_comment(text, at),
             b'\n' | b'\r' if fault_between(faults, start, at) && next_statement(text, at) => return at,
             _ => at + 1,
         };
@@ -168,7 +168,7 @@ fn statement(text: &[u8], out: &mut Vec<u8>) {
             continue;
         }
         let word = b.is_ascii_alphanumeric() || matches!(b, b'_' | b'-' | b'.' | b'+' | b'!');
-        let comment = b == b'/' && text[at..].starts_with(b"/*");
+        let comment = b == b'/' && lex::comment(text, at).is_some();
         let end = match b {
             b'\'' => lex::string(text, at).unwrap_or(text.len()),
             _ if comment => skip_comment(text, at),

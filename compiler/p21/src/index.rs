@@ -67,9 +67,10 @@ pub(crate) fn skip_blank(text: &[u8], mut at: usize) -> usize {
     while let Some(b) = text.get(at) {
         match b {
             0..=0x20 => at += 1,
-            b'/' if text.get(at + 1) == Some(&b'*') => match memchr::memmem::find(&text[at + 2..], b"*/") {
-                Some(n) => at += n + 4,
-                None => return text.len(),
+            b'/' => match crate::lex::comment(text, at) {
+                Some(Some(end)) => at = end,
+                Some(None) => return text.len(),
+                None => break,
             },
             // Print control: a new line, a new page.
             b'\\' if matches!(text.get(at + 1..at + 3), Some(b"N\\" | b"F\\")) => at += 3,
@@ -109,11 +110,11 @@ fn statement_end(text: &[u8], mut at: usize) -> usize {
                     }
                 }
             },
-            _ if text.get(at + 1) == Some(&b'*') => match memchr::memmem::find(&text[at + 2..], b"*/") {
-                Some(m) => at += m + 4,
-                None => return text.len(),
+            _ => match crate::lex::comment(text, at) {
+                Some(Some(end)) => at = end,
+                Some(None) => return text.len(),
+                None => at += 1,
             },
-            _ => at += 1,
         }
     }
 }

@@ -67,6 +67,24 @@ pub(crate) fn peek(text: &[u8], mut at: usize) -> (u8, usize) {
     (0, at)
 }
 
+/// A comment that opens at `at`: one past it, or `Some(None)` where it never closes. Ignored bytes may stand between the two
+/// bytes of either end: a line may break anywhere.
+pub(crate) fn comment(text: &[u8], at: usize) -> Option<Option<usize>> {
+    let (star, open) = peek(text, at + 1);
+    if text.get(at) != Some(&b'/') || star != b'*' {
+        return None;
+    }
+    let mut from = open + 1;
+    while let Some(n) = memchr::memchr(b'*', text.get(from..).unwrap_or(&[])) {
+        let (slash, close) = peek(text, from + n + 1);
+        if slash == b'/' {
+            return Some(Some(close + 1));
+        }
+        from += n + 1;
+    }
+    Some(None)
+}
+
 /// What a number is, and one past it; `None` where the text is not a number.
 #[inline(always)]
 pub(crate) fn number(text: &[u8], start: usize) -> Option<(bool, usize)> {

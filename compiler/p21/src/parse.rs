@@ -207,10 +207,13 @@ impl<'t, const KEEP: bool> Parser<'t, KEEP> {
         self.at = skip_blank(self.text, self.at);
         if self.at == self.text.len() {
             // Either the end, or a comment that never closes.
-            if let Some(n) = memchr::memmem::rfind(&self.text[from..], b"/*")
-                && memchr::memmem::find(&self.text[from + n + 2..], b"*/").is_none()
-            {
-                self.unclosed_comment(from + n);
+            let mut at = from;
+            while at < self.text.len() {
+                match lex::comment(self.text, at) {
+                    Some(Some(end)) => at = end,
+                    Some(None) => return self.unclosed_comment(at),
+                    None => at += 1,
+                }
             }
         }
     }
@@ -293,6 +296,7 @@ impl<'t, const KEEP: bool> Parser<'t, KEEP> {
                 }
                 b'@' | b'<' => self.anchor().is_err(),
                 b if is(b, UPPER | LOWER) || b == b'!' => self.word().is_err(),
+                b'0'..=b'9' => self.bare_instance().is_err(),
                 b';' => {
                     self.unexpected("a statement: the last one has its `;`");
                     self.at += 1;
@@ -397,7 +401,36 @@ impl<'t, const KEEP: bool> Parser<'t, KEEP> {
 
     fn instance(&mut self) -> Result<(), Lost> {
         let start = self.at;
-        let digits = peek(self.text, start + 1).1;
+        self.numbered(start, peek(self.text, start + 1).1)
+    }
+
+    /// `31=A(…);`: the `#` is missing. One message; the instance is read.
+    #[cold]
+    #[inline(never)]
+    fn bare_instance(&mut self) -> Result<(), Lost> {
+        let start = self.at;
+        let digits = run(self.text, start, DIGIT);
+        let lost = self.unexpected("an instance (#n=…;) or a section keyword");
+        if !self.instances || self.text.get(skip_blank(self.text, digits)) != Some(&b'=') {
+            return Err(lost);
+        }
+        self.numbered(start, start)
+    }
+
+    /// `#31A(…);` or `#31:A(…);`: one message, and whether the instance can be read on.
+    #[cold]
+    #[inline(never)]
+    fn without_equals(&mut self) -> Result<(), Lost> {
+        let lost = self.unexpected("`=`");
+        if self.byte() == b':' {
+            self.at += 1;
+            self.blank();
+        }
+        let entity = is(self.byte(), UPPER | LOWER) && self.text.get(skip_blank(self.text, run(self.text, self.at, UPPER | LOWER | DIGIT))) == Some(&b'(');
+        if entity || self.byte() == b'(' { Ok(()) } else { Err(lost) }
+    }
+
+    fn numbered(&mut self, start: usize, digits: usize) -> Result<(), Lost> {
         let end = run(self.text, digits, DIGIT);
         if end == digits {
             self.at = digits;
@@ -411,10 +444,11 @@ impl<'t, const KEEP: bool> Parser<'t, KEEP> {
         }
         self.at = end;
         self.blank();
-        if self.byte() != b'=' {
-            return Err(self.unexpected("`=`"));
+        if self.byte() == b'=' {
+            self.at += 1;
+        } else {
+            self.without_equals()?;
         }
-        self.at += 1;
         self.blank();
         if id <= self.last_id {
             self.sorted = false;

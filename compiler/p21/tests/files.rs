@@ -67,6 +67,15 @@ fn one_mistake_one_message() {
     check("/* open\n#1=A();\n", &["8:1 p21/unterminated-comment"]);
 }
 
+/// The head of a statement is damaged: one message, and nothing that refers to it is without what it means.
+#[test]
+fn damaged_heads() {
+    for (head, place) in [("#2B(1);", "9:3"), ("#2:B(1);", "9:3"), ("2=B(1);", "9:1"), ("#2 (B(1)C());", "9:4"), ("#2==B(1);", "9:4")] {
+        let parsed = check(&format!("#1=A(#2);\n{head}\n#3=C(#2);\n"), &[&format!("{place} p21/unexpected")]);
+        assert!(parsed.find(2).is_some() && parsed.find(3).is_some(), "{head}");
+    }
+}
+
 #[test]
 fn five_faults_five_messages_and_the_healthy_stay() {
     let parsed = check(
@@ -106,6 +115,20 @@ fn meaning(text: &[u8]) -> String {
 fn broken_at_any_column_it_is_the_same_file() {
     let text = file("#12=CARTESIAN_POINT('it''s \\X2\\00D8\\X0\\',(1.5E+3,-20.25,.T.,#12));\n#13=(AB(1)C($,*,\"0F\"));\n");
     let whole = meaning(text.as_bytes());
+    broken_alike(&text, &whole);
+}
+
+#[test]
+fn comments_broken_at_any_column() {
+    // `/` and `*` of a comment's ends may stand on two lines: line ends are no part of the alphabet.
+    let text = file("/* one; #7=Z(); ** */#1=A(1,/**/*,2);/***/#2=B(/* it's */#1);/* last */\n");
+    let whole = meaning(text.as_bytes());
+    broken_alike(&text, &whole);
+    check("#1=A(1); /\r\n* #2=B(); *\r\n/ #3=C(#1);\n", &[]);
+    check("#1=A(1); /\n* open *\n", &["8:10 p21/unterminated-comment"]);
+}
+
+fn broken_alike(text: &str, whole: &str) {
     for width in 1..40 {
         let mut broken = Vec::new();
         for (n, b) in text.bytes().filter(|b| *b != b'\n').enumerate() {
