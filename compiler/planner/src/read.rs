@@ -148,9 +148,11 @@ impl<'m> Reader<'m> {
         self.in_range(node, attribute, v, f64::MIN_POSITIVE, "above zero")
     }
     pub fn in_range(&mut self, node: Node<'m>, attribute: &str, v: f64, low: f64, what: &str) -> Option<f64> {
-        if v.is_finite() && v >= low && v < 1e7 {
+        const MOST: f64 = 1e7;
+        if v.is_finite() && v >= low && v < MOST {
             return Some(v);
         }
+        let what = if v >= MOST { "a number that a machine can have" } else { what };
         self.say_at(code::PLAN_BAD_SIZE, node, attribute, &[&title(node), attribute, &v.to_string(), what]);
         None
     }
@@ -161,10 +163,10 @@ impl<'m> Reader<'m> {
         }
     }
     /// Told once in a file: nothing in it says which of two readings is meant.
-    pub fn units_are_open(&mut self, node: Node<'_>, iso: &str, other: &str) {
+    pub fn units_are_open(&mut self, node: Node<'_>, attribute: &str, iso: &str, other: &str) {
         if !self.units_said {
             self.units_said = true;
-            self.say_at(code::PLAN_UNITS_OPEN, node, "spindle", &[iso, other]);
+            self.say_at(code::PLAN_UNITS_OPEN, node, attribute, &[iso, other]);
         }
     }
 

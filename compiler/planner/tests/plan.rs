@@ -72,6 +72,25 @@ fn open_units_are_an_error() {
     assert!(plan(open.as_bytes(), FileId(0), &options(&open)).1.iter().any(|d| d.code == code::PLAN_UNITS_OPEN));
 }
 
+/// A cutting speed alone: 25 is an everyday value in m/min and no machine's in m/s on a small tool.
+#[test]
+fn a_cutting_speed_alone_has_two_readings() {
+    let alone = |v: &str| {
+        let text = PART1.replace("(0.04,.TCP.,$,-12.0", &format!("(0.04,.TCP.,{v},$"));
+        assert!(text != PART1);
+        let (planned, out) = plan(text.as_bytes(), FileId(0), &options(&text));
+        let open: Vec<String> = out.iter().filter(|d| d.code == code::PLAN_UNITS_OPEN).map(|d| d.message.clone()).collect();
+        (planned.is_some(), open)
+    };
+    for v in ["15.", "25.", "50.", "60."] {
+        let (made, open) = alone(v);
+        assert!(!made && open.len() == 1 && open[0].contains(" rpm"), "{v}: {open:?}");
+    }
+    for v in ["0.8", "1.8", "5.", "10."] {
+        assert_eq!(alone(v), (true, Vec::new()), "{v}");
+    }
+}
+
 /// An overlap is what the options say it is.
 #[test]
 fn overlaps() {

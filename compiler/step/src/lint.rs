@@ -408,7 +408,7 @@ impl<'m> Lints<'m, '_> {
             let args = vec![short(n), short(n.abs() * 60.0), short(n / 60.0)];
             self.once(code::STEP_SPINDLE_UNIT, t, v.span(), args);
         } else if let (Some(vc), Some(v)) = (vc, cutspeed)
-            && vc.abs() > 50.0
+            && (vc.abs() > 10.0 || d.is_some_and(|d| d > 0.0 && vc.abs() * 1000.0 / (PI * d) > 1000.0))
         {
             self.once(code::STEP_CUTSPEED_UNIT, t, v.span(), vec![short(vc), short(vc * 60.0), short(vc / 60.0)]);
         }

@@ -358,6 +358,9 @@ impl Emitter<'_> {
             (_, false) => state.feed * per / self.w.unit,
         };
         let text = self.w.number(value, self.w.places.max(6));
+        if value > 0.0 && text.bytes().all(|b| matches!(b, b'0' | b'.')) {
+            self.cannot("a feed so slow that its decimals are all zero", source);
+        }
         if text != self.feed || mode == FeedMode::Inverse || self.options.repeat_words {
             out.push(format!("F{text}"));
             self.feed = text;

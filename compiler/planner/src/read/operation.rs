@@ -12,6 +12,10 @@ const MOST_FEED_ON_RETRACT: f64 = 10.0;
 /// Largest cutting speed, m/s, and spindle speed, 1/s, that a mill may mean.
 const FASTEST: [f64; 2] = [50.0, 1000.0];
 
+/// Largest cutting speed, m/s, that is taken as it stands when no spindle speed says the same: 600 m/min. Above it nobody but
+/// the writer knows whether m/min were meant; everyday values in m/min are 10 to 300.
+const DOUBTFUL_CUT: f64 = 10.0;
+
 /// Largest feed per tooth that any mill takes, mm: face mills for high feeds come near it.
 const THICKEST: f64 = 4.0;
 
@@ -114,6 +118,9 @@ impl<'m> Reader<'m> {
         let ratio = |a: &str| strategy.and_then(|s| s.real(a));
         let depth = |a: &str| strategy.and_then(|s| s.real(a)).filter(|d| *d > 0.0);
         let stretch = |depth: Option<f64>, feed: Option<f64>| Some((as_ratio(feed?), depth?));
+        if let Some(v) = node.real("feed_on_retract") {
+            self.in_range(node, "feed_on_retract", v, f64::MIN_POSITIVE, "above zero");
+        }
         if let Some(v) = node.real("feed_on_retract").filter(|v| *v > MOST_FEED_ON_RETRACT) {
             self.no_effect(node, "feed_on_retract", &format!("{v} is read as {v} percent"));
         }
@@ -258,7 +265,7 @@ impl<'m> Reader<'m> {
                 [rpm, cut, feed].into_iter().flatten().collect::<Vec<_>>().join(", ")
             };
             let (a, b) = (show(60.0, 60.0, feed.unwrap_or(0.0) * 60_000.0), show(1.0, 1.0, feed.unwrap_or(0.0) * 1000.0));
-            self.units_are_open(node, &a, &b);
+            self.units_are_open(node, "spindle", &a, &b);
         }
         let per_minute = if iso { 60.0 } else { 1.0 };
         Technology {
@@ -435,7 +442,11 @@ impl<'m> Reader<'m> {
         // What no tooth can take: as a feed per revolution it may be meant.
         let rev = feed_mm.zip(speed.filter(|s| *s > 0.0)).filter(|_| iso && feed.is_some() && tool.teeth.is_some() && !tool.kind.contains("TAP"));
         let thick = rev.is_some_and(|(f, rpm)| f * 60.0 / rpm / teeth > THICKEST);
-        let open = thick || too_much.into_iter().any(|(v, most)| v.is_some_and(|v| v.abs() > most));
+        // A cutting speed alone: in m/min it may be an everyday one, and in m/s faster than spindles turn.
+        let alone = cut.filter(|_| spindle.is_none()).map(f64::abs);
+        let turns = by_cut.filter(|_| iso && alone.is_some()).unwrap_or(0.0) / 60.0;
+        let doubtful = iso && alone.is_some_and(|v| v > DOUBTFUL_CUT || turns > FASTEST[1]);
+        let open = thick || doubtful || too_much.into_iter().any(|(v, most)| v.is_some_and(|v| v.abs() > most));
         if open || spindle.zip(cut).is_some_and(|(n, vc)| !agree(n, vc, round)) {
             let (n, vc) = (spindle.unwrap_or(0.0), cut.unwrap_or(0.0));
             let by_cut = |v: f64| if round > 0.0 { v * 1000.0 / round } else { 0.0 };
@@ -443,7 +454,10 @@ impl<'m> Reader<'m> {
             let rpm = if cut.is_some() { by_cut(vc) } else { n.abs() };
             let iso = format!("{:.1} rpm, feed {:.1} mm/min", rps * 60.0, feed.unwrap_or(0.0) * 60_000.0);
             let other = format!("{rpm:.1} rpm, feed {:.1} mm/min", feed.or(per_rev).unwrap_or(0.0) * rpm);
-            self.units_are_open(node, &iso, &other);
+            self.units_are_open(node, if doubtful { "cutspeed" } else { "spindle" }, &iso, &other);
+        }
+        if let Some(v) = cut {
+            self.in_range(node, "cutspeed", v, f64::MIN_POSITIVE, "above zero");
         }
         for (a, v) in [("feedrate", feed), ("feedrate_per_tooth", tooth)] {
             if let Some(v) = v {
