@@ -638,11 +638,12 @@ fn planned(o: &mut rs274ngc::Options, plan: &crate::exchange::Plan) {
 /// The motion as a process plan with explicit tool paths.
 fn stepnc(motion: &Motion, unit: &Unit, options: &TargetOptions, name: &str) -> Made {
     let unit_mm = unit.unit_mm();
-    let row = |t: &gr_interp::Tool| (t.number, t.diameter * unit_mm, t.offset[2] * unit_mm);
-    let number = |t: &Tool| i32::try_from(t.number).unwrap_or(i32::MAX);
     let tools = match &motion.plan {
-        Some(plan) => plan.tools.iter().map(|t| (number(t), t.diameter, t.length.unwrap_or(0.0))).collect(),
-        None => unit.setup.tools.rows.iter().skip(1).filter(|t| &*t.comment != gr_interp::ASSUMED).map(row).collect(),
+        Some(plan) => plan.tools.iter().map(crate::tools::described).collect(),
+        None => {
+            let rows = unit.setup.tools.rows.iter().skip(1).filter(|t| &*t.comment != gr_interp::ASSUMED);
+            rows.map(|t| crate::tools::described_row(t, unit_mm)).collect()
+        }
     };
     let o = gr_planner::stepnc::Options {
         name: name.to_string(),
@@ -652,7 +653,19 @@ fn stepnc(motion: &Motion, unit: &Unit, options: &TargetOptions, name: &str) -> 
     };
     let texts = texts(motion);
     let place = |s: Source| gr_backends::Sources::place(&texts, s);
-    gr_planner::stepnc::write_at(&motion.program, &o, &place).map(|(text, notes)| (one(text.into_bytes()), notes))
+    let mut said = gr_robot::Coordinates::new(&motion.program);
+    let mut begun = false;
+    let mut words = |v: &gr_ir::View<'_, '_>| {
+        said.step(&motion.program, v, &texts);
+        let b = said.brought();
+        let mut words = gr_planner::stepnc::Words { work: b.work, machine: b.machine, hidden: b.hidden };
+        if motion.plan.is_some() && v.op.moves() && !std::mem::replace(&mut begun, true) {
+            // A plan's first way goes up from wherever the machine stands.
+            words.work = [false, false, true];
+        }
+        words
+    };
+    gr_planner::stepnc::write_at(&motion.program, &o, &place, &mut words).map(|(text, notes)| (one(text.into_bytes()), notes))
 }
 
 /// Work offsets and tools that the control has in store, in mm and rad.

@@ -2,6 +2,7 @@
 //! that names no other type or edge radius.
 
 use gr_interp::ToolTable;
+use gr_planner::stepnc::Described;
 use gr_planner::{Loaded, Tool};
 use gr_text::{Diagnostic, FileId, code};
 
@@ -149,6 +150,35 @@ const TYPES: [(u32, &[&str]); 21] = [
     (14, &["TAPEREDENDMILL"]),
     (15, &["THREADMILL"]),
 ];
+
+/// The types as entities of part 111 of 2002, row by row.
+const ENTITIES: [&str; TYPES.len()] = [
+    "ENDMILL", "FACEMILL", "BALL_ENDMILL", "BULLNOSE_ENDMILL", "TWIST_DRILL", "SPADE_DRILL", "CENTERDRILL", "CENTERDRILL", "COUNTERSINK",
+    "COUNTERSINK", "COUNTERBORE", "REAMER", "TAPERED_REAMER", "TAP", "TAPERED_TAP", "BORING_TOOL", "T_SLOT_MILL", "SIDE_MILL",
+    "DOVETAIL_MILL", "TAPERED_ENDMILL", "THREAD_MILL",
+];
+
+fn entity(dense: &str) -> String {
+    type_of(dense).map_or("ENDMILL", |(row, _)| ENTITIES[row]).to_string()
+}
+
+/// A tool of a plan as a plan describes it.
+pub fn described(tool: &Tool) -> Described {
+    let number = i32::try_from(tool.number).unwrap_or(i32::MAX);
+    let length = tool.length.unwrap_or(0.0);
+    Described { number, kind: entity(&dense(&tool.kind)), diameter: tool.diameter, length, edge_radius: tool.edge_radius }
+}
+
+/// A row of a tool table, with what its remark says, as a plan describes it; `unit` is that of the table, mm.
+pub fn described_row(row: &gr_interp::Tool, unit: f64) -> Described {
+    Described {
+        number: row.number,
+        kind: entity(&kind_in(&row.comment).unwrap_or_default()),
+        diameter: row.diameter * unit,
+        length: row.offset[2] * unit,
+        edge_radius: radius_in(&row.comment).unwrap_or(0.0),
+    }
+}
 
 /// Row of the table and group of a type.
 fn type_of(kind: &str) -> Option<(usize, u32)> {

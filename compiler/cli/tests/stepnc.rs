@@ -1,5 +1,8 @@
 //! STEP-NC files as users of the command meet them: every target, the published systems, bad files, the filter.
 
+#[path = "stepnc/back.rs"]
+mod back;
+
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 
@@ -296,7 +299,7 @@ fn g_code_to_stepnc_and_back() {
     let o = f.run(&["diff", "part.ngc", "back.ngc", "--tools", "part.tbl", "--tolerance", "1e-6"]);
     insta::assert_snapshot!("there_and_back_diff", out(&o));
     // What STEP-NC has no word for.
-    f.put("tap.ngc", "G21 G90 T1 M6 S500 M3\nG0 X0 Y0 Z5\nG33.1 Z-10 K1\nM62 P1\nM5\nM2\n");
+    f.put("tap.ngc", "G21 G90 T1 M6 S500 M3\nG0 X0 Y0 Z5\nG1 Z4 F100\nG33.1 Z-10 K1\nM62 P1\nM5\nM2\n");
     insta::assert_snapshot!("no_counterpart", f.refused(&["build", "tap.ngc", "--target", "stepnc", "-o", "tap.p21"]));
     let o = f.run(&["build", "tap.ngc", "--target", "stepnc", "--lossy", "-o", "tap.p21", "--message-format", "short"]);
     assert!(code(&o) == 0 && err(&o).matches("E0498").count() >= 2 && f.path("tap.p21").is_file(), "{}", err(&o));

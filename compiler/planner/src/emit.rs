@@ -13,8 +13,9 @@ pub const TINY: f64 = 1e-9;
 const CLEARANCE: f64 = 1.0;
 /// Sweep of an arc whose end says how far it goes.
 const BY_ITS_END: f64 = 1e-3;
-/// Chords of an arc as it is taken off the block: this far apart at most, rad.
+/// Chords of an arc as it is taken off the block: this far apart at most, rad, and no further from it than this, mm.
 const CHORD: f64 = 0.2;
+const CHORD_ERROR: f64 = 0.01;
 
 pub(crate) struct Emit<'a> {
     pub b: Builder,
@@ -149,6 +150,10 @@ impl<'a> Emit<'a> {
     pub fn blocked(&self, a: [f64; 3], b: [f64; 3]) -> Option<f64> {
         self.stock.as_ref()?.blocks(self.upright()?, a, b)
     }
+    /// The same with what may stand close beside the way.
+    fn may_be_blocked(&self, a: [f64; 3], b: [f64; 3]) -> Option<f64> {
+        self.stock.as_ref()?.may_block(self.upright()?, a, b)
+    }
     /// Rapid as it is written, whatever is in its way.
     pub fn rapid_as_written(&mut self, to: [f64; 3]) {
         if !self.same(to) {
@@ -165,8 +170,10 @@ impl<'a> Emit<'a> {
     /// Rapid to a point, or to a little over the material in which it lies.
     pub fn rapid_until_material(&mut self, to: [f64; 3]) {
         let Some(from) = self.at else { return self.rapid_as_written(to) };
-        let Some(highest) = self.blocked(from, to) else { return self.rapid_as_written(to) };
         let sideways = (to[0] - from[0]).abs() + (to[1] - from[1]).abs() > TINY;
+        // Sideways a lift more costs little, material between the cells' middles much.
+        let met = if sideways { self.may_be_blocked(from, to) } else { self.blocked(from, to) };
+        let Some(highest) = met else { return self.rapid_as_written(to) };
         if sideways {
             let over = (highest + CLEARANCE).max(from[2]);
             self.rapid_as_written([from[0], from[1], over]);
@@ -234,7 +241,8 @@ impl<'a> Emit<'a> {
         }
         let turns = ((sweep.abs() - part) / full + 1e-9).floor().clamp(0.0, 1e4);
         let by = (part + turns * full).copysign(sweep);
-        let count = (by.abs() / CHORD).ceil().clamp(1.0, 1e5) as usize;
+        let step = (2.0 * libm::acos((1.0 - CHORD_ERROR / radius.max(CHORD_ERROR)).clamp(-1.0, 1.0))).clamp(1e-3, CHORD);
+        let count = (by.abs() / step).ceil().clamp(1.0, 1e5) as usize;
         let mut last = from;
         for k in 1..=count {
             let share = k as f64 / count as f64;
@@ -420,6 +428,7 @@ impl<'a> Emit<'a> {
         }
         self.at = None;
     }
+    /// All that the plan switched on is off again.
     pub fn end(&mut self, security: f64) {
         self.lift(security);
         self.stop_spindle();
@@ -430,6 +439,5 @@ impl<'a> Emit<'a> {
         if self.tool.take().is_some() {
             self.push(Op::Close(Marker::Tool));
         }
-        self.push(Op::End);
     }
 }

@@ -3,7 +3,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use gr_ir::{Marker, Note, Op, PathMode, Program, Stop};
+use gr_ir::{Marker, Note, Op, PathMode, Program, Source, Stop};
 use gr_text::{Diagnostic, FileId, LineIndex, Severity, code};
 
 use crate::emit::Emit;
@@ -100,6 +100,7 @@ pub fn plan(text: &[u8], file: FileId, options: &Options) -> (Option<Planned>, V
         block: None,
         axial_depth: options.axial_depth,
         made: BTreeSet::new(),
+        pallet: None,
     };
     p.e.b.file(file, &options.name);
     p.e.begin();
@@ -110,6 +111,8 @@ pub fn plan(text: &[u8], file: FileId, options: &Options) -> (Option<Planned>, V
     p.elements(&process.elements);
     let security = p.security;
     p.e.end(security);
+    p.change_pallet();
+    p.e.push(Op::End);
     let mut holes: BTreeMap<u64, Vec<(&Workingstep, &Feature)>> = BTreeMap::new();
     for s in process.steps() {
         for f in targets(s) {
@@ -177,11 +180,16 @@ struct Planner<'a> {
     axial_depth: Option<f64>,
     /// Operations that were made on their features.
     made: BTreeSet<(u64, u64)>,
+    /// The pallet is to be changed before anything else is done.
+    pallet: Option<Source>,
 }
 
 impl Planner<'_> {
     fn elements(&mut self, all: &[Element]) {
         for element in all {
+            if !matches!(element, Element::Plan(_)) {
+                self.change_pallet();
+            }
             match element {
                 Element::Plan(p) => self.workplan(p),
                 Element::Step(s) => self.step(s),
@@ -367,6 +375,13 @@ impl Planner<'_> {
         self.security = security;
     }
 
+    /// The pallet change that the plan has come to. At its end it stands right before the end of the program, as M30 has it.
+    fn change_pallet(&mut self) {
+        if let Some(source) = self.pallet.take() {
+            self.e.b.push(Op::Stop(Stop::Pallet), source);
+        }
+    }
+
     fn function(&mut self, f: &Function) {
         self.e.from(f.origin);
         let security = self.security;
@@ -377,7 +392,7 @@ impl Planner<'_> {
             FunctionKind::ExchangePallet => {
                 self.e.lift(security);
                 self.e.stop_spindle();
-                self.e.push(Op::Stop(Stop::Pallet));
+                self.pallet = Some(self.e.source);
                 self.e.at = None;
             }
             FunctionKind::LoadTool(t) => self.e.tool(t, security),

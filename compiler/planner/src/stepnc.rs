@@ -3,11 +3,16 @@
 //! coolant and override locks stand with each tool path. What the standard has no counterpart for is an error, or, where losses are allowed, left out and
 //! listed.
 
+mod known;
+
+pub use known::{Words, changes};
+
+use known::{Frame, Known, Place, differ};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 
 use gr_ir::geometry::ArcShape;
-use gr_ir::{FeedMode, Marker, Note, Op, Program, Source, State, Stop, Turn, View};
+use gr_ir::{Axes, FeedMode, Marker, Note, Op, Program, Source, State, Stop, Turn, View};
 use gr_text::{Diagnostic, FileId, Span, code};
 
 /// What can be chosen.
@@ -17,10 +22,32 @@ pub struct Options {
     pub name: String,
     /// Leave out what has no counterpart, with a warning.
     pub lossy: bool,
-    /// Tools by number: diameter and length, mm; none = a tool of 0.001 mm.
-    pub tools: Vec<(i32, f64, f64)>,
+    /// Tools that are described; any other becomes an end mill of 0.001 mm.
+    pub tools: Vec<Described>,
     /// Helices, which the standard does not have, become chords no further from them than this, mm; 0 = 1e-6.
     pub tolerance: f64,
+}
+
+/// A tool of the program.
+#[derive(Clone, PartialEq, Debug, Default)]
+pub struct Described {
+    /// T number.
+    pub number: i32,
+    /// Entity of its body as part 111 of 2002 names it; what is none of them becomes an end mill.
+    pub kind: String,
+    /// Diameter, mm.
+    pub diameter: f64,
+    /// Length, mm, for a tool that never cuts; any other has the length that the program gives it.
+    pub length: f64,
+    /// Edge radius, mm.
+    pub edge_radius: f64,
+}
+
+impl Described {
+    /// An end mill.
+    pub fn mill(number: i32, diameter: f64, length: f64) -> Described {
+        Described { number, kind: "ENDMILL".into(), diameter, length, edge_radius: 0.0 }
+    }
 }
 
 /// Writes a program.
@@ -28,10 +55,11 @@ pub struct Options {
 /// # Errors
 /// What STEP-NC cannot say, unless losses are allowed.
 pub fn write(program: &Program, options: &Options) -> Result<(String, Vec<Diagnostic>), Vec<Diagnostic>> {
-    write_at(program, options, &|source| (source.file, Span::default()))
+    write_at(program, options, &|source| (source.file, Span::default()), &mut changes)
 }
 
-/// The same; findings are at the places that `place` gives.
+/// The same; findings are at the places that `place` gives, and `words` tells of each operation what it does to X, Y
+/// and Z.
 ///
 /// # Errors
 /// As [`write`].
@@ -39,13 +67,16 @@ pub fn write_at(
     program: &Program,
     options: &Options,
     place: &dyn Fn(Source) -> (FileId, Span),
+    words: &mut dyn FnMut(&View<'_, '_>) -> Words,
 ) -> Result<(String, Vec<Diagnostic>), Vec<Diagnostic>> {
     let mut w = Writer::new(program, options, place);
     let mut cursor = program.cursor();
     while let Some(view) = cursor.next() {
-        w.op(&view);
+        w.op(&view, words(&view));
     }
     w.finish_step();
+    w.load();
+    w.needs_a_feed();
     if w.out.iter().any(|d| d.severity == gr_text::Severity::Error) {
         return Err(w.out);
     }
@@ -108,15 +139,29 @@ struct Writer<'a> {
     feature: usize,
     highest: f64,
     steps: usize,
-    /// Axes that some move has brought to a place: where the machine stands before, nobody knows.
-    known: [bool; 3],
+    at: Place,
+    /// The last move was a rapid.
+    rapid: bool,
+    /// Frame of all coordinates in the file.
+    frame: Option<Frame>,
+    /// Offset of each tool as it cut first: that is its length.
+    offsets: BTreeMap<i32, Axes>,
+    /// What keeps moves from being written, told already.
+    hindered: Option<String>,
+    /// Tool that was put into the spindle, and where.
+    loaded: Option<(i32, Source)>,
+    /// Tool of the last workingstep or function of the plan.
+    spindle: Option<i32>,
+    /// Where a technology was first needed.
+    begun: Option<Source>,
 }
 
 impl<'a> Writer<'a> {
     fn new(program: &'a Program, options: &'a Options, place: &'a dyn Fn(Source) -> (FileId, Span)) -> Writer<'a> {
         let mut highest = 0.0f64;
         for s in program.steps() {
-            if s.op.moves() {
+            // Without a change Z may be what nobody has named.
+            if s.op.moves() && s.start.axes[2] != s.end.axes[2] {
                 highest = highest.max(s.end.axes[2]);
             }
         }
@@ -142,7 +187,14 @@ impl<'a> Writer<'a> {
             feature: 0,
             highest,
             steps: 0,
-            known: [false; 3],
+            at: Place::default(),
+            rapid: false,
+            frame: None,
+            offsets: BTreeMap::new(),
+            hindered: None,
+            loaded: None,
+            spindle: None,
+            begun: None,
         };
         // Instance 1 is the project; it is written last.
         w.data.push(String::new());
@@ -177,22 +229,22 @@ impl<'a> Writer<'a> {
         }
     }
 
-    fn op(&mut self, v: &View<'_, '_>) {
+    fn op(&mut self, v: &View<'_, '_>, words: Words) {
         match v.op {
-            Op::Rapid => self.motion(v, true, |_, end| vec![Piece::Line(end)]),
-            Op::Linear => self.motion(v, false, |_, end| vec![Piece::Line(end)]),
+            Op::Rapid => self.rapid(v, words),
+            Op::Linear => self.feed(v, words, |_, end| vec![Piece::Line(end)]),
             Op::Arc(arc) => {
                 let shape = ArcShape::new(&arc, v.start, v.end);
                 if shape.rise.abs() > 1e-9 {
                     // ISO 14649 has no helix: short chords, no further from it than the tolerance.
                     let tolerance = if self.options.tolerance > 0.0 { self.options.tolerance } else { 1e-6 };
                     let chords = shape.pieces(tolerance);
-                    return self.motion(v, false, |_, end| chorded(&shape, chords, end));
+                    return self.feed(v, words, |_, end| chorded(&shape, chords, end));
                 }
-                self.motion(v, false, |_, end| circle(&shape, arc.turns, end));
+                self.feed(v, words, |_, end| circle(&shape, arc.turns, end));
             }
-            Op::Nurbs { .. } => self.cannot("a spline", v),
-            Op::Probe(_) => self.cannot("probing without a workpiece (G38)", v),
+            Op::Nurbs { .. } => self.leave_out("a spline", v),
+            Op::Probe(_) => self.leave_out("probing without a workpiece (G38)", v),
             Op::RigidTap { .. } => self.cannot("rigid tapping without a hole (G33.1)", v),
             Op::SyncStart(_) => self.cannot("motion in step with the spindle (G33, G95)", v),
             Op::Dwell(s) => {
@@ -212,21 +264,18 @@ impl<'a> Writer<'a> {
             Op::ToolEntry { .. } => self.cannot("writing the tool table (G10 L1)", v),
             Op::WorkOffset(n, _) if n > 1 => self.cannot("more than one work offset", v),
             Op::Override(gr_ir::Override::Adaptive, true) => self.cannot("adaptive feed (M52)", v),
+            Op::ToolChange(_) => self.changed(v.state.prepared, v.source),
+            Op::ToolNumber(number) => self.changed(number, v.source),
+            Op::ToolOffset(offset) => self.offset(&offset, v),
             Op::Stop(stop) => {
-                self.finish_step();
                 let text = match stop {
                     Stop::Program => "PROGRAM_STOP('stop')",
                     Stop::Optional => "OPTIONAL_STOP('optional stop')",
                     Stop::Pallet => "EXCHANGE_PALLET('pallet')",
                 };
-                let id = self.add(text.into());
-                self.plan.push(id);
+                self.function(text.into());
             }
-            Op::Note(Note::Message, text) => {
-                self.finish_step();
-                let id = self.add(format!("DISPLAY_MESSAGE('message',{})", string(text)));
-                self.plan.push(id);
-            }
+            Op::Note(Note::Message, text) => self.function(format!("DISPLAY_MESSAGE('message',{})", string(text))),
             Op::Begin { marker: Marker::Workingstep, text, .. } => {
                 self.finish_step();
                 self.name = text.to_string();
@@ -239,23 +288,155 @@ impl<'a> Writer<'a> {
         }
     }
 
-    fn motion(&mut self, v: &View<'_, '_>, rapid: bool, pieces: impl Fn([f64; 3], [f64; 3]) -> Vec<Piece>) {
-        if v.start.axes[3..] != v.end.axes[3..] {
-            return self.cannot("motion of the axes A B C U V W", v);
+    /// A function of the plan, after all that was before it.
+    fn function(&mut self, text: String) {
+        self.finish_step();
+        self.load();
+        let id = self.add(text);
+        self.plan.push(id);
+    }
+
+    /// Another tool: nothing is known of where its tip is but by the tool table.
+    fn changed(&mut self, number: i32, source: Source) {
+        self.loaded = Some((number, source));
+        self.at.hold([false, false, true]);
+    }
+
+    /// The tool that was put into the spindle, where no workingstep says so.
+    fn load(&mut self) {
+        let Some((number, source)) = self.loaded.take().filter(|(n, _)| self.spindle != Some(*n)) else { return };
+        if number <= 0 && self.spindle.is_none() {
+            return;
         }
-        let (mut start, end) = (v.start.xyz(), v.end.xyz());
-        let all = if rapid && self.known != [true; 3] {
-            // The way there begins anywhere: only where it ends can be written.
-            self.known = std::array::from_fn(|i| self.known[i] || start == end || start[i] != end[i]);
-            if self.known != [true; 3] {
-                return;
-            }
-            start = end;
-            vec![Piece::Line(end)]
+        let text = if number > 0 {
+            self.describe(number, source);
+            format!("LOAD_TOOL('load',#{})", self.tool(number))
         } else {
-            self.known = [true; 3];
-            pieces(start, end)
+            "UNLOAD_TOOL('unload',$)".into()
         };
+        let id = self.add(text);
+        self.plan.push(id);
+        self.spindle = Some(number);
+    }
+
+    /// Another offset of the tool. Until the tool cuts it says how long the tool is, and where rapids with the one
+    /// before have led the tip is not known.
+    fn offset(&mut self, offset: &Axes, v: &View<'_, '_>) {
+        let changed = differ(offset, &v.state.tool_offset);
+        if changed == [false; 3] {
+            return;
+        }
+        let tool = v.state.tool;
+        if !self.offsets.contains_key(&tool) && self.elements.iter().all(|e| e.technology().tool == tool) {
+            self.at.waits |= !self.elements.is_empty();
+            self.elements.retain(|e| matches!(e, Element::Dwell(..)));
+        }
+        self.at.hold(changed);
+    }
+
+    /// What keeps a move from being written, and whether it keeps the moves after it as well.
+    fn hindrance(&self, v: &View<'_, '_>, words: Words) -> Option<(&'static str, bool)> {
+        let s = v.state;
+        if v.start.axes[3..] != v.end.axes[3..] {
+            return Some(("motion of the axes A B C U V W", false));
+        }
+        if words.machine != [false; 3] {
+            return Some(("a move to a place of the machine (G53, G28, G30)", false));
+        }
+        if self.frame.is_some_and(|f| f != Frame::of(s)) {
+            return Some(("motion from here on: the work frame is another than before (G10, G54 to G59.3, G92)", true));
+        }
+        if self.offsets.get(&s.tool).is_some_and(|o| *o != s.tool_offset) {
+            return Some(("motion from here on: the same tool has another offset than before (G43, G43.1, G49, G10 L1)", true));
+        }
+        (s.tool_offset[0] != 0.0 || s.tool_offset[1] != 0.0).then_some(("a tool offset in X or Y", true))
+    }
+
+    /// Whether a move can be written.
+    fn can_move(&mut self, v: &View<'_, '_>, words: Words) -> bool {
+        if words.hidden {
+            // A tool change of the plan makes the machine do the same of itself.
+            self.at.forget(differ(&v.start.axes, &v.end.axes));
+            return false;
+        }
+        let Some((what, lasts)) = self.hindrance(v, words) else { return true };
+        let told = lasts && self.hindered.as_deref() == Some(what);
+        if !told {
+            self.cannot(what, v);
+        }
+        self.hindered = lasts.then(|| what.to_string());
+        let moved = differ(&v.start.axes, &v.end.axes);
+        self.at.forget(std::array::from_fn(|i| lasts || moved[i] || words.machine[i] || words.work[i]));
+        false
+    }
+
+    /// Tells of a move that has no counterpart: where it ends the tool never is.
+    fn leave_out(&mut self, what: &str, v: &View<'_, '_>) {
+        self.cannot(what, v);
+        self.at.forget(differ(&v.start.axes, &v.end.axes));
+    }
+
+    fn rapid(&mut self, v: &View<'_, '_>, words: Words) {
+        if !self.can_move(v, words) {
+            return;
+        }
+        let sure = self.at.all();
+        self.at.name(words.work);
+        self.rapid = true;
+        if sure {
+            return self.path(v, true, v.start.xyz(), vec![Piece::Line(v.end.xyz())]);
+        }
+        // The way there begins anywhere: only where it ends can be written.
+        if self.at.all() { self.arrive(v, true, v.end.xyz()) } else { self.at.waits = true }
+    }
+
+    fn feed(&mut self, v: &View<'_, '_>, words: Words, pieces: impl Fn([f64; 3], [f64; 3]) -> Vec<Piece>) {
+        if !self.can_move(v, words) {
+            return;
+        }
+        let (start, end) = (v.start.xyz(), v.end.xyz());
+        if self.at.of.contains(&Known::No) {
+            let missing = self.at.missing();
+            self.at.name(words.work);
+            if v.op == Op::Linear && !self.at.of.contains(&Known::No) {
+                return self.arrive(v, false, end);
+            }
+            self.at.forget(words.work);
+            let what = format!("a cut that begins where no block has led the tool ({missing} not named before)");
+            if self.hindered.as_ref() != Some(&what) {
+                self.cannot(&what, v);
+            }
+            self.hindered = Some(what);
+            return;
+        }
+        if self.at.waits || self.rapid && !self.at.all() {
+            self.arrive(v, true, start);
+        }
+        self.at.name([true; 3]);
+        self.rapid = false;
+        self.path(v, false, start, pieces(start, end));
+    }
+
+    /// The tool is led to a place from anywhere: down from the height of all that the program names.
+    fn arrive(&mut self, v: &View<'_, '_>, rapid: bool, at: [f64; 3]) {
+        if self.elements.iter().any(|e| matches!(e, Element::Path(..))) {
+            self.finish_step();
+        }
+        self.at.waits = false;
+        self.at.name([true; 3]);
+        let over = [at[0], at[1], at[2].max(self.highest)];
+        if !rapid {
+            self.path(v, true, over, vec![Piece::Line(over)]);
+        }
+        self.path(v, rapid, over, vec![Piece::Line(at)]);
+    }
+
+    fn path(&mut self, v: &View<'_, '_>, rapid: bool, start: [f64; 3], all: Vec<Piece>) {
+        self.hindered = None;
+        self.frame.get_or_insert(Frame::of(v.state));
+        if !rapid {
+            self.offsets.entry(v.state.tool).or_insert(v.state.tool_offset);
+        }
         let t = self.adopt(v.state, v);
         let axes = v.end.tool_axis;
         let joins = match self.elements.last() {
@@ -278,14 +459,28 @@ impl<'a> Writer<'a> {
         }
     }
 
+    /// Every technology of ISO 14649 for milling has a feed.
+    fn needs_a_feed(&mut self) {
+        let Some(begun) = self.begun.filter(|_| !(self.first_feed > 0.0)) else { return };
+        if self.out.iter().any(|d| d.severity == gr_text::Severity::Error) {
+            return;
+        }
+        let (file, span) = (self.place)(begun);
+        let what = "a program without a feed: the technology of a workingstep needs one".to_string();
+        self.out.push(Diagnostic::new(code::STEPNC_NO_COUNTERPART, file, span, &[what]));
+    }
+
     fn adopt(&mut self, s: &State, v: &View<'_, '_>) -> Technology {
         let spindle = s.spindles[0];
         if s.spindles[1..].iter().any(|o| o.turn != Turn::Stop) {
             self.cannot("a second spindle", v);
         }
+        self.begun.get_or_insert(v.source);
+        // Feed per revolution is told; what is written is what it comes to.
+        let feed = if s.feed_mode == FeedMode::PerRev { s.feed * s.spindle(s.feed_spindle).speed / 60.0 } else { s.feed };
         let new = Technology {
             tool: s.tool,
-            feed: if s.feed > 0.0 { s.feed } else { self.first_feed },
+            feed: if feed > 0.0 { feed } else { self.first_feed },
             speed: spindle.speed,
             turn: spindle.turn,
             flood: s.flood,
@@ -295,27 +490,46 @@ impl<'a> Writer<'a> {
         if self.elements.last().is_some_and(|e| e.technology().tool != new.tool) {
             self.finish_step();
         }
-        let described = self.options.tools.iter().any(|t| t.0 == new.tool && t.1 > 0.0);
-        if !described && self.unknown.insert(new.tool) {
-            let name = if new.tool > 0 { format!("tool {}", new.tool) } else { "the tool".to_string() };
-            let (file, span) = (self.place)(v.source);
+        self.describe(new.tool, v.source);
+        new
+    }
+
+    fn described(&self, number: i32) -> Option<&'a Described> {
+        self.options.tools.iter().find(|t| t.number == number && t.diameter > 0.0)
+    }
+
+    /// Tells of a tool that is not described.
+    fn describe(&mut self, number: i32, source: Source) {
+        if self.described(number).is_none() && self.unknown.insert(number) {
+            let name = if number > 0 { format!("tool {number}") } else { "the tool".to_string() };
+            let (file, span) = (self.place)(source);
             self.out.push(Diagnostic::new(code::STEPNC_TOOL_UNKNOWN, file, span, &[name]));
         }
-        new
     }
 
     fn tool(&mut self, number: i32) -> usize {
         if let Some(id) = self.tools.get(&number) {
             return *id;
         }
-        let known = self.options.tools.iter().find(|t| t.0 == number);
-        let (diameter, length) = known.map_or((0.001, 0.0), |t| (t.1.max(0.001), t.2));
-        let dimension = self.add(format!("MILLING_TOOL_DIMENSION({},$,$,$,$,$,$)", real(diameter)));
-        let body = self.add(format!("ENDMILL(#{dimension},$,$,$,$)"));
-        let edge = self.add(format!("CUTTING_COMPONENT({},$,$,$,$)", real(length)));
+        let (kind, diameter, radius) = self.described(number).map_or(("ENDMILL", 0.001, 0.0), |t| (&*t.kind, t.diameter, t.edge_radius));
+        let (body, rest) = body(kind, diameter, radius);
+        let edge_radius = if body != "BALL_ENDMILL" && radius > 0.0 { real(radius) } else { "$".into() };
+        let dimension = self.add(format!("MILLING_TOOL_DIMENSION({},$,$,$,{edge_radius},$,$)", real(diameter.max(0.001))));
+        let body = self.add(format!("{body}(#{dimension},$,$,$,${rest})"));
+        // How long it is, is known when it has cut: `lengths` writes it.
+        let edge = self.add(String::new());
         let id = self.add(format!("MILLING_CUTTING_TOOL('T{}',#{body},(#{edge}),$,$,$)", number.max(0)));
         self.tools.insert(number, id);
         id
+    }
+
+    fn lengths(&mut self) {
+        for (number, id) in &self.tools {
+            let stated = self.described(*number).map_or(0.0, |t| t.length);
+            let length = self.offsets.get(number).map_or(stated, |o| o[2]);
+            // The edge is written right before its tool.
+            self.data[id - 2] = format!("CUTTING_COMPONENT({},$,$,$,$)", real(length));
+        }
     }
 
     fn technology(&mut self, t: Technology) -> usize {
@@ -352,6 +566,7 @@ impl<'a> Writer<'a> {
     fn finish_step(&mut self) {
         let elements = std::mem::take(&mut self.elements);
         let Some(t) = elements.first().map(Element::technology) else { return };
+        self.spindle = Some(t.tool);
         let height = last_of(&elements).map_or(self.highest, |p| p[2]);
         let (tool, technology, functions) = (self.tool(t.tool), self.technology(t), self.functions(t.flood, t.mist));
         let mut list = Vec::new();
@@ -441,6 +656,7 @@ impl<'a> Writer<'a> {
     }
 
     fn file(mut self) -> String {
+        self.lengths();
         let plan: Vec<String> = self.plan.iter().map(|i| format!("#{i}")).collect();
         let zero = self.placement([0.0; 3], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]);
         let highest = self.placement([0.0, 0.0, self.highest], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]);
@@ -462,6 +678,19 @@ impl<'a> Writer<'a> {
         }
         out.push_str("ENDSEC;\nEND-ISO-10303-21;\n");
         out
+    }
+}
+
+/// Entity of a body and what it has more than all of them. A ball has no radius of its own, a bull nose must have one.
+fn body(kind: &str, diameter: f64, radius: f64) -> (&str, &'static str) {
+    match kind {
+        "BULLNOSE_ENDMILL" if radius >= diameter / 2.0 => ("BALL_ENDMILL", ""),
+        "BULLNOSE_ENDMILL" if radius <= 0.0 => ("ENDMILL", ""),
+        "FACEMILL" | "BALL_ENDMILL" | "BULLNOSE_ENDMILL" | "TWIST_DRILL" | "SPADE_DRILL" | "CENTERDRILL" | "REAMER" | "TAP"
+        | "COUNTERBORE" | "THREAD_MILL" => (kind, ""),
+        "COUNTERSINK" | "TAPERED_ENDMILL" | "T_SLOT_MILL" | "DOVETAIL_MILL" | "SIDE_MILL" | "TAPERED_REAMER" | "TAPERED_TAP" => (kind, ",$"),
+        "BORING_TOOL" => (kind, ",.F."),
+        _ => ("ENDMILL", ""),
     }
 }
 

@@ -6,11 +6,13 @@ use crate::process::Tool;
 /// Most cells. Larger parts have coarser ones, and none where a cell would be wider than the smallest tool.
 const MOST_CELLS: f64 = 16e6;
 /// Cells in the radius of the smallest tool.
-const FINENESS: f64 = 3.0;
+const FINENESS: f64 = 6.0;
 /// Cells along the longer side, at least and at most where the tools leave the choice.
 const ALONG: [f64; 2] = [48.0, 4000.0];
 /// Material that no move is lifted for, mm.
 const FILM: f64 = 1e-3;
+/// Material beside a tool that none of its moves has touched, mm: arcs are taken off by chords.
+const RIM: f64 = 0.05;
 
 /// The shape of a tool below its shank.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -32,6 +34,10 @@ impl Cutter {
         let radius = tool.diameter / 2.0;
         let rise = if rise.is_finite() && rise > 0.0 { rise } else { 0.0 };
         Some(Cutter { radius, edge: tool.edge_radius.clamp(0.0, radius), rise })
+    }
+    /// It cuts a flat floor, as wide as it is.
+    fn flat(&self) -> bool {
+        self.rise == 0.0 && self.edge == 0.0
     }
     /// Height of its surface over its tip, at a distance from its axis.
     fn over_tip(&self, d: f64) -> f64 {
@@ -73,22 +79,60 @@ impl Stock {
         Some(Stock { low: [low[0], low[1]], cell, n, z: vec![high[2] as f32; n[0] * n[1]] })
     }
 
+    fn middle(&self, axis: usize, cell: usize) -> f64 {
+        self.low[axis] + (cell as f64 + 0.5) * self.cell
+    }
+
+    /// Cells along an axis whose middles lie between two coordinates.
+    fn cells(&self, axis: usize, from: f64, to: f64) -> std::ops::Range<usize> {
+        let index = |v: f64| ((v - self.low[axis]) / self.cell - 0.5).clamp(-1.0, self.n[axis] as f64);
+        let (first, last) = (index(from).ceil().max(0.0) as usize, index(to).floor());
+        first..if last < 0.0 { 0 } else { (last as usize + 1).min(self.n[axis]) }
+    }
+
+    /// Cells of a row within `reach` of a straight move: what two discs and the strip between them have of it is one piece.
+    fn columns(&self, y: f64, a: [f64; 3], b: [f64; 3], reach: f64) -> std::ops::Range<usize> {
+        let (mut from, mut to) = (f64::INFINITY, f64::NEG_INFINITY);
+        for p in [a, b] {
+            let left = reach * reach - (y - p[1]) * (y - p[1]);
+            if left >= 0.0 {
+                let half = libm::sqrt(left);
+                (from, to) = (from.min(p[0] - half), to.max(p[0] + half));
+            }
+        }
+        let along = [b[0] - a[0], b[1] - a[1]];
+        let length = libm::sqrt(along[0] * along[0] + along[1] * along[1]);
+        if along[1] != 0.0 {
+            for side in [-reach, reach] {
+                // Where the row crosses the border of the strip.
+                let share = (y - a[1] - side * along[0] / length) / along[1];
+                if (0.0..=1.0).contains(&share) {
+                    let x = a[0] + share * along[0] - side * along[1] / length;
+                    (from, to) = (from.min(x), to.max(x));
+                }
+            }
+        }
+        if from > to { 0..0 } else { self.cells(0, from, to) }
+    }
+
+    /// The cells under a flat tool on one height, row by row.
+    fn under(&self, a: [f64; 3], b: [f64; 3], reach: f64) -> impl Iterator<Item = std::ops::Range<usize>> {
+        self.cells(1, a[1].min(b[1]) - reach, a[1].max(b[1]) + reach).filter_map(move |row| {
+            let columns = self.columns(self.middle(1, row), a, b, reach);
+            (columns.start < columns.end).then(|| row * self.n[0] + columns.start..row * self.n[0] + columns.end)
+        })
+    }
+
     /// Cells whose middle is within `reach` of a straight move, with the distance and the part of the move that is
     /// within `reach` of it: closest, first, last. A move straight up or down is near them all the way.
     fn near(&self, a: [f64; 3], b: [f64; 3], reach: f64, mut each: impl FnMut(usize, f64, [f64; 3])) {
         let along = [b[0] - a[0], b[1] - a[1]];
         let length2 = along[0] * along[0] + along[1] * along[1];
-        let index = |v: f64, axis: usize| ((v - self.low[axis]) / self.cell - 0.5).clamp(-1.0, self.n[axis] as f64);
-        let range = |axis: usize| {
-            let first = index(a[axis].min(b[axis]) - reach, axis).ceil().max(0.0) as usize;
-            let last = index(a[axis].max(b[axis]) + reach, axis).floor();
-            first..if last < 0.0 { 0 } else { (last as usize + 1).min(self.n[axis]) }
-        };
-        let (columns, reach2) = (range(0), reach * reach);
-        for row in range(1) {
-            let y = self.low[1] + (row as f64 + 0.5) * self.cell;
-            for column in columns.clone() {
-                let x = self.low[0] + (column as f64 + 0.5) * self.cell;
+        let reach2 = reach * reach;
+        for row in self.cells(1, a[1].min(b[1]) - reach, a[1].max(b[1]) + reach) {
+            let y = self.middle(1, row);
+            for column in self.columns(y, a, b, reach) {
+                let x = self.middle(0, column);
                 let (dx, dy) = (x - a[0], y - a[1]);
                 let at = if length2 > 0.0 { ((dx * along[0] + dy * along[1]) / length2).clamp(0.0, 1.0) } else { 0.0 };
                 let (ex, ey) = (dx - at * along[0], dy - at * along[1]);
@@ -105,6 +149,14 @@ impl Stock {
     pub fn cut(&mut self, tool: Cutter, a: [f64; 3], b: [f64; 3]) {
         let mut z = std::mem::take(&mut self.z);
         let rise = b[2] - a[2];
+        if rise == 0.0 && tool.flat() {
+            let height = a[2] as f32;
+            for cells in self.under(a, b, tool.radius) {
+                z[cells].iter_mut().for_each(|z| *z = z.min(height));
+            }
+            self.z = z;
+            return;
+        }
         self.near(a, b, tool.radius, |cell, d, [_, first, last]| {
             // The deepest it is while it is over the cell.
             let deepest = a[2] + rise * if rise > 0.0 { first } else { last };
@@ -121,12 +173,25 @@ impl Stock {
     /// How high the tip has to stay for a straight move to pass over all material; none: it meets none at any height
     /// of its own.
     pub fn blocks(&self, tool: Cutter, a: [f64; 3], b: [f64; 3]) -> Option<f64> {
+        self.blocks_within(tool, (tool.radius - RIM).max(0.0), a, b)
+    }
+
+    /// The same with material that reaches no middle of a cell: a way beside it is taken for one through it.
+    pub fn may_block(&self, tool: Cutter, a: [f64; 3], b: [f64; 3]) -> Option<f64> {
+        self.blocks_within(tool, tool.radius + 0.75 * self.cell, a, b)
+    }
+
+    fn blocks_within(&self, tool: Cutter, reach: f64, a: [f64; 3], b: [f64; 3]) -> Option<f64> {
         let mut highest: Option<f64> = None;
         let rise = b[2] - a[2];
-        // Cells at the rim are cut only in part: no move is lifted for them.
-        self.near(a, b, (tool.radius - 0.75 * self.cell).max(0.0), |cell, d, [_, first, last]| {
+        if rise == 0.0 && tool.flat() {
+            let top = self.under(a, b, reach).flat_map(|cells| &self.z[cells]).fold(f32::NEG_INFINITY, |a, b| a.max(*b));
+            let top = f64::from(top);
+            return (top > a[2] + FILM + 1e-6 * top.abs()).then_some(top);
+        }
+        self.near(a, b, reach, |cell, d, [_, first, last]| {
             let Some(z) = self.z.get(cell) else { return };
-            let top = f64::from(*z) - tool.over_tip(d);
+            let top = f64::from(*z) - tool.over_tip(d.min(tool.radius));
             let deepest = a[2] + rise * if rise > 0.0 { first } else { last };
             if top > deepest + FILM + 1e-6 * top.abs() {
                 highest = Some(highest.map_or(top, |h: f64| h.max(top)));

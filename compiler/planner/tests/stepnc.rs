@@ -1,7 +1,7 @@
 //! Motion → STEP-NC → motion.
 
 use gr_ir::{Arc, ArcPlane, Builder, Marker, Op, Plane, Pose, Program, Source, Stop, Turn};
-use gr_planner::stepnc::{Options, write};
+use gr_planner::stepnc::{Described, Options, write};
 use gr_planner::{Options as PlanOptions, plan};
 use gr_text::{FileId, Severity, code};
 use proptest::prelude::*;
@@ -47,7 +47,10 @@ enum Seen {
 fn seen(program: &Program) -> Vec<Seen> {
     let mut out = Vec::new();
     let mut c = program.cursor();
+    // The way to the first place of a tool is the reader's own: it may start the spindle when it is there.
+    let mut own_way = true;
     while let Some(v) = c.next() {
+        own_way = (own_way || matches!(v.op, Op::ToolChange(_))) && !v.op.feeds();
         match v.op {
             Op::Stop(s) => out.push(Seen::Stop(s)),
             Op::Dwell(s) => out.push(Seen::Dwell(s)),
@@ -58,7 +61,7 @@ fn seen(program: &Program) -> Vec<Seen> {
                 };
                 let s = v.state;
                 let rapid = op == Op::Rapid;
-                let (turn, speed) = (s.spindles[0].turn, s.spindles[0].speed);
+                let (turn, speed) = if own_way { (Turn::Stop, 0.0) } else { (s.spindles[0].turn, s.spindles[0].speed) };
                 out.push(Seen::Move {
                     rapid,
                     arc,
@@ -66,8 +69,8 @@ fn seen(program: &Program) -> Vec<Seen> {
                     feed: if rapid { 0.0 } else { s.feed },
                     speed: if turn == Turn::Stop { 0.0 } else { speed },
                     turn,
-                    flood: s.flood,
-                    mist: s.mist,
+                    flood: s.flood && !own_way,
+                    mist: s.mist && !own_way,
                     tool: s.tool.max(0),
                 });
             }
@@ -96,7 +99,7 @@ fn close(a: &Seen, b: &Seen) -> bool {
 }
 
 fn round_trip(program: &Program) -> (Vec<Seen>, Vec<Seen>, String) {
-    let options = Options { name: "part".into(), tools: vec![(1, 10.0, 0.0), (2, 6.0, 0.0)], ..Options::default() };
+    let options = Options { name: "part".into(), tools: vec![Described::mill(1, 10.0, 0.0), Described::mill(2, 6.0, 0.0)], ..Options::default() };
     let (text, notes) = write(program, &options).expect("written");
     assert!(notes.is_empty(), "{notes:?}");
     let (planned, out) = plan(text.as_bytes(), FileId(0), &PlanOptions::default());
@@ -245,12 +248,12 @@ fn an_unknown_tool_is_told() {
     b.to(Op::Linear, 2.0, 1.0, 0.0);
     b.to(Op::Linear, 3.0, 1.0, 0.0);
     let program = b.0.finish();
-    let notes = |tools: Vec<(i32, f64, f64)>| {
+    let notes = |tools: Vec<Described>| {
         let (_, notes) = write(&program, &Options { tools, ..Options::default() }).expect("it can be written");
         notes.iter().map(|d| (d.code, d.message.split(" is not").next().unwrap_or_default().to_string())).collect::<Vec<_>>()
     };
     let told = |name: &str| (code::STEPNC_TOOL_UNKNOWN, name.to_string());
     assert_eq!(notes(Vec::new()), [told("the tool"), told("tool 2")]);
-    assert_eq!(notes(vec![(2, 0.0, 10.0)]), [told("the tool"), told("tool 2")]);
-    assert_eq!(notes(vec![(2, 6.0, 10.0)]), [told("the tool")]);
+    assert_eq!(notes(vec![Described::mill(2, 0.0, 10.0)]), [told("the tool"), told("tool 2")]);
+    assert_eq!(notes(vec![Described::mill(2, 6.0, 10.0)]), [told("the tool")]);
 }

@@ -134,6 +134,133 @@ fn rapids_pass_over_a_boss_that_stands_above_its_pocket() {
     assert!(worst < 1e-6, "a rapid {worst} mm in the block");
 }
 
+/// The block in cells of 0.4 mm, and tools by their numbers: how deep a rapid goes into what is left.
+fn deepest_rapid(p: &Planned, block: [f64; 3]) -> (f64, [f64; 3]) {
+    const CELL: f64 = 0.4;
+    let n = [0, 1].map(|i| (block[i] / CELL) as usize);
+    let mut tops = vec![block[2]; n[0] * n[1]];
+    let mut worst = (0.0f64, [0.0; 3]);
+    let (mut radius, mut begun) = (0.0, false);
+    for s in p.program.steps() {
+        if let Op::ToolPrepare(number) = s.op {
+            radius = p.tools.iter().find(|t| i64::from(t.number) == i64::from(number)).map_or(0.0, |t| t.diameter / 2.0);
+        }
+        // The first move begins anywhere.
+        if !s.op.moves() || !std::mem::replace(&mut begun, true) {
+            continue;
+        }
+        let (a, b) = (s.start.xyz(), s.end.xyz());
+        let far = (0..3).map(|i| (a[i] - b[i]).abs()).fold(0.0, f64::max);
+        let shape = if let Op::Arc(arc) = s.op { Some(ArcShape::new(&arc, &s.start, &s.end)) } else { None };
+        let count = (shape.as_ref().map_or(far, ArcShape::length) / 0.2).ceil().max(1.0) as usize;
+        for k in 0..=count {
+            let share = k as f64 / count as f64;
+            let q = shape.as_ref().map_or_else(|| [0, 1, 2].map(|i| a[i] + (b[i] - a[i]) * share), |s| s.point(share));
+            let range = |i: usize| {
+                let low = ((q[i] - radius) / CELL).floor().clamp(0.0, n[i] as f64) as usize;
+                low..((q[i] + radius) / CELL).ceil().clamp(0.0, n[i] as f64) as usize
+            };
+            for y in range(1) {
+                for x in range(0) {
+                    let d = ((x as f64 + 0.5) * CELL - q[0]).hypot((y as f64 + 0.5) * CELL - q[1]);
+                    let top = &mut tops[y * n[0] + x];
+                    if s.op == Op::Rapid && d < radius - 0.25 && *top - q[2] > worst.0 {
+                        worst = (*top - q[2], q);
+                    } else if s.op.feeds() && d <= radius {
+                        *top = top.min(q[2]);
+                    }
+                }
+            }
+        }
+    }
+    worst
+}
+
+/// Features that lie under uncut material, with a retract plane lower than it.
+#[test]
+fn rapids_pass_beside_no_material() {
+    let block = [80.0, 50.0, 20.0];
+    let strategies = ["CENTER_MILLING($,$)", "UNIDIRECTIONAL($,$,$,$,$)", "BIDIRECTIONAL($,$,$,$,$)", "CONTOUR_PARALLEL($,$,$,$)", "CONTOUR_SPIRAL($,$,$,$)"];
+    for strategy in strategies {
+        let mut p = Part::new(block);
+        let tool = p.tool("ENDMILL", 10.0, 0.0, None);
+        let op = p.mill(&Mill::new("BOTTOM_AND_SIDE_ROUGH_MILLING", tool, 2.5, 6.0).strategy(strategy));
+        let size = p.length(20.0);
+        let circle = p.add(format!("CIRCULAR_CLOSED_PROFILE($,#{size})"));
+        p.machine("BOSS", &[op], [40.0, 25.0, 14.0], Some(4.0), &format!(",#{circle},0."));
+        let (made, _) = planned(&p.retract("1."));
+        let (deep, at) = deepest_rapid(&made, block);
+        assert!(deep < 1e-6, "boss, {strategy}: a rapid {deep} mm in the block at {at:?}");
+
+        let mut p = Part::new(block);
+        let (rough, finish) = (p.tool("ENDMILL", 10.0, 0.0, None), p.tool("ENDMILL", 6.0, 0.0, None));
+        let first = p.mill(&Mill::new("BOTTOM_AND_SIDE_ROUGH_MILLING", rough, 2.5, 6.0).strategy(strategy).leave(0.5, 0.0));
+        let second = p.mill(&Mill::new("BOTTOM_AND_SIDE_FINISH_MILLING", finish, 2.5, 3.0).strategy(strategy));
+        let (w, l, r) = (p.length(36.0), p.length(24.0), p.length(3.0));
+        let profile = p.add(format!("RECTANGULAR_CLOSED_PROFILE($,#{l},#{w})"));
+        let bottom = p.add("PLANAR_POCKET_BOTTOM_CONDITION()".into());
+        p.machine("CLOSED_POCKET", &[first, second], [40.0, 25.0, 14.0], Some(4.0), &format!(",(),$,#{bottom},$,#{r},#{profile}"));
+        let (made, _) = planned(&p.retract("1."));
+        let (deep, at) = deepest_rapid(&made, block);
+        assert!(deep < 1e-6, "pocket, {strategy}: a rapid {deep} mm in the block at {at:?}");
+    }
+}
+
+/// A boss as high as the block in a pocket that lies lower, its corner close to the ways between the passes.
+#[test]
+fn rapids_pass_no_corner_of_a_boss() {
+    let block = [60.0, 40.0, 16.0];
+    for strategy in ["$", "CONTOUR_PARALLEL($,$,$,$)", "UNIDIRECTIONAL($,$,$,$,$)"] {
+        let mut p = Part::new(block);
+        let tool = p.tool("ENDMILL", 6.0, 0.0, None);
+        let op = p.mill(&Mill::new("BOTTOM_AND_SIDE_ROUGH_MILLING", tool, 2.5, 3.6).strategy(strategy));
+        let (a, w, l) = (p.length(8.0), p.length(50.0), p.length(30.0));
+        let square = p.add(format!("RECTANGULAR_CLOSED_PROFILE($,#{a},#{a})"));
+        let (place, deep) = (p.place([0.0, 0.0, 4.0]), p.place([0.0, 0.0, -9.0]));
+        let plane = p.add(format!("PLANE('depth',#{deep})"));
+        let boss = p.add(format!("BOSS('boss',$,(),#{place},#{plane},#{square},$)"));
+        let profile = p.add(format!("RECTANGULAR_CLOSED_PROFILE($,#{l},#{w})"));
+        let bottom = p.add("PLANAR_POCKET_BOTTOM_CONDITION()".into());
+        p.machine("CLOSED_POCKET", &[op], [30.0, 20.0, 12.0], Some(5.0), &format!(",(#{boss}),$,#{bottom},$,$,#{profile}"));
+        let (made, _) = planned(&p.retract("2."));
+        let (deep, at) = deepest_rapid(&made, block);
+        assert!(deep < 1e-6, "{strategy}: a rapid {deep} mm in the block at {at:?}");
+    }
+}
+
+/// What a rounded edge cannot reach at the foot of a wall is told; where the foot is as round, nothing is.
+#[test]
+fn feet_of_walls_are_told() {
+    let ball = |feature: &str| {
+        let mut p = Part::new([60.0, 50.0, 20.0]);
+        let tool = p.tool("BALL_ENDMILL", 6.0, 3.0, None);
+        let op = p.mill(&Mill::new("BOTTOM_AND_SIDE_FINISH_MILLING", tool, 2.5, 1.0));
+        let round = |p: &mut Part, d: f64| {
+            let d = p.length(d);
+            p.add(format!("CIRCULAR_CLOSED_PROFILE($,#{d})"))
+        };
+        match feature {
+            "BOSS" => {
+                let c = round(&mut p, 20.0);
+                p.machine("BOSS", &[op], [30.0, 25.0, 20.0], Some(5.0), &format!(",#{c},0."));
+            }
+            "PROFILE" => {
+                let c = round(&mut p, 30.0);
+                p.machine("GENERAL_OUTSIDE_PROFILE", &[op], [30.0, 25.0, 20.0], Some(5.0), &format!(",#{c}"));
+            }
+            _ => {
+                let d = p.length(16.0);
+                let r = p.length(8.0);
+                let bottom = p.add(format!("SPHERICAL_HOLE_BOTTOM(#{r})"));
+                p.machine("ROUND_HOLE", &[op], [30.0, 25.0, 20.0], Some(12.0), &format!(",#{d},$,#{bottom}"));
+            }
+        }
+        p
+    };
+    says(&ball("BOSS"), code::PLAN_UNREACHABLE_CORNER, "a radius of 3 mm all along the foot");
+    silent(&ball("HOLE"), code::PLAN_UNREACHABLE_CORNER);
+}
+
 /// A tool path of the file keeps its rapids, and is told of those that go through the block.
 #[test]
 fn rapids_of_the_file_through_the_block_are_told() {

@@ -30,18 +30,35 @@ pub struct Coordinates {
     planned: bool,
     /// The axis that a canned cycle goes along.
     cycle: Option<usize>,
+    last: Brought,
+}
+
+/// What a move does to X, Y and Z.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct Brought {
+    /// Those that it brings to a place of the work frame.
+    pub work: [bool; 3],
+    /// Those that it brings to a place of the machine.
+    pub machine: [bool; 3],
+    /// The machine makes it of itself, before it changes the tool.
+    pub hidden: bool,
 }
 
 impl Coordinates {
     /// Before a program.
     pub fn new(program: &Program) -> Coordinates {
         let planned = program.steps().any(|s| matches!(s.op, Op::Begin { marker: Marker::Workingstep, .. }));
-        Coordinates { by: [By::Nothing; 3], planned, cycle: None }
+        Coordinates { by: [By::Nothing; 3], planned, cycle: None, last: Brought::default() }
     }
 
     /// What they are known by so far.
     pub fn by(&self) -> [By; 3] {
         self.by
+    }
+
+    /// What the last operation did, if it moved.
+    pub fn brought(&self) -> Brought {
+        self.last
     }
 
     /// With the next operation. A coordinate is named by its letter or when it changes, both of a plane by an arc in it.
@@ -57,6 +74,7 @@ impl Coordinates {
         let letters = if self.planned { None } else { Letters::at(sources, view.source.file, view.source.line) };
         let Some(letters) = letters else {
             self.by = [By::Work; 3];
+            self.last = Brought { work: [true; 3], ..Brought::default() };
             return self.by;
         };
         let goal = goal(program, view, letters);
@@ -73,6 +91,16 @@ impl Coordinates {
             }
         }
         self.curve(&view.op);
+        let changed = |i: usize| view.start.axes[i] != view.end.axes[i];
+        let named = |i: usize| letters.has(AXES[i]) && self.cycle != Some(i);
+        // Without its letter an axis of a plain move changes only because it was elsewhere than the program's run has it.
+        let spelled = letters.names_axes() && self.cycle.is_none();
+        let work = |i: usize| self.by[i] == By::Work && (named(i) || changed(i) && !spelled);
+        self.last = Brought {
+            work: std::array::from_fn(work),
+            machine: std::array::from_fn(|i| self.by[i] == By::Machine && (named(i) || changed(i))),
+            hidden: matches!(goal, Goal::Hidden),
+        };
         self.by
     }
 

@@ -424,7 +424,12 @@ impl Job<'_> {
         let moves = self.emptied(e, &area)?;
         if let Shape::Pocket { .. } | Shape::Hole { .. } = self.feature.shape {
             // A floor that is not flat leaves a disk further down: corners are those of the walls.
-            let y = if matches!(area.floor, Floor::Flat) { self.depth.min(self.bottom) } else { 0.0 };
+            let y = match (area.floor, &self.feature.shape) {
+                // A rounded foot or a ball of a floor draws the outline in: corners are those above it.
+                (Floor::Flat, Shape::Hole { bottom: HoleBottom::Radiused(r) | HoleBottom::Spherical(r), .. }) => (self.depth - r).max(0.0),
+                (Floor::Flat, _) => self.depth.min(self.bottom),
+                _ => 0.0,
+            };
             if let Some(region) = area.at(y)?.first() {
                 self.rest(e, region, |_| true);
             }
@@ -445,13 +450,20 @@ impl Job<'_> {
             _ => 0.0,
         };
         let through = self.bottom > self.depth;
-        if self.edge > asked + 1e-6 && !through && matches!(area.floor, Floor::Flat) {
-            self.leaves(e, &format!("a radius of {} mm all along the foot of its walls", self.edge));
+        if !through && matches!(area.floor, Floor::Flat) {
+            self.foot(e, asked);
         }
         if !area.steady() && !self.m.finish {
             self.leaves(e, &format!("stairs of up to {:.4} mm on its walls; a finishing workingstep takes them", self.stairs(&area)));
         }
         Ok(moves)
+    }
+
+    /// What a rounded edge leaves at the foot of walls that have a radius, or none.
+    pub(super) fn foot(&self, e: &mut Emit<'_>, asked: f64) {
+        if self.edge > asked + 1e-6 {
+            self.leaves(e, &format!("a radius of {} mm all along the foot of its walls", self.edge));
+        }
     }
 
     /// How far the stairs of roughing stand out from the walls.
@@ -612,6 +624,11 @@ impl Job<'_> {
             _ => return Err(String::new()),
         };
         let line = path(boundary)?;
+        // Past the underside of the raw part by the edge, nothing of it is left.
+        let under = self.step.stock.map(|[low, _]| self.feature.frame.inverse_point(low)[2]);
+        if under.is_none_or(|z| -self.bottom > z - self.edge + 1e-6) {
+            self.foot(e, 0.0);
+        }
         if !line.is_closed() {
             return self.beside(e, &line, left);
         }

@@ -67,6 +67,9 @@ impl Job<'_> {
             let cut = Cut::new(&shape, self.depth, self.radius + self.m.allowance_side, self.edge + self.m.allowance_side)?;
             let places = cut.places(self.tolerance)?.into_iter().map(|(u, y)| (u, (y - self.m.allowance_side).min(self.bottom)));
             self.along_section(&line, ends, closed, places.filter(|p| p.1 > 1e-6).collect(), &mut moves)?;
+            if floor < self.bottom - self.tolerance {
+                self.leaves(e, &format!("the last {:.4} mm above its floor, where it is too narrow", self.bottom - floor));
+            }
         } else if floor < self.bottom - 1e-6 {
             self.leaves(e, &format!("the last {:.4} mm above its floor, where it is too narrow", self.bottom - floor));
         } else if !cut.steady && !self.m.finish && !ball {
@@ -76,6 +79,9 @@ impl Job<'_> {
             self.rising_ends(&cut, &line, ends, floor, &mut moves)?;
         } else if rising {
             self.leaves(e, &format!("stairs of up to {:.4} mm on its Woodruff ends; a finishing workingstep takes them", self.axial.min(floor)));
+        }
+        if let Section::SquareU { radius, .. } = section {
+            self.foot(e, radius[0].min(radius[1]));
         }
         self.slot_rest(e, &line, &cut, floor, ends, closed);
         Ok(moves)
