@@ -144,8 +144,8 @@ fn gcode(lines: usize) {
         x = x.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (x >> 40) as f64 / 16_777_216.0 * 100.0
     };
-    let mut text = String::from("G21 G90 G17 F1000\n");
-    for _ in 0..lines.saturating_sub(2) {
+    let mut text = String::from("G21 G90 G17 F1000\nT1 M6\n");
+    for _ in 0..lines.saturating_sub(3) {
         let (a, b, c) = (next(), next(), next());
         text.push_str(&format!("G1 X{a:.4} Y{b:.4} Z{c:.4}\n"));
     }

@@ -6,7 +6,8 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
-use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, TryRecvError, channel};
+use std::time::Duration;
 
 use gr_driver::Session;
 use gr_text::{Diagnostic, Span};
@@ -49,9 +50,9 @@ pub enum Message {
     /// Diagnostics of the lines around the last edit were found; those of the rest follow.
     Early { uri: lsp::Uri, version: i32, lines: Range<u32>, found: Vec<Diagnostic> },
     /// Diagnostics of a version were found.
-    Found { uri: lsp::Uri, version: i32, calls: bool, found: Option<Arc<Vec<Diagnostic>>> },
+    Found { uri: lsp::Uri, version: i32, lane: usize, calls: bool, found: Option<Arc<Vec<Diagnostic>>> },
     /// Looking for diagnostics of a version broke off by a mistake of the server.
-    Failed { uri: lsp::Uri, version: i32 },
+    Failed { uri: lsp::Uri, version: i32, lane: usize },
 }
 
 /// What goes to the client without being asked for.
@@ -76,6 +77,9 @@ const MOST_ON_DISK: u64 = 1 << 30;
 
 /// Documents of this size are worth a progress report.
 const BIG: u32 = 4_000_000;
+
+/// Big exchange files are looked at as a whole, which no edit cuts short: after this time without a key.
+const QUIET: Duration = Duration::from_millis(300);
 
 pub(crate) type Job = Box<dyn FnOnce() + Send>;
 
@@ -117,7 +121,10 @@ pub struct Analysis {
     /// Files that are asked about and not open, as they were on disk; the last used at the end.
     unopened: Vec<(Option<(std::time::SystemTime, u64)>, Document)>,
     reads: Sender<Job>,
-    checks: Sender<Job>,
+    /// Workers that look for diagnostics, one job each at a time: the second one is for big exchange files.
+    checks: [Sender<Job>; 2],
+    /// Those that have a job.
+    checking: [bool; 2],
     background: Sender<Job>,
     own: Sender<Message>,
 }
@@ -141,7 +148,8 @@ impl Analysis {
             closed: Closed::default(),
             unopened: Vec::new(),
             reads: workers(2),
-            checks: workers(1),
+            checks: [workers(1), workers(1)],
+            checking: [false; 2],
             background: workers(1),
             own,
         }
@@ -149,8 +157,17 @@ impl Analysis {
 
     /// Works until the queue's other end is gone.
     pub fn serve(mut self, queue: &Receiver<Message>, publish: &(impl Fn(Event) + Clone + Send + 'static)) {
-        while let Ok(first) = queue.recv() {
-            self.take(first, publish);
+        let mut wait = None;
+        loop {
+            let next = match wait {
+                Some(time) => queue.recv_timeout(time),
+                None => queue.recv().map_err(|_| RecvTimeoutError::Disconnected),
+            };
+            match next {
+                Ok(first) => self.take(first, publish),
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => return,
+            }
             loop {
                 match queue.try_recv() {
                     Ok(next) => self.take(next, publish),
@@ -158,7 +175,7 @@ impl Analysis {
                     Err(TryRecvError::Disconnected) => return,
                 }
             }
-            self.check(publish);
+            wait = self.check(publish);
         }
     }
 
@@ -192,7 +209,10 @@ impl Analysis {
                 folders.extend(added);
                 folders.sort();
                 folders.dedup();
-                self.workspace.set_folders(folders);
+                if folders != self.workspace.folders() {
+                    self.workspace.set_folders(folders);
+                    self.reload(publish);
+                }
             }
             Message::Ask { uri, work } => {
                 let view = self.view(&uri).or_else(|| self.from_disk(&uri, publish));
@@ -209,8 +229,14 @@ impl Analysis {
             }
             Message::Closed { path, found } => self.closed.put(path, found),
             Message::Early { uri, version, lines, found } => self.early(&uri, version, &lines, found, publish),
-            Message::Found { uri, version, calls, found } => self.found(&uri, version, calls, found, publish),
-            Message::Failed { uri, version } => self.failed(&uri, version, publish),
+            Message::Found { uri, version, lane, calls, found } => {
+                self.checking[lane] = false;
+                self.found(&uri, version, calls, found, publish);
+            }
+            Message::Failed { uri, version, lane } => {
+                self.checking[lane] = false;
+                self.failed(&uri, version, publish);
+            }
         }
     }
 
@@ -234,9 +260,14 @@ impl Analysis {
     }
 
     /// Settings for a file: those of its folder come before the general ones.
-    fn settings_of(&self, path: &Path) -> &Arc<Settings> {
+    fn settings_of(&self, path: &Path) -> Arc<Settings> {
         let holds = self.of_folders.iter().filter(|(folder, _)| path.starts_with(folder));
-        holds.max_by_key(|(folder, _)| folder.as_os_str().len()).map_or(&self.settings, |f| &f.1)
+        let own = holds.max_by_key(|(folder, _)| folder.as_os_str().len()).map_or(&self.settings, |f| &f.1);
+        let folders = self.workspace.folders();
+        // Paths in them are relative to the folder that holds the file, and not to where the server was started.
+        let open = folders.iter().filter(|f| path.starts_with(f)).max_by_key(|f| f.as_os_str().len()).or(folders.first());
+        let from = open.map(PathBuf::as_path).or(path.parent()).unwrap_or(Path::new(""));
+        Arc::new(Settings { folders: folders.clone(), ..own.below(from) })
     }
 
     /// What a request about a document works on.
@@ -283,7 +314,7 @@ impl Analysis {
     fn view_of(&self, document: &Document) -> View {
         let session = matches!(document.kind, Kind::Gcode(..)).then(|| self.session.snapshot());
         let others = self.open_files().into_iter().filter(|o| o.uri != document.uri).collect();
-        let (settings, host, workspace) = (self.settings_of(&document.path).clone(), self.host.clone(), self.workspace.clone());
+        let (settings, host, workspace) = (self.settings_of(&document.path), self.host.clone(), self.workspace.clone());
         View::new(document, self.columns, settings, host, workspace, Arc::new(others), session)
     }
 
@@ -293,7 +324,7 @@ impl Analysis {
         if let Some(known) = self.stations.get(&folder) {
             return known.clone();
         }
-        let station = Arc::new(self.host.station(path, self.settings_of(path)));
+        let station = Arc::new(self.host.station(path, &self.settings_of(path)));
         self.stations.insert(folder.clone(), station.clone());
         self.tell_station(&folder, &station, publish);
         station
@@ -327,7 +358,7 @@ impl Analysis {
     /// Has a program that is not open looked at, when nothing else is to be done.
     fn look_at_closed(&mut self, path: PathBuf, publish: &impl Fn(Event)) {
         let station = self.station(&path, publish);
-        let (columns, settings, host, workspace) = (self.columns, self.settings_of(&path).clone(), self.host.clone(), self.workspace.clone());
+        let (columns, settings, host, workspace) = (self.columns, self.settings_of(&path), self.host.clone(), self.workspace.clone());
         let own = self.own.clone();
         let job = move || {
             let found = crate::closed::look(&path, columns, settings, host, workspace, station);
@@ -341,6 +372,7 @@ impl Analysis {
         self.forget(&uri);
         self.forget_unopened(|d| d.uri == uri);
         let document = self.document(uri.clone(), language, version, text, publish);
+        self.callers_again(&uri);
         self.documents.insert(uri, document);
     }
 
@@ -373,8 +405,11 @@ impl Analysis {
         }
         document.version = version;
         document.latest.store(version, Ordering::Relaxed);
-        document.derived = Arc::default();
+        document.edited = Some(std::time::Instant::now());
         document.stale = true;
+        // Tables of a big file take a while to be put away.
+        let old = std::mem::take(&mut document.derived);
+        let _ = self.background.send(Box::new(move || drop(old)));
         self.look_again(uri);
         self.callers_again(uri);
     }
@@ -421,6 +456,7 @@ impl Analysis {
 
     fn close(&mut self, uri: &lsp::Uri, publish: &impl Fn(Event)) {
         self.forget(uri);
+        self.callers_again(uri);
         publish(Event::Diagnostics { uri: uri.clone(), version: None, diagnostics: Vec::new(), open: false });
     }
 
@@ -480,15 +516,28 @@ impl Analysis {
         }
     }
 
-    /// Has diagnostics of changed documents found.
-    fn check(&mut self, publish: &(impl Fn(Event) + Clone + Send + 'static)) {
+    /// Has diagnostics of changed documents found, small ones first. A view is made when a worker is free for it, so that
+    /// none of an outdated version waits. Gives the time after which to come again.
+    fn check(&mut self, publish: &(impl Fn(Event) + Clone + Send + 'static)) -> Option<Duration> {
         self.look_at_disk();
-        let stale: Vec<lsp::Uri> = self.documents.values().filter(|d| d.stale).map(|d| d.uri.clone()).collect();
-        for uri in stale {
-            let Some(view) = self.view(&uri) else { continue };
+        let mut stale: Vec<(u32, lsp::Uri)> = self.documents.values().filter(|d| d.stale).map(|d| (d.text.len(), d.uri.clone())).collect();
+        stale.sort();
+        let mut wait: Option<Duration> = None;
+        for (_, uri) in stale {
+            let Some(document) = self.documents.get(&uri) else { continue };
+            let lane = usize::from(matches!(document.kind, Kind::Exchange) && document.text.len() > BIG);
+            if self.checking[lane] {
+                continue;
+            }
+            if let Some(rest) = document.edited.filter(|_| lane == 1).and_then(|t| QUIET.checked_sub(t.elapsed())) {
+                wait = Some(wait.map_or(rest, |w| w.min(rest)));
+                continue;
+            }
+            let view = self.view_of(document);
             if let Some(d) = self.documents.get_mut(&uri) {
                 d.stale = false;
             }
+            self.checking[lane] = true;
             let (own, publish) = (self.own.clone(), publish.clone());
             let big = view.text.len() > BIG && view.version <= 1;
             let job = move || {
@@ -496,22 +545,25 @@ impl Analysis {
                     publish(Event::Busy { uri: view.uri.clone(), begins: true });
                 }
                 let (uri, version) = (view.uri.clone(), view.version);
-                if let Ok(Some((lines, found))) = crate::features::early(&view) {
-                    let _ = own.send(Message::Early { uri: uri.clone(), version, lines, found });
-                }
-                let calls = crate::features::calls(&view);
-                let found = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| crate::features::diagnostics(view)));
+                let look = || {
+                    if let Ok(Some((lines, found))) = crate::features::early(&view) {
+                        let _ = own.send(Message::Early { uri: uri.clone(), version, lines, found });
+                    }
+                    (crate::features::calls(&view), crate::features::diagnostics(view))
+                };
+                let found = std::panic::catch_unwind(std::panic::AssertUnwindSafe(look));
                 if big {
                     publish(Event::Busy { uri: uri.clone(), begins: false });
                 }
                 let _ = own.send(match found {
                     // Cut short by an edit: the edit has made the document stale again.
-                    Ok(found) => Message::Found { uri, version, calls, found: found.ok().map(Arc::new) },
-                    Err(_) => Message::Failed { uri, version },
+                    Ok((calls, found)) => Message::Found { uri, version, lane, calls, found: found.ok().map(Arc::new) },
+                    Err(_) => Message::Failed { uri, version, lane },
                 });
             };
-            let _ = self.checks.send(Box::new(job));
+            let _ = self.checks[lane].send(Box::new(job));
         }
+        wait
     }
 
     fn found(&mut self, uri: &lsp::Uri, version: i32, calls: bool, found: Option<Arc<Vec<Diagnostic>>>, publish: &impl Fn(Event)) {

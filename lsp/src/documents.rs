@@ -371,10 +371,27 @@ impl View {
             return Some(planning.clone());
         }
         let own = self.text.to_string();
-        let texts = std::iter::once((motion.main, own.as_str())).chain(motion.subs.iter().map(|(id, t)| (*id, t.as_str())));
-        let planning = Arc::new(gr_robot::plan(&motion.program, machine, &Texts::new(texts), &gr_robot::Options::default()));
+        let planning = Arc::new(gr_robot::plan(&motion.program, machine, &self.lines(motion, &own), &gr_robot::Options::default()));
         *known = Some((motion.program.clone(), planning.clone()));
         Some(planning)
+    }
+    /// The lines that the motion comes from; `own`: the text of the document.
+    fn lines<'a>(&self, motion: &'a Motion, own: &'a str) -> Texts<'a> {
+        let texts = std::iter::once((motion.main, own)).chain(motion.subs.iter().map(|(id, t)| (*id, t.as_str())));
+        match self.kind {
+            Kind::Exchange => Texts::new(texts).instances(),
+            Kind::Gcode(_, dialect) => Texts::new(texts).with_increments(dialect.id == "fanuc-turn"),
+            _ => Texts::new(texts),
+        }
+    }
+    /// What the chosen machine has to say about the motion, in all its files: that is what `check` says.
+    pub fn opinion(&self, motion: &Motion) -> Vec<Diagnostic> {
+        let Some(machine) = &self.station.machine else { return Vec::new() };
+        match self.planning(motion).as_deref() {
+            Some(Ok(planned)) => planned.warnings.clone(),
+            Some(Err(found)) => found.clone(),
+            None => gr_robot::opinion::opinion(&motion.program, machine, &self.lines(motion, &self.text.to_string()), &gr_robot::Options::default()),
+        }
     }
     /// Whether the plan is there, or soon is: see [`View::planning`].
     pub fn plans_quickly(&self, motion: &Motion) -> bool {
@@ -438,6 +455,8 @@ pub struct Document {
     pub failed: bool,
     /// The line that was edited last: what is visible is around it.
     pub focus: u32,
+    /// When it was edited last.
+    pub edited: Option<std::time::Instant>,
     /// Worked out once per version.
     pub derived: Arc<Derived>,
     /// A client has it open: else it is what stands on disk.
@@ -465,6 +484,7 @@ impl Document {
             calls: false,
             failed: false,
             focus: 0,
+            edited: None,
             derived: Arc::default(),
             open: true,
             latest: Arc::new(AtomicI32::new(version)),

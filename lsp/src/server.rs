@@ -127,7 +127,9 @@ impl Backend {
                 *running.lock().unwrap_or_else(PoisonError::into_inner) = view.as_ref().and_then(View::canceller);
                 // Nobody waits any more when the request was cancelled.
                 if !send.is_closed() {
-                    let _ = send.send(view.map(work).transpose());
+                    // The tables of an exchange file are made of a whole text: not of one that is outdated already.
+                    let late = view.as_ref().is_some_and(|v| matches!(v.kind, Kind::Exchange) && v.is_overtaken());
+                    let _ = send.send(if late { Err(Failure::Overtaken) } else { view.map(work).transpose() });
                 }
             }),
         });
@@ -336,7 +338,7 @@ fn capabilities(utf8: bool, pulls: bool) -> lsp::ServerCapabilities {
         "diagnosticProvider": { "identifier": "gcc-robot", "interFileDependencies": true, "workspaceDiagnostics": pulls },
         "workspace": { "workspaceFolders": { "supported": true, "changeNotifications": true } },
         "semanticTokensProvider": { "legend": features::legend(), "range": true, "full": { "delta": true } },
-        "experimental": { "gccRobot": ["preview", "output", "state", "targets", "explain"] },
+        "experimental": { "gccRobot": ["preview", "output", "state", "targets", "explain", "buildOptions"] },
     });
     serde_json::from_value(value).unwrap_or_default()
 }
@@ -611,6 +613,9 @@ impl Backend {
     async fn output(&self, p: custom::OutputParams) -> Result<Option<custom::Output>> {
         self.ask_again(p.text_document.uri.clone(), move |v| features::output(v, &p)).await
     }
+    async fn build_options(&self, p: custom::DocumentParams) -> Result<Option<custom::BuildOptions>> {
+        self.ask_again(p.text_document.uri, features::build_options).await
+    }
     async fn state(&self, p: custom::StateParams) -> Result<Option<custom::State>> {
         self.ask_again(p.text_document.uri, move |v| features::state(v, p.position)).await
     }
@@ -639,6 +644,7 @@ pub async fn serve(input: impl AsyncRead + Unpin + Send + 'static, output: impl 
         .custom_method("gccRobot/state", Backend::state)
         .custom_method("gccRobot/targets", Backend::targets)
         .custom_method("gccRobot/explain", Backend::explain)
+        .custom_method("gccRobot/buildOptions", Backend::build_options)
         .finish();
     let serving = Server::new(input, output, socket).concurrency_level(16).serve(service);
     let gone = async {

@@ -1,7 +1,7 @@
 //! What the user can choose: section `gccRobot` of the client's settings. `gcc-robot.toml` says what belongs to the
 //! programs; these come first.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use gr_ide::gcode::hints::{HintKinds, Positions};
 use serde::Deserialize;
@@ -33,6 +33,9 @@ pub struct Settings {
     pub hints: Hints,
     /// Most diagnostics of a file that are sent.
     pub most_problems: usize,
+    /// Folders that are open: beside the paths that are configured, no others are read.
+    #[serde(skip)]
+    pub folders: Vec<PathBuf>,
 }
 
 impl Default for Settings {
@@ -49,6 +52,7 @@ impl Default for Settings {
             lints: Lints::default(),
             hints: Hints::default(),
             most_problems: 1_000,
+            folders: Vec::new(),
         }
     }
 }
@@ -155,6 +159,47 @@ pub struct Read {
 }
 
 impl Settings {
+    /// The same with paths that are relative to this folder.
+    pub fn below(&self, folder: &Path) -> Settings {
+        let at = |path: &PathBuf| folder.join(path);
+        let machine = |name: &String| {
+            let path = folder.join(name);
+            let file = gr_machine::source(name).is_none() && (gr_machine::is_path(name) || path.is_file());
+            if file { path.to_string_lossy().into_owned() } else { name.clone() }
+        };
+        Settings {
+            machine: self.machine.as_ref().map(machine),
+            tools: self.tools.as_ref().map(at),
+            ini: self.ini.as_ref().map(at),
+            vars: self.vars.as_ref().map(at),
+            subs: self.subs.iter().map(at).collect(),
+            ..self.clone()
+        }
+    }
+
+    /// As options of `gcc-robot build`. The dialect is the one that the program is read in, where one was chosen: as an
+    /// option it would go before what the program says itself.
+    pub fn options(&self, dialect: Option<&gr_spec::Dialect>) -> Vec<String> {
+        let path = |p: &PathBuf| p.to_string_lossy().into_owned();
+        let mut options = Vec::new();
+        let mut give = |name: &str, value: Option<String>| {
+            options.extend(value.into_iter().flat_map(|v| [format!("--{name}"), v]));
+        };
+        give("dialect", dialect.filter(|_| self.dialect.is_some()).map(|d| d.id.to_string()));
+        give("machine", self.machine.clone());
+        give("tools", self.tools.as_ref().map(path));
+        give("ini", self.ini.as_ref().map(path));
+        give("vars", self.vars.as_ref().map(path));
+        give("machine-units", self.machine_units.clone());
+        self.subs.iter().for_each(|s| give("subs", Some(path(s))));
+        for (name, lints) in [("allow", &self.lints.allow), ("warn", &self.lints.warn), ("deny", &self.lints.deny)] {
+            lints.iter().for_each(|l| give(name, Some(l.clone())));
+        }
+        let switches = [("--block-delete", self.block_delete), ("--strict", self.lints.strict)];
+        options.extend(switches.iter().filter(|s| s.1).map(|s| s.0.to_string()));
+        options
+    }
+
     /// Reads what a client sent: the section itself or an object that holds it.
     pub fn read(value: &Value) -> Read {
         let section = value.get("gccRobot").or_else(|| value.get("gcc-robot")).unwrap_or(value);

@@ -216,6 +216,57 @@ impl Host for Fragile {
     }
 }
 
+/// Counts how often a STEP-NC file is looked at as a whole.
+#[derive(Default)]
+struct Counting(std::sync::atomic::AtomicUsize);
+
+impl Host for Counting {
+    fn station(&self, _: &Path, _: &Settings) -> Station {
+        Station::default()
+    }
+    fn check_project(&self, _: &Path, _: &str) -> Vec<Diagnostic> {
+        Vec::new()
+    }
+    fn check_exchange(&self, path: &Path, text: &str, station: &Station) -> Vec<Diagnostic> {
+        self.0.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+        Plain.check_exchange(path, text, station)
+    }
+    fn plan(&self, _: &Path, _: &str, _: &Station) -> Option<Plan> {
+        None
+    }
+    fn undeclared(&self, _: &Path, _: &str, _: &Settings) -> bool {
+        false
+    }
+    fn output(&self, _: &OutputJob<'_>) -> Result<Made, String> {
+        Err(String::new())
+    }
+}
+
+/// A big STEP-NC file is not looked at for every key of a burst, and no version that is outdated waits for its turn.
+#[test]
+fn a_burst_of_keys_is_looked_at_once() {
+    let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_time().build().expect("a runtime");
+    runtime.block_on(async {
+        let host = Arc::new(Counting::default());
+        let mut c = Client::of(host.clone()).await;
+        let uri = "file:///programs/big.p21";
+        let mut text = String::from("ISO-10303-21;\nDATA;\n");
+        (1..120_000).for_each(|n| text.push_str(&format!("#{n}=CARTESIAN_POINT('',(0.,0.,0.));\n")));
+        assert!(text.len() > 4_000_000 && text.len() < 8_000_000);
+        c.open(uri, &text).await;
+        let _ = c.published(1, &mut Vec::new()).await;
+        for version in 2..62 {
+            let range = json!({ "start": { "line": 5, "character": 0 }, "end": { "line": 5, "character": 0 } });
+            let change = json!([{ "range": range, "text": " " }]);
+            c.notify("textDocument/didChange", json!({ "textDocument": { "uri": uri, "version": version }, "contentChanges": change })).await;
+        }
+        let _ = c.published(61, &mut Vec::new()).await;
+        let looks = host.0.load(std::sync::atomic::Ordering::Relaxed);
+        assert!(looks < 10, "{looks} looks for 60 keys");
+    });
+    runtime.shutdown_background();
+}
+
 /// When looking for diagnostics breaks off, those of before stay and the user is told, once.
 #[test]
 fn a_mistake_of_the_server_is_told() {

@@ -1,6 +1,7 @@
 //! The error of the tool point at one place of the machine: by joints, by geometry, by force.
 
 use crate::grade;
+use crate::words::unplaced;
 use gr_machine::math::{V3, add, cross, dot, norm, scale, sub};
 use gr_machine::{Chain, KinematicsError, Machine, ParameterKind, TwoLegs, differential, parameter_columns};
 
@@ -109,11 +110,20 @@ pub(crate) fn at_lever(column: &[f64; 6], lever: V3) -> V3 {
     add([x, y, z], cross([a, b, c], lever))
 }
 
+/// Takes away what rotary axes would move that are nobody knows where. The columns are of the joints, or end with those of their zeros.
+pub(crate) fn blank(machine: &Machine, columns: &mut [[f64; 6]]) {
+    let first = columns.len().saturating_sub(machine.joints.len());
+    let of_joints = columns[first..].iter_mut().enumerate();
+    of_joints.filter(|(joint, _)| unplaced(machine, *joint)).for_each(|(_, c)| *c = [0.0; 6]);
+}
+
 impl Sensitivity {
     /// At joint values, for a tool point `lever` from the flange (base directions, mm).
     pub fn new(machine: &Machine, joints: &[f64], lever: V3) -> Result<Sensitivity, KinematicsError> {
-        let columns = differential::velocity(machine, joints)?;
-        let parameters = parameter_columns(machine, joints)?;
+        let mut columns = differential::velocity(machine, joints)?;
+        let mut parameters = parameter_columns(machine, joints)?;
+        blank(machine, &mut columns);
+        blank(machine, &mut parameters);
         let stiff = machine.cell.stiffness.as_ref();
         Ok(Sensitivity {
             joints: columns.iter().map(|c| at_lever(c, lever)).collect(),
@@ -122,9 +132,9 @@ impl Sensitivity {
         })
     }
 
-    /// The same for a two-leg machine whose place is known; none at a singularity.
-    pub fn of_two_legs(machine: &Machine, legs: &TwoLegs, at: V3) -> Option<Sensitivity> {
-        let cut = |c: &[f64; 6]| [c[0], c[1], c[2]];
+    /// The same for a two-leg machine whose place is known, for a tool point `lever` from the platform; none at a singularity.
+    pub fn of_two_legs(machine: &Machine, legs: &TwoLegs, at: V3, lever: V3) -> Option<Sensitivity> {
+        let cut = |c: &[f64; 6]| at_lever(c, lever);
         let stiff = machine.cell.stiffness.as_ref();
         let lengths = legs.lengths(at);
         Some(Sensitivity {

@@ -31,5 +31,5 @@ pub mod report;
 mod words;
 
 pub use error::{Budget, BudgetOptions, Errors, Sensitivity, Spread, closed_form};
-pub use gr_robot::words::{put_down, work_shift};
+pub use gr_robot::words::{put_down, unplaced, work_shift};
 pub use words::Named;

@@ -1,10 +1,10 @@
 //! Maps over the work space: a quantity on a grid in a plane of the base; on machines with a turning table, of the part's frame on it.
 
 use crate::clearance::Lattice;
-use crate::error::{Budget, Sensitivity, Spread, at_lever, closed_form};
-use crate::words::{Asked, Words, sensitivity};
-use gr_machine::math::{Frame, M3, V3, dot, eigenvalues, norm, rot_x, rotate, sub};
-use gr_machine::{Chain, Control, JointKind, Kind, Kinematics, Machine, Opw, TwoLegs, differential};
+use crate::error::{Budget, Sensitivity, Spread, at_lever, blank, closed_form};
+use crate::words::{Asked, Slides, Words, sensitivity};
+use gr_machine::math::{Frame, M3, V3, add, dot, eigenvalues, norm, product, rot_x, rot_z, rotate, sub};
+use gr_machine::{Chain, Control, JointKind, Kind, Kinematics, KinematicsError, Machine, Opw, TwoLegs, differential};
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -280,6 +280,8 @@ pub struct Probe<'a> {
     /// Tool point on the flange.
     tool: Frame,
     start: Vec<f64>,
+    /// On a machine tool that stands as at a place of a program: its rotary words are what they are there.
+    words: Option<(Slides, V3)>,
     /// What moves the tool point where the part was touched: errors by the geometry count from there.
     zero: Option<Sensitivity>,
     /// What one radian of a turning joint counts beside one mm of a sliding one, mm; once it is asked for.
@@ -294,7 +296,7 @@ impl<'a> Probe<'a> {
         let start = machine.start_joints.clone().unwrap_or_default();
         let kinematics = machine.kinematics();
         let turn = machine.start.frame().turn;
-        Probe { machine, kinematics, turn, tool: Frame::IDENTITY, start, zero: None, lever: OnceLock::new(), extent: OnceLock::new() }
+        Probe { machine, kinematics, turn, tool: Frame::IDENTITY, start, words: None, zero: None, lever: OnceLock::new(), extent: OnceLock::new() }
     }
 
     /// As on a machine tool whose part was touched there; other machines have no such zero.
@@ -345,13 +347,54 @@ impl<'a> Probe<'a> {
     pub fn held(self, tool: Frame, turn: M3) -> Probe<'a> {
         // A spindle that can't turn its part stands as it stands.
         let turn = if matches!(self.machine.chain, Chain::Cartesian) { self.turn } else { turn };
-        Probe { tool, turn, ..self }
+        Probe { tool, turn, lever: OnceLock::new(), extent: OnceLock::new(), ..self }
+    }
+
+    /// With that tool (on the flange), turned as it is without one where the machine can turn it at will; where it can't, as it is
+    /// mounted.
+    pub fn holding(self, tool: Frame) -> Probe<'a> {
+        let free = self.kinematics.control() == Control::Axis || self.machine.joints.len() >= 6;
+        let turn = if free { self.turn } else { product(&self.turn, &tool.turn) };
+        self.held(tool, turn)
+    }
+
+    /// With the tool (on the flange) as it stands at those joint values, at every place: a machine tool with its rotary axes as they
+    /// are, an arm with joints as near to them as can be.
+    pub fn standing(self, tool: Frame, joints: &[f64]) -> Result<Probe<'a>, KinematicsError> {
+        let here = self.kinematics.forward_frame(joints)?;
+        let mut out = self.held(tool, here.then(&tool).turn);
+        out.start = joints.to_vec();
+        if let (true, Ok(Words::Joints(slides))) = (out.machine.kind != Kind::Robot, Words::of(out.machine)) {
+            let mut rotary = [0.0; 3];
+            for (joint, word) in &slides.turning {
+                if let (Some(slot), Some(v)) = (word.checked_sub(3).and_then(|w| rotary.get_mut(w)), joints.get(*joint)) {
+                    *slot = *v;
+                }
+            }
+            out.words = Some((slides, rotary));
+        }
+        Ok(out)
+    }
+
+    /// With errors by the geometry counted from what moves the tool point at a zero that was touched.
+    pub fn since(self, zero: Option<Sensitivity>) -> Probe<'a> {
+        Probe { zero, ..self }
+    }
+
+    /// How far the tool's axis is turned away from straight down on arms, whose tools point along Z of their frame, and from
+    /// upright elsewhere, rad.
+    pub fn lean(&self) -> f64 {
+        let up = self.turn[2][2];
+        libm::acos((if self.leans() { up } else { -up }).clamp(-1.0, 1.0))
     }
 
     /// Where the flange is when the tool point is there. A machine that only places its tool point takes it upright.
     pub(crate) fn flange(&self, p: V3) -> Frame {
         match self.kinematics.control() {
             Control::Position => Frame::shift(sub(p, self.tool.position)),
+            _ if matches!(self.machine.chain, Chain::Cartesian) => {
+                Frame { turn: self.turn, position: sub(p, self.tool.position) }
+            }
             _ => Frame { turn: self.turn, position: p }.then(&self.tool.inverse()),
         }
     }
@@ -374,6 +417,11 @@ impl<'a> Probe<'a> {
     pub fn joints(&self, p: V3) -> Option<Vec<f64>> {
         if let Chain::Opw(k) = &self.machine.chain {
             return self.opw(k, p).map(|q| q.to_vec());
+        }
+        if let Some((slides, rotary)) = &self.words {
+            let asked = Asked { tip: p, tool: self.tool, rotary: *rotary };
+            let q = slides.stand(self.machine, &*self.kinematics, &asked)?.joints;
+            return (self.machine.outside(&q).is_empty() && self.kinematics.violations(&q).is_empty()).then_some(q);
         }
         let all = self.kinematics.inverse_frame(&self.flange(p)).ok()?;
         let good = all.into_iter().map(|s| s.joints).filter(|q| {
@@ -437,7 +485,9 @@ impl<'a> Probe<'a> {
                 if !legs_reach(k, at) {
                     return None;
                 }
-                Sensitivity::of_two_legs(self.machine, k, at)
+                // The platform turns by the yaw, and the tool with it.
+                let lever = rotate(&rot_z(at[1]), self.tool.position);
+                Sensitivity::of_two_legs(self.machine, k, at, lever)
             }
             _ if geometry => {
                 let q = self.joints(p)?;
@@ -450,7 +500,8 @@ impl<'a> Probe<'a> {
             }
             _ => {
                 let q = self.joints(p)?;
-                let columns = differential::velocity(self.machine, &q).ok()?;
+                let mut columns = differential::velocity(self.machine, &q).ok()?;
+                blank(self.machine, &mut columns);
                 self.bare(&q, &columns)
             }
         }
@@ -458,8 +509,8 @@ impl<'a> Probe<'a> {
 
     /// From the flange to the tool point, base directions.
     fn lever(&self, q: &[f64]) -> Option<V3> {
-        if self.tool.position == [0.0; 3] {
-            return Some([0.0; 3]);
+        if self.tool.position == [0.0; 3] || matches!(self.machine.chain, Chain::Cartesian) {
+            return Some(self.tool.position);
         }
         Some(rotate(&self.kinematics.forward_frame(q).ok()?.turn, self.tool.position))
     }
@@ -478,7 +529,21 @@ impl<'a> Probe<'a> {
     /// The part of the base the tool can reach, roughly: least and greatest X, Y and Z, mm. Exactly so for the turn of the tool on mills
     /// of five axes.
     pub fn extent(&self) -> [(f64, f64); 3] {
-        *self.extent.get_or_init(|| self.corners().unwrap_or_else(|| self.searched_extent()))
+        *self.extent.get_or_init(|| self.corners().unwrap_or_else(|| self.moved(self.searched_extent(), -1.0)))
+    }
+
+    /// The same of the flange.
+    pub(crate) fn flange_extent(&self) -> [(f64, f64); 3] {
+        self.moved(self.extent(), 1.0)
+    }
+
+    /// A box moved by the way from the tool point to the flange, or back.
+    fn moved(&self, extent: [(f64, f64); 3], by: f64) -> [(f64, f64); 3] {
+        if self.tool.position == [0.0; 3] {
+            return extent;
+        }
+        let way = self.flange([0.0; 3]).position;
+        [0, 1, 2].map(|i| (extent[i].0 + by * way[i], extent[i].1 + by * way[i]))
     }
 
     /// The part of the base the tool can reach in any turn of it, roughly.
@@ -495,7 +560,14 @@ impl<'a> Probe<'a> {
         let middle: Vec<f64> = joints.iter().map(|j| if j.kind == JointKind::Revolute { 0.0 } else { (limits(j).0 + limits(j).1) / 2.0 }).collect();
         let somewhere = self.kinematics.forward_frame(&middle).ok()?.position;
         let turning = |q: &[f64]| joints.iter().zip(q).all(|(j, v)| j.kind != JointKind::Revolute || j.allows(*v));
-        let ways = self.kinematics.inverse_frame(&self.flange(somewhere)).ok()?.into_iter().map(|s| s.joints).filter(|q| turning(q));
+        let ways = match &self.words {
+            Some((slides, rotary)) => {
+                let asked = Asked { tip: somewhere, tool: self.tool, rotary: *rotary };
+                vec![slides.stand(self.machine, &*self.kinematics, &asked)?.joints]
+            }
+            None => self.kinematics.inverse_frame(&self.flange(somewhere)).ok()?.into_iter().map(|s| s.joints).collect(),
+        };
+        let ways = ways.into_iter().filter(|q| turning(q));
         let mut out: Option<[(f64, f64); 3]> = None;
         for q in ways {
             for corner in 0..1u32 << joints.len().min(16) {
@@ -554,12 +626,13 @@ impl<'a> Probe<'a> {
             && t.shape.flange_offset > 0.0
         {
             // The only turning joints are those of the wrist, whose axes meet in its centre.
-            return t.shape.flange_offset;
+            return norm(add([0.0, 0.0, t.shape.flange_offset], self.tool.position));
         }
         let lever = |q: &[f64]| {
             let columns = differential::velocity(self.machine, q).ok()?;
+            let lever = self.lever(q)?;
             let turning = columns.iter().zip(&self.machine.joints).filter(|(_, j)| j.kind == JointKind::Revolute);
-            turning.map(|(c, _)| norm([c[0], c[1], c[2]])).reduce(f64::max)
+            turning.map(|(c, _)| norm(at_lever(c, lever))).reduce(f64::max)
         };
         let places = (1..LEVERS).map(|n| spread_joints(self.machine, n));
         let mut found: Vec<(f64, Vec<f64>)> = places.filter_map(|q| Some((lever(&q)?, q))).collect();

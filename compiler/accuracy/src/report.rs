@@ -66,7 +66,7 @@ impl CutData {
         let all = match work {
             Work::Mill => &mill[..],
             Work::Drill => &drill[..],
-            Work::Other => &[],
+            Work::Other | Work::Turn => &[],
         };
         all.iter().filter(|(v, _)| v.is_none()).map(|(_, n)| *n).collect()
     }
@@ -91,6 +91,8 @@ pub enum Work {
     Drill,
     /// Tapping, threading, boring, reaming, countersinking: no law here.
     Other,
+    /// Turning: the part turns, and the force is along its cut. No law here.
+    Turn,
 }
 
 impl Work {
@@ -121,8 +123,17 @@ pub struct Operation {
     pub cut: CutData,
     /// What it does all the time, where that is known; else each place says.
     pub work: Option<Work>,
+    /// Its part turns, as on a lathe: what else would be milling is turning.
+    pub turned: bool,
     /// Where its first cut is.
     pub first: Source,
+}
+
+impl Operation {
+    /// The work at a place where the tool would do this, if it were the tool that turned.
+    fn of_part(&self, work: Work) -> Work {
+        if self.turned && work == Work::Mill { Work::Turn } else { work }
+    }
 }
 
 /// The operations of a program, and which one each place of the source belongs to.
@@ -212,10 +223,11 @@ impl Operations {
 
     /// Kinds of work that an operation has.
     pub fn works(&self, operation: usize) -> Vec<Work> {
-        if let Some(work) = self.list.get(operation).and_then(|o| o.work) {
-            return vec![work];
+        let Some(o) = self.list.get(operation) else { return Vec::new() };
+        match o.work {
+            Some(work) => vec![o.of_part(work)],
+            None => self.works.get(operation).map_or(Vec::new(), |all| all.iter().map(|w| o.of_part(*w)).collect()),
         }
-        self.works.get(operation).cloned().unwrap_or_default()
     }
 }
 
@@ -228,6 +240,10 @@ pub struct Worst {
     pub point: V3,
     /// Joints there, mm or rad.
     pub joints: Vec<f64>,
+    /// Tool point and turn of the tool on the flange.
+    pub tool: Frame,
+    /// What moves the tool point at the program's zero, where errors by the geometry count from there.
+    pub zero: Option<std::rc::Rc<Sensitivity>>,
     /// Errors there.
     pub errors: Errors,
     /// Thickness of the chip there, mm, where the deflection is by one that the force law was not measured for.
@@ -261,6 +277,8 @@ pub enum Unforced {
     Across,
     /// There is no law of such work here.
     NoLaw,
+    /// There is no law of turning here.
+    Turned,
     /// No turns per minute are known.
     NoSpeed,
     /// Only rotary axes move: the tool turns about its point, which stays where it is on the part.
@@ -382,7 +400,9 @@ struct Spot {
     joints: Vec<f64>,
     /// Tool point in the base, mm.
     point: V3,
-    /// From the flange to it, base directions, mm.
+    /// The tool on the flange.
+    tool: Frame,
+    /// From the flange to its point, base directions, mm.
     lever: V3,
     /// Direction of the feed in the base; zero where it does not move.
     feed: V3,
@@ -461,7 +481,7 @@ impl<'a> Walk<'a> {
     fn place(&self, source: Source, point: V3, (feed, speed): (V3, f64), rotary: [f64; 3]) -> Option<Place> {
         let mut place = *self.operations.places.get(&source)?;
         let operation = self.operations.list.get(place.operation)?;
-        place.work = operation.work.unwrap_or(place.work);
+        place.work = operation.of_part(operation.work.unwrap_or(place.work));
         let near = self.last.as_ref().is_some_and(|last| {
             let turned = last.rotary.iter().zip(rotary).any(|(a, b)| (a - b).abs() > LEAN);
             let as_fast = (last.speed - speed).abs() <= 1e-9 * speed.abs();
@@ -527,7 +547,7 @@ impl<'a> Walk<'a> {
         let lever = rotate(&real.turn, self.tool.position);
         let axis = self.towards_spindle(&here, &real);
         let (turns, rotary) = (self.turning, [0.0; 3]);
-        self.record(&Spot { place, source, joints, point: here.position, lever, feed, zero: None, axis, speed, turns, rotary });
+        self.record(&Spot { place, source, joints, point: here.position, tool: self.tool, lever, feed, zero: None, axis, speed, turns, rotary });
     }
 
     /// Puts what is predicted at a place into its row.
@@ -552,7 +572,7 @@ impl<'a> Walk<'a> {
         let force = match spot.place.work {
             Work::Drill => self.thrust(spot),
             Work::Mill => self.force(spot),
-            Work::Other => None,
+            Work::Other | Work::Turn => None,
         };
         let errors = Errors { elastic: force.and_then(|f| at.deflection(f.0)), ..sensed.errors };
         let unforced = if force.is_none() { self.unforced(spot) } else { None };
@@ -605,7 +625,8 @@ impl<'a> Walk<'a> {
         }
         if row.worst.as_ref().is_none_or(|w| sum > w.errors.sum()) {
             let causes = causes(self.machine, at, self.budget);
-            row.worst = Some(Worst { source, point: spot.point, joints: spot.joints.clone(), errors, beyond_law, causes });
+            let (joints, zero) = (spot.joints.clone(), spot.zero.clone());
+            row.worst = Some(Worst { source, point: spot.point, joints, tool: spot.tool, zero, errors, beyond_law, causes });
         }
     }
 
@@ -622,6 +643,10 @@ impl<'a> Walk<'a> {
 
     /// Why there is no force at a place, where that is not that a number of the whole operation is not known.
     fn unforced(&self, spot: &Spot) -> Option<Unforced> {
+        // Without a law it is of no use to ask for a material.
+        if spot.place.work == Work::Turn {
+            return Some(Unforced::Turned);
+        }
         self.material?;
         let cut = self.operations.list.get(spot.place.operation)?.cut;
         if !cut.missing(spot.place.work).is_empty() {

@@ -4,7 +4,7 @@ use crate::error::Sensitivity;
 use gr_ir::View;
 use gr_machine::math::{Frame, V3};
 use gr_machine::{Kinematics, Machine};
-pub(crate) use gr_robot::words::{Asked, Slides, Words, frame, put_down, rotary, slid, started, tool};
+pub(crate) use gr_robot::words::{Asked, Slides, Words, as_far_as_known, frame, put_down, rotary, slid, started, tool, unplaced};
 
 /// What moves the tool point there.
 pub(crate) fn sensitivity(slides: &Slides, machine: &Machine, kinematics: &dyn Kinematics, asked: &Asked) -> Option<Sensitivity> {

@@ -125,7 +125,7 @@ fn with_deviations(id: &str, rows: &[(&str, f64)]) -> Machine {
     ))
 }
 
-/// Y leans by 0.02° towards X: the corrected words, taken as a machine that leans takes them, are the programmed path.
+/// X and Y stand at 90.02°, so Y leans away from X: the corrected words, taken as a machine that leans takes them, are the programmed path.
 #[test]
 fn a_mill_that_is_not_square() {
     let m = with_deviations("generic/mill3", &[("square-xy", 0.02), ("square-yz", -0.01)]);
@@ -138,7 +138,7 @@ fn a_mill_that_is_not_square() {
     let moves: Vec<_> = made.program.steps().filter(|s| s.op.moves()).collect();
     assert_eq!(moves.iter().filter(|s| s.source.line < 3).count(), 2);
     let (xy, yz) = (0.02f64.to_radians(), -0.01f64.to_radians());
-    let leaning = |[x, y, z]: [f64; 3]| [x + xy * y, y + yz * z, z];
+    let leaning = |[x, y, z]: [f64; 3]| [x - xy * y, y - yz * z, z];
     let corner = leaning(moves[1].end.xyz());
     assert!(norm(sub(corner, [100.0, 200.0, -5.0])) < 1e-9, "{corner:?}");
     for s in moves.iter().skip(2) {

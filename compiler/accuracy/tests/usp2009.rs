@@ -53,7 +53,7 @@ fn thirteen_places() {
         close(h[0], v["h1"].as_f64().unwrap(), 1e-12, "h1");
         close(h[1], v["h2"].as_f64().unwrap(), 1e-12, "h2");
         close(k.determinant(at), v["detJp"].as_f64().unwrap(), 1e-12, "determinant");
-        let s = Sensitivity::of_two_legs(&m, k, at).unwrap();
+        let s = Sensitivity::of_two_legs(&m, k, at, [0.0; 3]).unwrap();
         for (i, key) in ["k1", "k2", "k3"].into_iter().enumerate() {
             close(s.stiffness[i].unwrap(), v[key].as_f64().unwrap(), 1e-12, key);
         }
@@ -172,7 +172,7 @@ proptest! {
         let m = machine();
         let k = legs(&m);
         let at = k.place_of([x, y, z]);
-        let s = Sensitivity::of_two_legs(&m, k, at).unwrap();
+        let s = Sensitivity::of_two_legs(&m, k, at, [0.0; 3]).unwrap();
         let d = s.deflection(f).unwrap();
         let outside: f64 = (0..3).map(|i| f[i] * d[i]).sum();
         let inside: f64 = s.joints.iter().zip(&s.stiffness).map(|(c, k)| {
@@ -195,7 +195,7 @@ proptest! {
         let m = machine();
         let k = legs(&m);
         let at = k.place_of([x, y, z]);
-        let s = Sensitivity::of_two_legs(&m, k, at).unwrap();
+        let s = Sensitivity::of_two_legs(&m, k, at, [0.0; 3]).unwrap();
         let sizes = SYMMETRIC.map(f64::abs);
         let spread = Spread::new(&s.geometry, &sizes);
         let mut sum = [0.0; 3];

@@ -3,6 +3,8 @@
 
 mod approach;
 
+pub(crate) use approach::is_lathe;
+
 use std::collections::BTreeMap;
 
 use crate::sources::{Words, is_hidden};

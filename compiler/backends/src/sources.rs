@@ -9,14 +9,16 @@ use gr_text::FileId;
 pub struct Words {
     /// Bit `letter - 'a'`; `@` counts as X and Y, `^` too.
     letters: u32,
-    codes: u32,
+    codes: u64,
     /// The axes are named by increments alone.
     incremental: bool,
 }
 
 /// Codes that [`Words`] looks for, times ten.
-const CODES: [u32; 24] =
-    [900, 910, 530, 280, 300, 281, 301, 400, 410, 420, 411, 421, 490, 520, 920, 921, 922, 923, 610, 611, 640, 430, 431, 432];
+const CODES: [u32; 44] = [
+    900, 910, 530, 280, 300, 281, 301, 400, 410, 420, 411, 421, 490, 520, 920, 921, 922, 923, 610, 611, 640, 430, 431, 432,
+    70, 80, 100, 540, 550, 560, 570, 580, 590, 591, 592, 593, 700, 710, 711, 712, 720, 721, 722, 760,
+];
 
 /// Increments of a lathe, and the axis that each moves.
 const INCREMENTS: [(u8, u8); 4] = [(b'u', b'x'), (b'v', b'y'), (b'w', b'z'), (b'h', b'c')];

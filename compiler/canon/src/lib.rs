@@ -141,8 +141,8 @@ pub enum Call {
     StartChange,
     /// M6: pocket index.
     ChangeTool(i32),
-    /// M61.
-    ChangeToolNumber(i32),
+    /// M61: pocket index, tool.
+    ChangeToolNumber(i32, i32),
     /// Tool table reload after G10 L1 and its like.
     ReloadTooldata,
     /// G10 L1 …: pocket, tool, offsets, diameter, front angle, back angle, orientation.

@@ -359,7 +359,7 @@ fn simple(call: &Call, out: &mut Vec<u8>) {
         }
         Call::SelectTool(t) => line(out, "SELECT_TOOL", "", [int(t)]),
         Call::ChangeTool(t) => line(out, "CHANGE_TOOL", "", [int(t)]),
-        Call::ChangeToolNumber(t) => line(out, "CHANGE_TOOL_NUMBER", "", [int(t)]),
+        Call::ChangeToolNumber(t, _) => line(out, "CHANGE_TOOL_NUMBER", "", [int(t)]),
         Call::EnableSpeedOverride(s) => line(out, "ENABLE_SPEED_OVERRIDE", "", [int(s)]),
         Call::DisableSpeedOverride(s) => line(out, "DISABLE_SPEED_OVERRIDE", "", [int(s)]),
         Call::SetMotionOutputBit(i) => line(out, "SET_MOTION_OUTPUT_BIT", "", [int(i)]),

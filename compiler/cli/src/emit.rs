@@ -369,7 +369,7 @@ fn of_motion(mut motion: Motion, unit: &Unit, goal: &Goal<'_>) -> Result<Built, 
         return Ok(built(motion, Vec::new(), Vec::new()));
     }
     if let Some(machine) = goal.machine {
-        let found = crate::robot::missing_axes(&motion.program, machine, &texts(&motion));
+        let found = gr_robot::opinion::missing_axes(&motion.program, machine, &texts(&motion));
         if !found.is_empty() {
             return Ok(built(motion, Vec::new(), found));
         }
@@ -616,11 +616,35 @@ fn normalised(motion: &Motion, unit: &Unit, options: &TargetOptions, name: &str)
         table = plan.own_table.then(|| gr_planner::tool_table(&plan.tools));
     }
     let texts = texts(motion);
-    Ok(rs274ngc::emit(&motion.program, &o, &texts).map(|e| {
+    Ok(rs274ngc::emit(&motion.program, &o, &texts).map(|mut e| {
+        e.notes.extend(state_told(motion, unit, options, &o, &e.text));
         let mut artifacts = vec![Artifact { lines: e.lines, ..Artifact::new("", e.text.into_bytes()) }];
         artifacts.extend(table.map(|t| Artifact::new(".tbl", t.into_bytes())));
         (artifacts, e.notes)
     }))
+}
+
+/// What is to be said of a translation that depends on values nobody has named.
+fn state_told(motion: &Motion, unit: &Unit, options: &TargetOptions, o: &rs274ngc::Options, text: &str) -> Option<Diagnostic> {
+    let begins_later = motion.program.steps().any(|s| s.source.line == gr_backends::from_line::INSERTED);
+    if motion.plan.is_some() || begins_later || options.robot.compensate || options.tool_change_at.is_some() {
+        return None;
+    }
+    let to = gr_spec::Dialect::find(options.to.as_deref().unwrap_or("linuxcnc"))?;
+    crate::elsewhere::differs(unit, motion, text, to, allowed(options).max(1e-3) + 4.0 * o.arc_tolerance)
+}
+
+/// One unit of the last decimal that is written. With straight pieces for arcs, their tolerance too; with arcs, what
+/// rounding of both ends and the centre makes of them at most: half a unit in each coordinate moves the centre by 0.71
+/// units and each radius by 1.42, and a helix has its own half in depth.
+pub fn allowed(o: &TargetOptions) -> f64 {
+    let inch = o.units == Some(UnitArg::Inch);
+    let fanuc = o.to.as_deref().is_some_and(|t| !t.starts_with("linuxcnc"));
+    let decimals = o.decimals.unwrap_or(4 + usize::from(inch) - usize::from(fanuc)) as i32;
+    let unit = 10_f64.powi(-decimals) * if inch { 25.4 } else { 1.0 };
+    let pieces = o.arcs == Some(ArcsArg::Lines) || o.plane == Some(PlaneArg::Xy);
+    let curve = if pieces { o.arc_tolerance.unwrap_or(0.001) } else { 1.25 * unit };
+    (unit + curve).max(1e-6)
 }
 
 /// Tools of a process plan: what the operator loads, and their lengths as the program's own.
@@ -694,34 +718,10 @@ fn line_numbers(text: &str) -> Result<(u32, u32), String> {
     Ok((number(first)?, number(step)?))
 }
 
-/// Lines that motion comes from. Those of a STEP-NC file are places, not words of G-code.
-pub enum Lines<'a> {
-    /// Of G-code; whether U V W are increments there.
-    Code(Texts<'a>, bool),
-    /// Of STEP-NC.
-    Instances(Texts<'a>),
-}
-
-impl gr_backends::Sources for Lines<'_> {
-    fn place(&self, source: Source) -> (FileId, Span) {
-        let (Lines::Code(t, _) | Lines::Instances(t)) = self;
-        t.place(source)
-    }
-    fn line(&self, file: FileId, line: u32) -> Option<&str> {
-        match self {
-            Lines::Code(t, _) => t.line(file, line),
-            Lines::Instances(_) => None,
-        }
-    }
-    fn increments(&self) -> bool {
-        matches!(self, Lines::Code(_, true))
-    }
-}
-
 /// The lines of a program.
-pub fn texts(motion: &Motion) -> Lines<'_> {
+pub fn texts(motion: &Motion) -> Texts<'_> {
     let texts = Texts::new(motion.sources.iter().map(|(id, f)| (id, &*f.text)));
-    if motion.plan.is_some() { Lines::Instances(texts) } else { Lines::Code(texts, motion.increments) }
+    if motion.plan.is_some() { texts.instances() } else { texts.with_increments(motion.increments) }
 }
 
 fn joints(motion: &Motion, goal: &Goal<'_>) -> Result<Made, String> {

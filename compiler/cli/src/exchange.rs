@@ -71,6 +71,19 @@ pub fn check(name: &str, text: &Text, path: &Path, station: &Station) -> Checked
     with_source(name, &unit, found)
 }
 
+/// The same with what the machine has to say, where the file itself is good.
+pub fn check_on(machine: &gr_machine::Machine, name: &str, text: &Text, path: &Path, station: &Station) -> Checked {
+    let unit = Unit::new(path, text.into(), gr_text::Encoding::Utf8, station);
+    match motion(&unit) {
+        Ok((motion, checked)) => {
+            let mut checked = with_source(name, &unit, checked.found);
+            crate::robot::ask(motion, machine, station.job.as_deref(), &mut checked);
+            checked
+        }
+        Err(checked) => with_source(name, &unit, checked.found),
+    }
+}
+
 fn with_source(name: &str, unit: &Unit, found: Vec<Diagnostic>) -> Checked {
     let mut sources = Sources::default();
     sources.add(name, unit.text.clone());

@@ -2,6 +2,7 @@
 //! decided in the crates below.
 
 mod commands;
+mod elsewhere;
 mod emit;
 mod exchange;
 mod exit;

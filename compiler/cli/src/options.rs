@@ -198,6 +198,9 @@ pub struct CheckArgs {
     pub setup: SetupArgs,
     #[command(flatten)]
     pub lints: LintArgs,
+    /// Robots: job file, which gives parts of the program to setups with their own placement of the part
+    #[arg(long, value_name = "FILE")]
+    pub job: Option<PathBuf>,
     /// Number of files checked at a time [default: number of processors]
     #[arg(short, long, value_name = "N")]
     pub jobs: Option<std::num::NonZeroUsize>,
@@ -454,6 +457,9 @@ pub enum MachineAction {
         /// Id of the new machine: maker/model
         #[arg(long, default_value = "my/robot", value_name = "ID")]
         id: String,
+        /// Link that the arm ends at [default: `tool0` or `flange`, else the longest chain of moving joints]
+        #[arg(long, value_name = "LINK")]
+        tip: Option<String>,
         /// Where the machine file goes [default: standard output]
         #[arg(short, long, value_name = "PATH")]
         output: Option<PathBuf>,
@@ -597,6 +603,12 @@ pub struct MapArgs {
     /// Grade of ISO 286-1 of the machine's geometry, in place of its file's
     #[arg(long = "it", value_name = "GRADE", value_parser = clap::value_parser!(u8).range(1..=18))]
     pub grade: Option<u8>,
+    /// What is held: the tool of the machine file with this number; without one the nose of the spindle, or the flange
+    #[arg(long, value_name = "NUMBER", conflicts_with = "tool_length")]
+    pub tool: Option<u32>,
+    /// What is held: the length of a tool that the machine file does not have, mm
+    #[arg(long, value_name = "MM", allow_hyphen_values = true)]
+    pub tool_length: Option<f64>,
     /// How the tool is turned, as by the words A, B and C, degrees; without it straight down on arms, upright on mills
     #[arg(long, value_name = "A,B,C", allow_hyphen_values = true)]
     pub tool_turn: Option<String>,
@@ -622,6 +634,12 @@ pub struct PlaceArgs {
     /// Heights of the rectangle: a number or two, mm
     #[arg(long, value_name = "FROM,TO", default_value = "0", allow_hyphen_values = true)]
     pub heights: String,
+    /// Without a program: the tool of the machine file with this number; without one the nose of the spindle, or the flange
+    #[arg(long, value_name = "NUMBER", conflicts_with = "tool_length")]
+    pub tool: Option<u32>,
+    /// Without a program: the length of a tool that the machine file does not have, mm
+    #[arg(long, value_name = "MM", allow_hyphen_values = true)]
+    pub tool_length: Option<f64>,
     /// Without a program: how the tool is turned, as by the words A, B and C, degrees; without it straight down on arms, upright on mills
     #[arg(long, value_name = "A,B,C", allow_hyphen_values = true)]
     pub tool_turn: Option<String>,

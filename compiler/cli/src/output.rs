@@ -144,6 +144,12 @@ pub fn to_stdout(bytes: &[u8]) -> std::io::Result<()> {
     }
 }
 
+/// A file as make and ninja name it: from the folder that they and this program run in, where it lies there.
+pub fn from_here(path: &Path) -> PathBuf {
+    let here = std::env::current_dir().unwrap_or_default();
+    path.strip_prefix(&here).unwrap_or(path).to_path_buf()
+}
+
 /// Names of the files a result was made from, as a rule for make and ninja.
 pub fn depfile(goals: &[PathBuf], sources: &[PathBuf]) -> String {
     let escape = |p: &Path| {

@@ -167,7 +167,7 @@ pub fn motion_for(name: &str, text: &str, setup: &Setup, machine: &gr_machine::M
     if setup.dialect.family == Family::Ufmg2008 {
         return ufmg(name, text, setup.dialect, Some(machine));
     }
-    motion_of(name, text.to_string(), setup)
+    Motion { increments: setup.dialect.id == "fanuc-turn", ..motion_of(name, text.to_string(), setup) }
 }
 
 /// The UFMG 2008 language has commands of its own and no interpreter state.

@@ -152,6 +152,16 @@ impl Project {
         self.folder.join(name)
     }
 
+    /// The machine, an id or a path from here.
+    pub fn machine(&self) -> Option<String> {
+        let name = self.file.project.machine.clone()?;
+        if gr_machine::source(&name).is_some() {
+            return Some(name);
+        }
+        let path = self.path_of(Path::new(&name));
+        Some(if gr_machine::is_path(&name) || path.is_file() { path.to_string_lossy().into_owned() } else { name })
+    }
+
     /// Dialect that the rules give a file.
     pub fn dialect_of(&self, path: &Path) -> Option<&str> {
         let absolute = std::path::absolute(path).ok()?;

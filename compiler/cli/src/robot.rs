@@ -69,7 +69,13 @@ pub fn options(motion: &Motion, goal: &Goal<'_>, name: &str) -> Result<Options, 
 /// Reads the job file that the options name into the motion it is for. What is wrong comes back; it points into the
 /// motion's files.
 pub fn take_job(motion: &mut Motion, goal: &Goal<'_>) -> Result<(), Vec<Diagnostic>> {
-    let (Some(path), Some(machine)) = (&goal.options.robot.job, goal.machine) else { return Ok(()) };
+    match (&goal.options.robot.job, goal.machine) {
+        (Some(path), Some(machine)) => take_job_of(motion, path, machine),
+        _ => Ok(()),
+    }
+}
+
+fn take_job_of(motion: &mut Motion, path: &Path, machine: &Machine) -> Result<(), Vec<Diagnostic>> {
     let name = path.display().to_string();
     let text = match crate::sources::read(path) {
         Ok(decoded) => decoded.text,
@@ -78,7 +84,7 @@ pub fn take_job(motion: &mut Motion, goal: &Goal<'_>) -> Result<(), Vec<Diagnost
             return Err(vec![crate::sources::about_file(code, file, &args)]);
         }
     };
-    motion.subs.push(path.clone());
+    motion.subs.push(path.to_path_buf());
     let file = motion.sources.add(name, text.clone());
     let clampings = gr_machine::parse_job(file, &text)?;
     let found: Vec<Diagnostic> =
@@ -89,10 +95,10 @@ pub fn take_job(motion: &mut Motion, goal: &Goal<'_>) -> Result<(), Vec<Diagnost
     let line = |at: u32| text.get(..at as usize).map_or(0, |t| t.matches('\n').count()) as u32;
     let setup = |c: gr_machine::Clamping| gr_robot::Setup {
         place: gr_ir::Source { file, line: line(c.from_line.map_or(c.place.start, |(_, span)| span.start)), ..gr_ir::Source::default() },
+        part: machine.cell.carried(machine.cell.table.then(&c.part(&machine.cell.part))),
         name: c.name,
         from_line: c.from_line.map(|(l, _)| l - 1),
         workingsteps: c.workingsteps.into_iter().map(|(w, _)| w).collect(),
-        part: machine.cell.carried(machine.cell.table.then(&c.part)),
     };
     motion.setups = clampings.into_iter().map(setup).collect();
     Ok(())
@@ -136,7 +142,9 @@ pub fn build(motion: &Motion, goal: &Goal<'_>, texts: &dyn Sources, name: &str) 
     let machine = robot(goal)?;
     // The files take their name from where they go.
     let name = goal.file.filter(|f| f.extension().is_some()).map_or_else(|| name.to_string(), crate::emit::stem);
-    let options = options(motion, goal, &name)?;
+    let mut options = options(motion, goal, &name)?;
+    // Cutting curves into lines, correcting these: together within the tolerance.
+    options.tolerance *= if goal.options.robot.compensate { 0.5 } else { 1.0 };
     let planned = plan(&motion.program, &machine, texts, &options).and_then(|p| compensated(p, goal, texts, options.tolerance));
     let (planned, corrected) = match planned {
         Ok(planned) => planned,
@@ -269,22 +277,13 @@ fn robot(goal: &Goal<'_>) -> Result<Machine, String> {
     Err(format!("the target {} is for robots; {} is none", goal.target, machine.id))
 }
 
-/// What the machine has to say about a program.
-pub fn check(motion: &Motion, machine: &Machine, texts: &dyn Sources) -> Vec<Diagnostic> {
-    match plan(&motion.program, machine, texts, &Options::default()) {
-        Ok(planned) => planned.warnings,
-        Err(found) => found,
-    }
-}
-
 /// Figures of a planned program, for people.
 pub fn summary(planned: &Planned) -> String {
     let s = &planned.summary;
     let line = |source: Option<gr_ir::Source>| source.map_or(String::new(), |s| format!(" (line {})", s.line + 1));
     let joint = |i: usize| planned.program.machine.joints.get(i).map_or(String::new(), |j| j.name.clone());
-    let accelerates = planned.program.machine.joints.iter().any(|j| j.acceleration.is_some());
     let mut out = format!(
-        "{}: {} cuts ({} arcs), {} rapids; {} at feed, {} rapid, {} waiting, without {}\n",
+        "{}: {} cuts ({} arcs), {} rapids; {} at feed, {} rapid, {} waiting, with{}\n",
         planned.program.machine.id,
         s.cuts,
         s.arcs,
@@ -292,7 +291,7 @@ pub fn summary(planned: &Planned) -> String {
         duration(s.cut_seconds),
         duration(s.rapid_seconds),
         duration(s.wait_seconds),
-        if accelerates { "the accelerations of the machine file (`--target setpoints` tells the time with them)" } else { "acceleration" }
+        if s.accelerates { " the accelerations of the machine file" } else { "out acceleration" }
     );
     let mut more = Vec::new();
     if let Some((mm, at)) = s.reach_margin {
@@ -315,71 +314,21 @@ fn short(v: f64) -> String {
     number(v, 1)
 }
 
-const LETTERS: &str = "XYZABCUVW";
-
-/// Axes that a machine tool has; none for a robot, whose joints are not axes of the program.
-fn axes(machine: &Machine) -> Option<[bool; 9]> {
-    if machine.kind == Kind::Robot {
-        return None;
-    }
-    let mut has = [false; 9];
-    for j in &machine.joints {
-        let letter = j.word.or_else(|| j.name.chars().next())?.to_ascii_uppercase();
-        has[LETTERS.find(letter)?] = true;
-    }
-    Some(has)
-}
-
-/// The first move of each axis that the machine doesn't have.
-pub fn missing_axes(program: &gr_ir::Program, machine: &Machine, texts: &dyn Sources) -> Vec<Diagnostic> {
-    let Some(mut has) = axes(machine).filter(|has| has.contains(&false)) else { return Vec::new() };
-    let mut found = Vec::new();
-    let mut cursor = program.cursor();
-    while let Some(view) = cursor.next() {
-        if !view.op.moves() {
-            continue;
-        }
-        for (i, letter) in LETTERS.chars().enumerate() {
-            if view.start.axes[i] != view.end.axes[i] && !std::mem::replace(&mut has[i], true) {
-                let (file, span) = texts.place(view.source);
-                found.push(Diagnostic::new(gr_text::code::MACHINE_NO_AXIS, file, span, &[letter.to_string(), machine.id.clone()]));
-            }
-        }
-    }
-    found
-}
-
-/// Whether a machine has anything to say about a program beside what its limits say.
-fn has_a_say(machine: &Machine) -> bool {
-    machine.kind == Kind::Robot || axes(machine).is_some_and(|has| has.contains(&false))
-}
-
-/// What any machine has to say about a program: a robot that is planned, the planar arm point by point, a machine tool
-/// about its axes.
+/// What the machine has to say about a program.
 pub fn opinion(motion: &Motion, machine: &Machine) -> Vec<Diagnostic> {
-    let texts = crate::emit::texts(motion);
-    if machine.kind != Kind::Robot {
-        return missing_axes(&motion.program, machine, &texts);
-    }
-    if !matches!(machine.chain, gr_machine::Chain::Planar3r(_)) {
-        return check(motion, machine, &texts);
-    }
-    let place = |s: gr_ir::Source| texts.place(s);
-    let found = gr_backends::joint::compile(&motion.program, machine, &gr_backends::joint::Options::default(), &place).err().unwrap_or_default();
-    // What joint G-code can't say is no matter of the arm.
-    found.into_iter().filter(|d| d.code.def().code.starts_with("E05")).collect()
+    let options = Options { setups: motion.setups.clone(), ..Options::default() };
+    gr_robot::opinion::opinion(&motion.program, machine, &crate::emit::texts(motion), &options)
 }
 
-/// Adds to the findings of a program what the machine has to say, when the program itself is good.
-pub fn ask(name: &str, text: &str, machine: &Machine, setup: &gr_interp::Setup, checked: &mut Checked) {
-    let bad = checked.found.iter().any(|d| d.severity == gr_text::Severity::Error);
-    if bad || !has_a_say(machine) {
-        return;
-    }
-    let motion = crate::pipeline::motion_for(name, text, setup, machine);
-    let found = opinion(&motion, machine);
-    if checked.sources.get(gr_text::FileId(0)).is_none() {
-        checked.sources.add(name.to_string(), text.to_string());
+/// Adds to the findings of a program, which is good, what the machine has to say, when the parts are clamped as a job file
+/// has it.
+pub fn ask(mut motion: Motion, machine: &Machine, job: Option<&Path>, checked: &mut Checked) {
+    let taken = job.map_or(Ok(()), |path| take_job_of(&mut motion, path, machine));
+    let found = taken.err().unwrap_or_else(|| opinion(&motion, machine));
+    if checked.sources.get(gr_text::FileId(0)).is_none()
+        && let Some(main) = motion.sources.get(gr_text::FileId(0))
+    {
+        checked.sources.add(main.name.clone(), main.text.clone());
     }
     let mut known = std::collections::BTreeMap::from([(gr_text::FileId(0), gr_text::FileId(0))]);
     for mut d in found {
@@ -401,7 +350,7 @@ fn own_plan(motion: &Motion, goal: &Goal<'_>, texts: &dyn Sources, name: &str, s
     let machine = machine(goal)?;
     let all = options(motion, goal, name)?;
     let tolerance = all.tolerance * share;
-    let options = Options { own_words: true, tolerance, ..all };
+    let options = Options { own_words: true, probing: goal.target == "verify", tolerance, ..all };
     let corrected = |p| if machine.kind == Kind::Mill { Ok((p, None)) } else { compensated(p, goal, texts, tolerance) };
     Ok(plan(&motion.program, &machine, texts, &options).and_then(corrected))
 }

@@ -1,5 +1,6 @@
 //! From options, project file and the files they name to what a run of the interpreter starts from.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use gr_canon::{Units, Version};
@@ -30,6 +31,8 @@ pub struct Station {
     pub dialect: Option<&'static Dialect>,
     /// The machine, if one was named.
     pub machine: Option<gr_machine::Machine>,
+    /// Job file that `check` was given.
+    pub job: Option<PathBuf>,
     /// Files it was made of, for dep-files and `--watch`.
     pub files: Vec<PathBuf>,
     /// Project file, if one was found.
@@ -86,7 +89,56 @@ pub fn station(
     (renderer.tally.errors == errors).then_some(station)
 }
 
-/// The same, as far as it goes: what could not be read is left out.
+/// The folder from which upwards the project file of a program is looked for: its own, wherever the command runs.
+pub fn beside(program: &Path) -> &Path {
+    program.parent().filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+/// Programs that were named: what each is run with. Those of one project share one station.
+pub struct Stations {
+    all: Vec<Station>,
+    of: Vec<usize>,
+}
+
+impl Stations {
+    /// As [`station`], for several programs.
+    pub fn of(args: &SetupArgs, lints: &LintArgs, programs: &[PathBuf], sources: &mut Sources, renderer: &mut Renderer) -> Option<Stations> {
+        let (mut all, mut of, mut known) = (Vec::new(), Vec::new(), BTreeMap::new());
+        let mut projects: BTreeMap<&Path, Option<PathBuf>> = BTreeMap::new();
+        for program in programs {
+            let from = beside(program);
+            let project = projects.entry(from).or_insert_with(|| Project::find(from));
+            let at = match known.get(project) {
+                Some(at) => *at,
+                None => {
+                    all.push(station(args, lints, from, sources, renderer)?);
+                    known.insert(project.clone(), all.len() - 1);
+                    all.len() - 1
+                }
+            };
+            of.push(at);
+        }
+        Some(Stations { all, of })
+    }
+    /// One for all: programs that a project names.
+    pub fn one(station: Station, programs: usize) -> Stations {
+        Stations { all: vec![station], of: vec![0; programs] }
+    }
+    /// Of the program with this number.
+    pub fn get(&self, program: usize) -> Option<&Station> {
+        self.all.get(*self.of.get(program)?)
+    }
+    /// Each once.
+    pub fn iter(&self) -> impl Iterator<Item = &Station> {
+        self.all.iter()
+    }
+    /// The same, to be changed.
+    pub fn iter_mut(&mut self) -> impl Iterator<Item = &mut Station> {
+        self.all.iter_mut()
+    }
+}
+
+/// The same as [`station`], as far as it goes: what could not be read is left out.
 pub fn assembled(args: &SetupArgs, lints: &LintArgs, from: &Path, sources: &mut Sources, renderer: &mut Renderer) -> Station {
     let mut reader = Reader { sources, renderer, files: Vec::new(), project: None, blamed: None, ini: None, hard: Levels::default() };
     let project = reader.project(from);
@@ -96,7 +148,7 @@ pub fn assembled(args: &SetupArgs, lints: &LintArgs, from: &Path, sources: &mut 
     let named = |option: &Option<PathBuf>, key: Option<&PathBuf>| {
         option.clone().or_else(|| key.map(|k| project.as_ref().map_or(k.clone(), |p| p.path_of(k))))
     };
-    let mut setup = Setup::default();
+    let mut setup = Setup { base: own_folder(&from.join("-")), ..Setup::default() };
     reader.named_as(args.ini.is_none(), "ini");
     if let Some(path) = named(&args.ini, section.and_then(|s| s.ini.as_ref())) {
         reader.ini(&path, &mut setup);
@@ -120,7 +172,7 @@ pub fn assembled(args: &SetupArgs, lints: &LintArgs, from: &Path, sources: &mut 
     let reference = section.and_then(|s| s.reference).filter(|r| *r == crate::emit::Reference::Ufmg2008).map(|_| "ufmg2008");
     let dialect = args.dialect.as_deref().or(reference).and_then(|name| reader.dialect(name));
     reader.named_as(args.machine.is_none(), "machine");
-    let machine = args.machine.clone().or_else(|| section.and_then(|s| s.machine.clone()));
+    let machine = args.machine.clone().or_else(|| project.as_ref().and_then(Project::machine));
     let machine = machine.and_then(|name| reader.machine(&name));
     reader.blamed = None;
     if let Some(machine) = &machine {
@@ -135,7 +187,12 @@ pub fn assembled(args: &SetupArgs, lints: &LintArgs, from: &Path, sources: &mut 
     let step_overlap = args.step_overlap.or(section.and_then(|s| s.step_overlap)).map(gr_planner::Overlap::from);
     let stock = section.and_then(|s| s.stock).map(|[a, b]| [std::array::from_fn(|i| a[i].min(b[i])), std::array::from_fn(|i| a[i].max(b[i]))]);
     let Reader { files, .. } = reader;
-    Station { setup, stock, step_units, step_overlap, tools, dialect, machine, files, project, lints }
+    Station { setup, stock, step_units, step_overlap, tools, dialect, machine, job: None, files, project, lints }
+}
+
+/// The folder of a program, in which its subroutines are looked for first; none = the current one.
+fn own_folder(program: &Path) -> Option<PathBuf> {
+    Some(beside(program)).filter(|f| *f != Path::new(".")).map(Path::to_path_buf)
 }
 
 fn units(args: &SetupArgs, section: Option<&crate::project::Section>) -> Option<Units> {
@@ -212,6 +269,7 @@ impl Station {
         let mut setup = self.setup.clone();
         setup.dialect = self.dialect_of(path, text);
         setup.version = version_of(setup.dialect);
+        setup.base = own_folder(path);
         setup
     }
 }

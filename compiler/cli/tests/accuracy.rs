@@ -752,7 +752,7 @@ fn how_the_tool_is_held() {
         whole(&run(folder.path(), &["place", "--machine=usp/2ups-prp", "--heights=660", "--message-format=short"])),
     ];
     insta::assert_snapshot!(all.join("\n\n"));
-    assert!(std::fs::read_to_string(folder.path().join("r.csv")).unwrap().starts_with("x mm,y mm,\"workspace (tool turned as at the start"));
+    assert!(std::fs::read_to_string(folder.path().join("r.csv")).unwrap().starts_with("x mm,y mm,\"workspace (the flange turned as at the start"));
 }
 
 /// A mill that the file places the part on has an end of its travel.
@@ -931,7 +931,7 @@ fn labels_and_boxes() {
     ];
     insta::assert_snapshot!(all.join("\n"));
     let svg = std::fs::read_to_string(folder.path().join("s.svg")).unwrap();
-    assert!(svg.contains("tool upright") && svg.contains("turned table") && svg.contains("rotary1.tilt-a (mrad)"), "{svg}");
+    assert!(svg.contains("nose upright") && svg.contains("turned table") && svg.contains("rotary1.tilt-a (mrad)"), "{svg}");
 }
 
 /// The least error of a path along which an arm's tool turns is next to what can be planned; the text says how fine it
@@ -948,4 +948,216 @@ fn least_error_with_a_turning_tool() {
     assert!(o.contains("from its 12 best places"), "{o}");
     let error: f64 = o.split("largest error of the path there: ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
     assert!(error < 310.0, "{o}");
+}
+
+/// The row of the largest error, and the value of the map beside the report at the node nearest to its place.
+fn row_and_map(folder: &Path, args: &[&str]) -> (f64, f64, String) {
+    let o = run(folder, &[&["accuracy"], args, &["--format=json", "-q", "--map=beside.csv"]].concat());
+    assert!(o.status.success(), "{}", whole(&o));
+    let v = json(&o);
+    let rows = v["operations"].as_array().unwrap();
+    let sum = |r: &&serde_json::Value| r["worst"]["sum"].as_f64().unwrap();
+    let worst = rows.iter().max_by(|a, b| sum(a).total_cmp(&sum(b))).unwrap();
+    let at = vector(&worst["worst"]["point"]);
+    let csv = std::fs::read_to_string(folder.join("beside.csv")).unwrap();
+    let mut nearest = (f64::INFINITY, f64::NAN);
+    for line in csv.lines().skip(1) {
+        let n: Vec<f64> = line.split(',').map(|t| t.parse().unwrap()).collect();
+        let far = (n[0] - at[0]).hypot(n[1] - at[1]);
+        if far < nearest.0 {
+            nearest = (far, n[2]);
+        }
+    }
+    assert!(nearest.0 < 6.0, "{nearest:?} from {at:?}");
+    (sum(&worst) * 1e3, nearest.1, csv.lines().next().unwrap().to_string())
+}
+
+/// The map beside a report has the tool of the report, as it stands at the largest error: on arms with a spindle that leans, on
+/// mills, on a turned table, on a parallel machine.
+#[test]
+fn table_and_map_agree() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+    let cell = std::fs::read_to_string(examples().join("irb2400-cell.toml")).unwrap();
+    write("cell.toml", &format!("{cell}\n[accuracy]\nsource = \"made up\"\njoints = [0.01, 0.01, 0.01, 0.02, 0.02, 0.03]\ngrade = 7\n"));
+    write("arm.ngc", "G21 G90 G94 F600\nT1 M6\nG43 H1\nS5000 M3\nG0 X0 Y0 Z10\nG1 Z-2\nG1 X100 Y40\nM5\nM2\n");
+    let data = "[accuracy]\nsource = \"made up\"\njoints = [0.012, 0.012, 0.012]\n";
+    let square = "[[accuracy.parameter]]\nname = \"square-xz\"\ntolerance = 0.02\n";
+    write("mill.toml", &format!("format = 1\nextends = \"generic/mill3\"\nid = \"test/mill\"\n{data}{square}"));
+    write("long.tbl", "T1 P1 Z80 D10\n");
+    write("mill.ngc", "G21 G90 G94 F600\nT1 M6\nG43 H1\nS5000 M3\nG0 X0 Y0 Z10\nG1 Z-2\nG1 X50.8\nM5\nM2\n");
+    let data = "[accuracy]\nsource = \"made up\"\njoints = [0.005, 0.005, 0.005, 0.004, 0.004]\ngrade = 6\n";
+    write("five.toml", &format!("format = 1\nextends = \"generic/mill5-b-head-c-table\"\nid = \"test/five\"\n{data}"));
+    write("five.ngc", "G21 G90 G94 F600\nT1 M6\nG43 H1\nS5000 M3\nG0 X0 Y0 Z50 B0 C40\nG1 X20 Y90\nG1 X60 B20\nM5\nM2\n");
+    let flange = std::fs::read_to_string(examples().join("flange.ngc")).unwrap();
+    write("flange.ngc", &flange);
+    write("600.tbl", "T1 P1 Z600 D10\nT2 P2 Z600 D6.8\nT3 P3 Z600 D8\n");
+    let all = [
+        row_and_map(folder.path(), &["arm.ngc", "--machine=cell.toml"]),
+        row_and_map(folder.path(), &["mill.ngc", "-tlong.tbl", "--machine=mill.toml", "--part=0,0,-350"]),
+        row_and_map(folder.path(), &["five.ngc", "-tlong.tbl", "--machine=five.toml", "--part=0,0,-350"]),
+        row_and_map(folder.path(), &["flange.ngc", "-t600.tbl", "--machine=usp/2ups-prp", "--part=820,-10,-600"]),
+    ];
+    for (row, map, head) in &all {
+        assert!((row - map).abs() < 0.01 * row, "{row} {map} {head}");
+    }
+    insta::assert_snapshot!(all.map(|a| a.2).join("\n"));
+}
+
+/// A map of an arm with a spindle is of the spindle's nose or of a tool of its file, never of the bare flange, and says which; the lean
+/// is told where the tool can't be put straight.
+#[test]
+fn maps_with_tools() {
+    let folder = tempfile::tempdir().unwrap();
+    let cell = std::fs::read_to_string(examples().join("irb2400-cell.toml")).unwrap();
+    std::fs::write(folder.path().join("cell.toml"), format!("{cell}\n[accuracy]\nsource = \"made up\"\njoints = [0.01, 0.01, 0.01, 0.02, 0.02, 0.03]\n")).unwrap();
+    let scara = "format = 1\nextends = \"adept/one\"\nid = \"test/scara\"\n[spindle]\nposition = [0, 0, 50]\nrotation = [0, 30, 0]\n";
+    std::fs::write(folder.path().join("scara.toml"), scara).unwrap();
+    let map = |args: &[&str]| {
+        let text = whole(&run(folder.path(), &[&["map", "--resolution=40", "--message-format=short", "-q"], args].concat()));
+        text.lines().filter(|l| !l.starts_with("outline")).collect::<Vec<_>>().join("\n")
+    };
+    let arm = ["--machine=cell.toml", "--quantity=kinematic", "--plane=z=442"];
+    let all = [
+        map(&[&arm[..], &["-oa.csv", "-oa.svg"]].concat()),
+        map(&[&arm[..], &["--tool=1"]].concat()),
+        map(&[&arm[..], &["--tool=1", "--tool-turn=0,30,0"]].concat()),
+        map(&[&arm[..], &["--tool=7"]].concat()),
+        map(&[&arm[..], &["--tool-length=20000"]].concat()),
+        map(&["--machine=scara.toml", "--plane=z=300"]),
+        map(&["--machine=generic/mill3", "--tool-length=80", "--plane=z=-352"]),
+        map(&["--machine=generic/mill3", "--plane=z=-352"]),
+        whole(&run(folder.path(), &["place", "--machine=cell.toml", "--heights=442", "--tool=2"])),
+        whole(&run(folder.path(), &["place", "--machine=generic/mill3", "--heights=-352", "--tool-length=80"])),
+    ];
+    insta::assert_snapshot!(all.join("\n\n"));
+    assert!(std::fs::read_to_string(folder.path().join("a.svg")).unwrap().contains("the spindle's nose straight down"));
+}
+
+const LATHE: &str = r#"
+format = 1
+id = "test/lathe"
+title = "Lathe"
+kind = "lathe"
+source = "made up"
+
+[kinematics]
+kind = "cartesian"
+
+[start]
+joints = [100, 0, 100]
+
+[[joint]]
+name = "X"
+type = "prismatic"
+min = -5
+max = 200
+
+[[joint]]
+name = "Y"
+type = "prismatic"
+min = -1
+max = 1
+
+[[joint]]
+name = "Z"
+type = "prismatic"
+min = -400
+max = 400
+
+[accuracy]
+source = "made up"
+joints = [0.03, 0, 0.008]
+
+[stiffness]
+source = "made up"
+member = [
+  { joint = "X", name = "screw", stiffness = 20000 },
+  { joint = "Y", name = "guide", stiffness = 30000 },
+  { joint = "Z", name = "screw", stiffness = 40000 },
+]
+"#;
+
+/// There is no law of turning here: no force of milling instead, from G-code and from STEP-NC, and no number of a mill is asked for. Half
+/// the tolerance of a turned diameter is what the tool may be off.
+#[test]
+fn turning_has_no_law() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+    write("lathe.toml", LATHE);
+    write("lathe.tbl", "T1 P1 Z10 D0.8 I85 J5 Q2\n");
+    write("turn.ngc", "G21 G90 G18 G7 G95\nT1 M6 G43 H1\nS1000 M3\nG0 X50 Z5\nG0 X40\nG1 Z-30 F0.2\nG1 X50\nG0 Z5\nM5\nM2\n");
+    write("turn.nc", "G21 G18 G99\nT0101\nG97 S1000 M3\nG0 X50. Z5.\nG0 X40.\nG1 Z-30. F0.2\nX50.\nG0 Z5.\nM5\nM30\n");
+    write("shaft.p21", include_str!("fixtures/turned-shaft.p21"));
+    let cut = ["--machine=lathe.toml", "--material=1045", "--depth=2", "--width=0.8", "--teeth=1", "--message-format=short", "-q"];
+    let short = ["--machine=lathe.toml", "--message-format=short", "-q"];
+    let report = |args: &[&str], more: &[&str]| run(folder.path(), &[&["accuracy"], args, more].concat());
+    let all = [
+        whole(&report(&["turn.ngc", "-tlathe.tbl"], &cut)),
+        whole(&report(&["turn.ngc", "-tlathe.tbl"], &short)),
+        whole(&report(&["turn.nc", "--dialect=fanuc-turn"], &cut)),
+        whole(&report(&["shaft.p21"], &[&cut[..], &["--diameter=3"]].concat())),
+    ];
+    assert!(all.iter().all(|text| text.contains("not of turning") && !text.contains("--teeth`")), "{}", all.join("\n"));
+    let v = json(&report(&["shaft.p21"], &[&cut[..], &["--diameter=3", "--format=json"]].concat()));
+    let row = &v["operations"][0];
+    assert_eq!(row["tolerance"], 0.025, "{row}");
+    assert!(row["worst"]["elastic"].is_null() && !row["over"].as_array().unwrap().is_empty(), "{row}");
+    insta::assert_snapshot!(all.join("\n\n"));
+}
+
+/// The diameter of a tool is the machine file's where neither program nor tool table has it.
+#[test]
+fn diameters_of_the_machine_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let tools = "[[tool]]\nnumber = 1\nname = \"mill\"\nposition = [0, 0, -60]\ndiameter = 10\n[[tool]]\nnumber = 2\nname = \"small\"\nposition = [0, 0, -60]\ndiameter = 6\n";
+    std::fs::write(folder.path().join("m.toml"), format!("{}{tools}", springs())).unwrap();
+    std::fs::write(folder.path().join("p.ngc"), "G21 G90 G94 F600\nT1 M6\nS3000 M3\nG0 X0 Y0 Z0\nG1 X40\nM5\nT2 M6\nS3000 M3\nG1 X0\nM5\nM2\n").unwrap();
+    let cut = ["accuracy", "p.ngc", "--machine=m.toml", "--material=6061", "--teeth=2", "--depth=2", "--width=3", "--format=json", "-q"];
+    let v = json(&run(folder.path(), &cut));
+    let bend = |v: &serde_json::Value, i: usize| vector(&v["operations"][i]["worst"]["elastic"]);
+    assert_ne!(bend(&v, 0), bend(&v, 1), "{v}");
+    // What the file says goes before the option.
+    let same = json(&run(folder.path(), &[&cut[..], &["--diameter=3"]].concat()));
+    assert_eq!(bend(&v, 0), bend(&same, 0));
+}
+
+/// Where the rotary axis of a `cartesian` mill is, nobody knows: its error is left out and told, the words of the program are the joints,
+/// and the end of the travel is where `check` has it.
+#[test]
+fn rotary_axes_without_a_place() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+    let joint = "[start]\njoints = [0, 0, 0, 0]\n[[joint]]\nname = \"A\"\ntype = \"revolute\"\nmin = -360\nmax = 360\n";
+    let data = "[accuracy]\nsource = \"made up\"\njoints = [0.01, 0.01, 0.01, 0.02]\n";
+    write("m.toml", &format!("format = 1\nextends = \"generic/mill3\"\nid = \"test/fourth\"\n{joint}{data}"));
+    write("p.ngc", "G21 G90 G94 G17\nT1 M6 G43 H1\nS2000 M3\nG0 X0 Y30 Z50 A0\nG0 Z-2\nG1 X50 A90 F500\nM5\nM2\n");
+    write("high.ngc", "G21 G90 G94 G17\nT1 M6 G43 H1\nS2000 M3\nG0 X0 Y-200 Z50 A90\nG1 X50 F500\nM5\nM2\n");
+    for length in [0.0, 80.0, 160.0] {
+        write("t.tbl", &format!("T1 P1 Z{length} D10\n"));
+        let v = json(&run(folder.path(), &["accuracy", "p.ngc", "-tt.tbl", "--machine=m.toml", "--format=json", "-q"]));
+        let worst = &v["operations"][0]["worst"];
+        let joints: Vec<f64> = worst["joints"].as_array().unwrap().iter().map(|j| j.as_f64().unwrap()).collect();
+        assert_eq!((joints[1], joints[2]), (30.0, length - 2.0), "{worst}");
+        // Three slides, ±0.01 each.
+        assert!((worst["sum"].as_f64().unwrap() - 0.01 * 3f64.sqrt()).abs() < 1e-9, "{worst}");
+    }
+    write("t.tbl", "T1 P1 Z180 D10\n");
+    let told = |command: &str| whole(&run(folder.path(), &[command, "high.ngc", "-tt.tbl", "--machine=m.toml", "--message-format=short"]));
+    let (checked, predicted) = (told("check"), told("accuracy"));
+    for text in [&checked, &predicted] {
+        assert!(text.contains("E0285") && text.contains("Z to 230 mm, beyond the machine's limit 150 mm"), "{text}");
+    }
+    assert_eq!(predicted.matches("E0285").count(), 1, "{predicted}");
+    insta::assert_snapshot!(predicted);
+}
+
+/// A tolerance of nothing allows nothing that can be read: told at its place.
+#[test]
+fn tolerances_of_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = std::fs::read_to_string(examples().join("stepnc/case-study.p21")).unwrap();
+    std::fs::write(folder.path().join("part.p21"), text.replace("PLUS_MINUS_VALUE(0.05,0.05,3)", "PLUS_MINUS_VALUE(0.,0.,3)")).unwrap();
+    let o = whole(&run(folder.path(), &["accuracy", "part.p21", "--machine=usp/2ups-prp", "--part=700,-60,0", "--message-format=short"]));
+    assert!(o.contains("PLUS_MINUS_VALUE needs a limit above 0"), "{o}");
 }

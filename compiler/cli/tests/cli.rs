@@ -159,6 +159,10 @@ fn a_project() {
     let o = in_folder(at, &["build"]);
     assert_eq!(code(&o), 0, "{}", text(&o.stderr));
     assert!(at.join("build/part.ngc").is_file());
+    // make and ninja know the files by the names that they have from the project's folder.
+    assert_eq!(code(&in_folder(at, &["build", "--depfile", "d.d"])), 0);
+    let rule = std::fs::read_to_string(at.join("d.d")).unwrap();
+    assert!(rule.starts_with("build/part.ngc: \\\n  part.ngc"), "{rule}");
     std::fs::write(at.join("gcc-robot.toml"), "schema = 1\n[project]\nsorces = []\n").unwrap();
     insta::assert_snapshot!(whole(&in_folder(at, &["check"])).replace(&*at.to_string_lossy(), "FOLDER"));
 }
@@ -192,6 +196,89 @@ fn a_project_with_wrong_names() {
     std::fs::remove_file(at.join("gcc-robot.toml")).unwrap();
     let job = in_folder(at, &["build", "a.ngc", "--target", "inform", "--machine", "abb/irb140", "--job", "no.toml"]);
     assert!(whole(&job).contains("there is no file no.toml"), "{}", whole(&job));
+}
+
+/// Of programs that are named, project and subroutines are looked for from where the program lies, as the editor does.
+#[test]
+fn programs_are_run_as_where_they_lie() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let write = |name: &str, text: &str| {
+        std::fs::create_dir_all(at.join(name).parent().unwrap()).unwrap();
+        std::fs::write(at.join(name), text).unwrap();
+    };
+    write("q/shop.ngc", "G21 G90 F100\no<pocket> call\nM2\n");
+    write("q/pocket.ngc", "o<pocket> sub\nG1 X7\no<pocket> endsub\n");
+    // A file of the same name where the command runs is another one.
+    write("pocket.ngc", "o<pocket> sub\nG1 X[1/0]\no<pocket> endsub\n");
+    let absolute = at.join("q/shop.ngc").display().to_string();
+    for program in ["q/shop.ngc", "./q/../q/shop.ngc", &absolute] {
+        let o = in_folder(at, &["check", program]);
+        assert_eq!(code(&o), 0, "{program}: {}", whole(&o));
+        let o = in_folder(at, &["build", program, "--target", "canon"]);
+        assert!(code(&o) == 0 && text(&o.stdout).contains("STRAIGHT_FEED(7.0000"), "{program}: {}", whole(&o));
+    }
+    let o = in_folder(at, &["diff", "q/shop.ngc", &absolute]);
+    assert_eq!(code(&o), 0, "{}", whole(&o));
+    let o = in_folder(at, &["preview", "q/shop.ngc", "-o", "q.svg"]);
+    assert_eq!(code(&o), 0, "{}", whole(&o));
+    assert_eq!(code(&in_folder(&at.join("q"), &["check", "shop.ngc"])), 0);
+
+    let cut = "G21 G90 G17 F300\nT1 M6\nG43 H1\nG0 X0 Y0 Z5\nG1 Z-1\nM2\n";
+    for (part, length) in [("a", "50"), ("b", "60")] {
+        write(&format!("{part}/part.ngc"), cut);
+        write(&format!("{part}/t.tbl"), &format!("T1 P1 D10 Z{length}\n"));
+        write(&format!("{part}/gcc-robot.toml"), "schema = 1\n[project]\ntools = \"t.tbl\"\nsources = [\"*.ngc\"]\n[[targets]]\ntarget = \"canon\"\noutput = \"{name}.canon\"\n");
+        let o = in_folder(at, &["build", &format!("{part}/part.ngc"), "--target", "canon"]);
+        assert!(text(&o.stdout).contains(&format!("USE_TOOL_LENGTH_OFFSET(0.0000 0.0000 {length}.0000")), "{}", whole(&o));
+    }
+    // Each by its own project, in one command too.
+    let o = in_folder(at, &["build", "a/part.ngc", "q/shop.ngc", "--target", "canon", "-o", "out/"]);
+    assert_eq!(code(&o), 0, "{}", whole(&o));
+    assert!(std::fs::read_to_string(at.join("out/part.canon")).unwrap().contains("50.0000"));
+    let o = in_folder(at, &["diff", "a/part.ngc", "b/part.ngc"]);
+    assert_eq!(code(&o), 1, "{}", whole(&o));
+}
+
+/// Programs of a Fanuc control are files of the names that it gives them, and open with `%`.
+#[test]
+fn fanuc_subprograms_are_files_of_their_number() {
+    for name in ["O2000.nc", "O2000.NC", "O2000", "2000.nc", "2000.ngc", "o2000.nc"] {
+        for head in ["", "%\n", "\n%\n"] {
+            let folder = tempfile::tempdir().unwrap();
+            let at = folder.path();
+            std::fs::write(at.join(name), format!("{head}O2000\nG1 X77. F100.\nM99\n%\n")).unwrap();
+            std::fs::write(at.join("O1234.nc"), "%\nO1234\nG21 G90 G54\nM98 P2000\nG65 P2000\nM30\n%\n").unwrap();
+            let o = in_folder(at, &["build", "O1234.nc", "--dialect", "fanuc-mill", "--target", "canon"]);
+            assert!(code(&o) == 0 && text(&o.stdout).matches("77.0000").count() >= 1, "{name} {head:?}: {}", whole(&o));
+        }
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    std::fs::write(at.join("O0012.nc"), "%\nO0012\nG1 X77. F100.\nM99\n%\n").unwrap();
+    std::fs::write(at.join("a.nc"), "%\nO1\nG21 G90 G54\nM98 P12\nM30\n%\n").unwrap();
+    let o = in_folder(at, &["check", "a.nc", "--dialect", "fanuc-mill"]);
+    assert_eq!(code(&o), 0, "{}", whole(&o));
+}
+
+/// Names in a project file are relative to it, wherever the command runs.
+#[test]
+fn names_in_a_project_are_relative_to_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    std::fs::create_dir_all(at.join("cell/parts")).unwrap();
+    let cell = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/examples/irb2400-cell.toml");
+    std::fs::copy(cell, at.join("cell/cell.toml")).unwrap();
+    std::fs::write(at.join("cell/parts/a.ngc"), "G21 G90 G17 G54\nT1 M6\nS12000 M3\nG0 X10 Y0 Z5\nG1 X20 F600\nM2\n").unwrap();
+    for machine in ["cell.toml", "./cell.toml"] {
+        let project = format!("schema = 1\n[project]\nsources = [\"parts/*.ngc\"]\nmachine = \"{machine}\"\n[[targets]]\ntarget = \"rapid\"\noutput = \"{{name}}.mod\"\n");
+        std::fs::write(at.join("cell/gcc-robot.toml"), project).unwrap();
+        for (from, words) in [(".", &["build", "--project", "cell"][..]), ("cell", &["build"]), ("cell/parts", &["build"]), (".", &["check", "cell/parts/a.ngc"]), ("cell/parts", &["check"])] {
+            let o = in_folder(&at.join(from), words);
+            assert_eq!(code(&o), 0, "{machine} {from} {words:?}: {}", whole(&o));
+        }
+        assert!(at.join("cell/a.mod").is_file());
+    }
 }
 
 fn text_of_first(o: &Output) -> String {
@@ -228,7 +315,12 @@ fn other_commands() {
     assert_eq!(code(&run(&["no-such-command"])), 2);
     assert_eq!(code(&run(&["--version"])), 0);
     insta::assert_snapshot!("diff", whole(&run(&["diff", "part.ngc", "other.ngc"])));
-    assert_eq!(code(&run(&["verify", "part.ngc", "--to", "grbl"])), 0);
+    // A length that only the machine knows can't be said in grbl's language; with the tool table it can.
+    assert_eq!(code(&run(&["verify", "part.ngc", "--to", "grbl"])), 1);
+    let folder = tempfile::tempdir().unwrap();
+    let table = folder.path().join("tool.tbl");
+    std::fs::write(&table, "T1 P1 Z50 D10\n").unwrap();
+    assert_eq!(code(&run(&["verify", "part.ngc", "--to", "grbl", "--tools", &table.display().to_string()])), 0);
 }
 
 /// `--watch` builds again when a program changes, also after a mistake in it.
@@ -264,6 +356,61 @@ fn watching() {
     child.kill().unwrap();
     child.wait().unwrap();
     assert!(running && seen == [true, true, true], "{running} {seen:?}");
+}
+
+/// A source that comes to a watched project is built too.
+#[test]
+fn watching_a_project() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let write = |name: &str| std::fs::write(at.join(name), "G21 G90\nG0 X1\nM2\n").unwrap();
+    std::fs::write(at.join("gcc-robot.toml"), "schema = 1\n[project]\nsources = [\"*.ngc\"]\n[[targets]]\ntarget = \"canon\"\noutput = \"{name}.canon\"\n").unwrap();
+    write("a.ngc");
+    let mut child = command(&["build", "--watch", "-q"]).current_dir(at).stderr(Stdio::null()).spawn().unwrap();
+    let wait_for = |name: &str| {
+        let until = std::time::Instant::now() + std::time::Duration::from_secs(120);
+        while !at.join(name).is_file() && std::time::Instant::now() < until {
+            std::thread::sleep(std::time::Duration::from_millis(50));
+        }
+        at.join(name).is_file()
+    };
+    let first = wait_for("a.canon");
+    write("b.ngc");
+    let second = wait_for("b.canon");
+    child.kill().unwrap();
+    child.wait().unwrap();
+    assert!(first && second, "{first} {second}");
+}
+
+/// `diff` tells apart what no path of the simulation shows.
+#[test]
+fn differences_beside_the_path() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let base = "g21 g90\nt1 m6 g43 h1\ns1000 m3\ng0 x0 y0 z5\nm64 p1\ng1 x20 f100\ng2 x30 i5\ng38.2 z-5\nm5\nm2\n";
+    std::fs::write(at.join("a.ngc"), base).unwrap();
+    let mut told = String::new();
+    for (from, to) in [
+        (" g43 h1", ""),
+        ("h1", "h2"),
+        ("g21", "g21 g64 p1"),
+        ("g21", "g21 m50 p0"),
+        ("g2 ", "g3 "),
+        ("g38.2", "g38.3"),
+        ("m64", "m62"),
+        ("g90", "g90 g54"),
+    ] {
+        std::fs::write(at.join("b.ngc"), base.replace(from, to)).unwrap();
+        let o = in_folder(at, &["diff", "a.ngc", "b.ngc"]);
+        told += &format!("{from:?} → {to:?}\n{}", text(&o.stdout));
+        assert_eq!(code(&o), 1, "{told}");
+    }
+    insta::assert_snapshot!(told);
+    // With the tool table, and the offsets of the machine, nothing is left open.
+    std::fs::write(at.join("t.tbl"), "T1 P1 Z0\n").unwrap();
+    std::fs::write(at.join("v.var"), "5161 0\n").unwrap();
+    std::fs::write(at.join("b.ngc"), base.replace(" g43 h1", "")).unwrap();
+    assert_eq!(code(&in_folder(at, &["diff", "a.ngc", "b.ngc", "--tools", "t.tbl", "--vars", "v.var"])), 0);
 }
 
 /// What `completions` writes, the shells can read.

@@ -215,3 +215,38 @@ fn what_a_robot_cannot_do() {
     let huge = file("a.ngc", "G21 G90 F100\nG0 X0 Y0 Z0\nG1 X9000\nG1 Y9000\nM2\n");
     told("E0705", &[huge], "place a.ngc --machine abb/irb2400");
 }
+
+/// What a translation takes from a machine that nobody described is told; what it leaves to the machine is not.
+#[test]
+fn a_translation_holds_on_every_machine_or_says_so() {
+    let program = |text: &str| [("a.ngc", text.to_string())];
+    for text in [
+        "G21 G90\nG10 L2 P1 X0 Y0 Z0\nG54 G0 X1 Y1 Z5\nM2\n",
+        "G21 G90\nG10 L2 P2 X[#5221+5]\nG55 G0 X1\nM2\n",
+        "G21 G90\nG0 Z4\nG28.1\nG0 Z1\nG28\nM2\n",
+        "G21 G90 F100\nT1 M6\nG0 X0 Y0 Z5\nG41 D1 G1 X10\nY10\nX20\nG40 X30\nM2\n",
+    ] {
+        for command in ["build a.ngc -o o.ngc", "verify a.ngc"] {
+            let (found, status) = codes(&program(text), command);
+            assert!(found.iter().any(|c| c == "E0607"), "{command}: {found:?}\n{text}");
+            assert_eq!(status, Some(i32::from(command.starts_with("verify"))), "{text}");
+        }
+    }
+    for text in [
+        // A height set by hand, a touch-off, an offset that is selected, a lathe, and a length that only the control has.
+        "G21 G90 M3 S100\nG0 X10 Y10\nG1 X20 F100\nG3 X10 Y20 R10\nM5\nM2\n",
+        "G21 G90\nG0 X1 Y1 Z1\nG38.2 Z-5 F10\nG92 Z0\nG0 Z5\nM2\n",
+        "G21 G90\nG0 X1 Y1 Z1\nG38.2 Z-5 F10\nG10 L20 P1 Z2.5\nG0 Z5\nM2\n",
+        "G21 G90\nG0 X10\nG10 L20 P1 X0\nG0 X5\nM2\n",
+        "G21 G90 G17 G40 G49 G54\nG0 X1 Y1 Z1\nM2\n",
+        "G20 G90\nG92 X0 Y0 Z0\nG0 Z1\nX1 Y1\nG92.2\nG0 X2\nG92.3\nG0 X3\nM2\n",
+        "G21 G90\nG52 X0 Y0\nG0 X1\nM2\n",
+        "G21 G90\nG92.1\nG0 X1 Z5\nM2\n",
+        "G21 G90\nT1 M6 G43 H1\nG0 X10 Y10\nG0 Z5\nG43.2 H2\nG0 Z6\nM2\n",
+        "G21 G90\nM61 Q5\nG43 H5\nG0 X1 Z5\nM2\n",
+        "G21 G90 G18 G7\nM3 S100\nG0 X20 Z5\nG1 X18 F100\nZ0\nM5\nM2\n",
+    ] {
+        let (found, status) = codes(&program(text), "verify a.ngc");
+        assert!(!found.iter().any(|c| c == "E0607") && status == Some(0), "{found:?}, {status:?}\n{text}");
+    }
+}

@@ -102,6 +102,20 @@ fn verify_reports() {
     }
 }
 
+/// One direction of the spindle at a time: whichever way it turned before, or not at all.
+#[test]
+fn a_spindle_turns_one_way() {
+    let folder = tempfile::tempdir().unwrap();
+    let source = folder.path().join("s.ngc");
+    let made = |spindle: &str| {
+        std::fs::write(&source, format!("G21 G90 G54\nT1 M6\n{spindle}\nG0 X30 Y30 Z10\nG1 X40 F500\nM5\nM2\n")).unwrap();
+        let o = run(&["build", source.to_str().unwrap(), "--machine", CELL, "--target", "rapid"]);
+        assert!(o.status.success(), "{}", text(&o.stderr));
+        text(&o.stdout).matches("SetDO doSpindleCw,1").count()
+    };
+    assert_eq!([made("S5000 M4"), made("S5000 M3"), made("S5000 M3\nM5\nM4")], [0, 1, 1]);
+}
+
 /// A job gives the second half of a program to another clamping.
 #[test]
 fn setups_of_a_job() {
@@ -118,6 +132,89 @@ fn setups_of_a_job() {
     let bad = args(job.to_str().unwrap());
     assert_eq!(bad.status.code(), Some(1));
     assert!(text(&bad.stderr).contains("needs `from_line` or `workingsteps`"), "{}", text(&bad.stderr));
+}
+
+/// `check` asks the robot with the same setups as `build`.
+#[test]
+fn check_takes_a_job() {
+    let folder = tempfile::tempdir().unwrap();
+    let (source, job) = (folder.path().join("two.ngc"), folder.path().join("job.toml"));
+    std::fs::write(&source, "T1 M6\nG43 H1\nG0 X0 Y0 Z20\nG1 Z0 F500\nX50\nG0 Z30\nG0 X0 Y0 Z20\nG1 Z0\nX50\nM30\n").unwrap();
+    let check = |place: &str, more: &[&str]| {
+        std::fs::write(&job, format!("[[setup]]\nname = \"top\"\nfrom_line = 1\n[[setup]]\nname = \"far\"\nfrom_line = 7\nposition = {place}\n")).unwrap();
+        let args = ["check", source.to_str().unwrap(), "--message-format", "short", "--job", job.to_str().unwrap()];
+        let made = run(&[&args[..], more].concat());
+        (made.status.code(), text(&made.stderr) + &text(&made.stdout))
+    };
+    let near = check("[0, 50, 0]", &["--machine", CELL]);
+    assert_eq!(near.0, Some(0), "{}", near.1);
+    let far = check("[0, 5000, 0]", &["--machine", CELL]);
+    assert!(far.0 == Some(1) && far.1.contains("E0504"), "{}", far.1);
+    let bad = check("[0, 50]", &["--machine", CELL]);
+    assert!(bad.0 == Some(1) && bad.1.contains("job.toml") && bad.1.contains("E055"), "{}", bad.1);
+    let alone = check("[0, 50, 0]", &[]);
+    assert!(alone.0 == Some(2) && alone.1.contains("--job needs --machine"), "{:?}", alone);
+}
+
+const PROBED: &str = "compiler/cli/tests/fixtures/probe.p21";
+
+/// `check` asks the machine about STEP-NC files as well, with the setups of a job.
+#[test]
+fn check_asks_about_stepnc() {
+    let folder = tempfile::tempdir().unwrap();
+    let job = folder.path().join("job.toml");
+    let check = |args: &[&str]| {
+        let made = run(&[&["check", PROBED, "--message-format", "short"], args].concat());
+        (made.status.code(), text(&made.stderr) + &text(&made.stdout))
+    };
+    let of_job = |place: &str, step: &str| {
+        let setups = format!("[[setup]]\nname = \"only\"\nworkingsteps = [\"{step}\"]\nposition = {place}\n");
+        std::fs::write(&job, setups).unwrap();
+        check(&["--machine", CELL, "--job", job.to_str().unwrap()])
+    };
+    let near = check(&["--machine", CELL]);
+    assert_eq!(near.0, Some(0), "{}", near.1);
+    let bare = check(&["--machine", "abb/irb140"]);
+    assert!(bare.0 == Some(1) && bare.1.contains("probe.p21:44:") && bare.1.contains("E0521"), "{}", bare.1);
+    let placed = of_job("[0, 50, 0]", "drill the hole");
+    assert_eq!(placed.0, Some(0), "{}", placed.1);
+    let far = of_job("[0, 5000, 0]", "drill the hole");
+    assert!(far.0 == Some(1) && far.1.contains("E0504") && far.1.contains("probe.p21:44:"), "{}", far.1);
+    let unknown = of_job("[0, 50, 0]", "turn it");
+    assert!(unknown.0 == Some(1) && unknown.1.contains("job.toml") && unknown.1.contains("turn it"), "{}", unknown.1);
+}
+
+/// A plan that probes goes on from named places, whatever is measured.
+#[test]
+fn a_plan_that_probes() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("probe.mod");
+    let made = run(&["build", PROBED, "--machine", CELL, "--target", "rapid", "-o", out.to_str().unwrap()]);
+    assert!(made.status.success(), "{}", text(&made.stderr));
+    assert!(text(&made.stderr).contains("what it measures ('top') changes no motion"), "{}", text(&made.stderr));
+    let program = std::fs::read_to_string(&out).unwrap();
+    let at = program.find("Probe_2 diProbe,0,TRUE,[[50,50,-5]").expect("the probe move");
+    let next = program[at..].lines().nth(1).expect("a line");
+    assert!(next.trim().starts_with("MoveL [[50,50,5]"), "{next}");
+}
+
+/// A program that probes is verified like any other, and refused as joint positions.
+#[test]
+fn probes_are_verified() {
+    let folder = tempfile::tempdir().unwrap();
+    let source = folder.path().join("touch.ngc");
+    std::fs::write(&source, "G21 G90\nT1 M6\nG43 H1\nG0 X10 Y10 Z20\nG38.2 Z-5 F120\nG0 Z20\nM30\n").unwrap();
+    let call = |args: &[&str]| {
+        let made = run(&[args, &[source.to_str().unwrap(), "--machine", CELL, "--message-format", "short"]].concat());
+        (made.status.code(), text(&made.stderr) + &text(&made.stdout))
+    };
+    let (verified, checked) = (call(&["verify"]), call(&["check"]));
+    assert!(verified.0 == Some(0) && verified.1.contains("6 points"), "{}", verified.1);
+    assert_eq!(checked.0, Some(0), "{}", checked.1);
+    for target in ["joint-gcode", "setpoints"] {
+        let refused = call(&["build", "--target", target]);
+        assert!(refused.0 == Some(1) && refused.1.contains("E0523"), "{}", refused.1);
+    }
 }
 
 /// What a job file can't mean is told where it stands; a setup never begins in the work, and nothing is written then.

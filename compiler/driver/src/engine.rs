@@ -60,6 +60,7 @@ impl PartialEq for Boundary {
             && self.opening == other.opening
             && self.key == other.key
             && self.state.queue == other.state.queue
+            && (Arc::ptr_eq(&self.state, &other.state) || self.state.same_tools(&other.state))
             && self.seen == other.seen
     }
 }

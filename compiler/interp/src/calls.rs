@@ -1,7 +1,7 @@
 //! Calls: `o… call`, M98 and M99, remapped codes, the contours of roughing cycles; and the way back.
 
-use gr_canon::{Sink, Version};
-use gr_gcode::{Form, Keyword, Scan, Word};
+use gr_canon::{FileId, Sink, Version};
+use gr_gcode::{Form, Keyword, LineKind, Scan, Word};
 use gr_spec::{Rs274, code, rs274};
 
 use crate::control::Skip;
@@ -97,6 +97,7 @@ impl<S: Sink> Interp<'_, S> {
     /// A line that begins with M98 or M99.
     pub(crate) fn fanuc_line(&mut self, scan: &Scan, words: &[Word], which: Fanuc) -> Res {
         self.count_control()?;
+        self.check_listed_m(if which == Fanuc::M98 { 98 } else { 99 })?;
         let rest: Vec<Word> = first_real(words).map_or_else(Vec::new, |first| {
             words.iter().filter(|w| w.start > first.start).copied().collect()
         });
@@ -339,7 +340,7 @@ impl<S: Sink> Interp<'_, S> {
         if let Some(file) = self.files.find_sub(name) {
             self.note_file(file);
             self.place.file = file;
-            self.next = 0;
+            self.next = self.behind_percent(file);
             self.shift = 0;
             start = 0;
         } else if self.setup.version == Version::V2_10 && self.outside_main_file() {
@@ -350,6 +351,14 @@ impl<S: Sink> Interp<'_, S> {
         }
         self.skip = Some(Skip { label, to_sub: true, start, from: Some(from) });
         Ok(())
+    }
+
+    /// Where a file that is called begins: on a Fanuc control every file opens with `%`, which is no end of it.
+    fn behind_percent(&self, file: FileId) -> u32 {
+        let Some((chunk, _, _)) = self.files.chunk(file, 0).filter(|_| self.is_fanuc()) else { return 0 };
+        let blank = |l: &u32| chunk.scan.words(*l).is_empty() && chunk.scan.lines[*l as usize].kind != LineKind::Percent;
+        let first = (0..chunk.scan.lines.len() as u32).find(|l| !blank(l));
+        first.filter(|l| chunk.scan.lines[*l as usize].kind == LineKind::Percent).map_or(0, |l| l + 1)
     }
 
     /// The line stands in another file than the main program's first call.

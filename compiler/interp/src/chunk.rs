@@ -1,6 +1,5 @@
 //! One chunk alone: for programs without control flow, of which any part can be run from the state before it.
 
-use std::sync::Arc;
 
 use gr_canon::Sink;
 use gr_gcode::Chunk;
@@ -72,8 +71,7 @@ pub fn run_lines<S: Sink>(
     sink: S,
 ) -> ChunkExit {
     let mut files = NoFiles::default();
-    let tools = state.tools.clone().unwrap_or_else(|| Arc::new(setup.tools.clone()));
-    let mut run = Interp::with(&mut files, setup, sink, state.clone(), params.clone(), tools);
+    let mut run = Interp::with(&mut files, setup, sink, state.clone(), params.clone());
     run.log = Some(Box::new(Log { before: params.clone(), ..Log::default() }));
     run.reading.text = chunk.text.clone();
     run.reading.scan = chunk.scan.clone();

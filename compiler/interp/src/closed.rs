@@ -110,7 +110,7 @@ impl<S: Sink> Interp<'_, S> {
     #[inline]
     pub(crate) fn check_listed_m(&self, n: i32) -> Res {
         match self.closed {
-            Some(list) if !has(&list.m, n) && crate::read::m_group(n) >= 0 => {
+            Some(list) if !has(&list.m, n) && (crate::read::m_group(n) >= 0 || n == 98) => {
                 Err(self.not_in_dialect(&format!("M{n}"), OTHER_CODE).at(b'm'))
             }
             _ => Ok(()),

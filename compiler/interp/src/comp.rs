@@ -424,9 +424,9 @@ impl<S: Sink> Interp<'_, S> {
     }
 
     fn comp_from_tool(&self, g: i16, plane: Plane) -> Res<(f64, i32)> {
-        let tools = &self.tools.rows;
+        let tools = &self.tools;
         let row = match self.block.get(b'd') {
-            None => tools.first(),
+            None => tools.get(0),
             Some(d) => {
                 let number = (d + 0.5) as i32;
                 if (f64::from(number) - d).abs() >= 0.0001 {
@@ -441,8 +441,8 @@ impl<S: Sink> Interp<'_, S> {
                         .at(b'd'));
                 }
                 // The spindle's row counts last.
-                let spindle = || tools.first().filter(|t| number == 0 || t.number == number);
-                let found = tools.iter().skip(1).find(|t| number != 0 && t.number == number).or_else(spindle);
+                let spindle = || tools.get(0).filter(|t| number == 0 || t.number == number);
+                let found = tools.pockets().iter().find(|t| number != 0 && t.number == number).or_else(spindle);
                 if found.is_none() && number != 0 {
                     return Err(Fault::new(code::COMP_TOOL_WORD, rs274::COMP_D_UNKNOWN)
                         .arg(format!("tool {number} is not in the tool table"))

@@ -315,15 +315,27 @@ impl<S: Sink> Interp<'_, S> {
             return Ok(());
         }
         if matches!(motion, 0 | 10) {
-            self.m.cycle_il_set = 0;
+            self.leave_cycle();
             return self.convert_straight(motion);
         }
         self.convert_other_motion(motion)
     }
 
+    /// No cycle is in force any more. A Fanuc control forgets its dwell and its peck then (Series 0i/30i operator's manual, machining
+    /// center system, canned cycles for drilling); LinuxCNC keeps them.
+    #[inline]
+    pub(crate) fn leave_cycle(&mut self) {
+        if self.m.cycle_il_set != 0 {
+            self.m.cycle_il_set = 0;
+            if self.is_fanuc() {
+                (self.m.cycle_p, self.m.cycle_q) = (0.0, 0.0);
+            }
+        }
+    }
+
     fn convert_other_motion(&mut self, motion: i16) -> Res {
         if !crate::check::is_cycle(motion) {
-            self.m.cycle_il_set = 0;
+            self.leave_cycle();
         }
         match motion {
             20 | 30 => self.convert_arc(motion),

@@ -77,7 +77,7 @@ impl<S: Sink> Interp<'_, S> {
         // G80 goes back to the motion of group 01, which a bare axis word then makes.
         if self.block.g(Group::Motion) == 800 && self.has_axes() {
             self.m.motion = self.m.before_cycle;
-            self.m.cycle_il_set = 0;
+            self.leave_cycle();
             self.block.g[Group::Motion as usize] = -1;
             self.block.g_mask &= !(1 << Group::Motion as u32);
         }

@@ -75,7 +75,7 @@ pub use params::Params;
 pub use labels::{LabelAt, LabelName, Met};
 pub use remap::{remaps_without_file, subroutine_paths};
 pub use run::{End, Files, Interp, NoFiles, Place};
-pub use setup::{Budgets, Ini, Setup, Tool, ToolTable};
+pub use setup::{Budgets, Ini, Setup, Tool, ToolTable, Tools};
 pub use statements::{Statement, is_stop, statement, unclosed};
 pub use state::{Modal, SavedModes, Side, State};
 pub use world::World;

@@ -306,7 +306,11 @@ impl<S: Sink> Interp<'_, S> {
             self.m.probed = 0;
         }
         if self.m.tool_changed != 0 {
-            self.refresh_position();
+            // A tool change leaves the axes where they are. `rs274` asks its stand-in, which knows of no tool offset: one
+            // set by G43 in the block of the change is forgotten there, and not at a machine.
+            if self.is_rs274() {
+                self.refresh_position();
+            }
             self.load_tool_table();
             self.m.tool_changed = 0;
         }

@@ -1,6 +1,6 @@
 //! Configuration from the INI file, remapped codes, saved modes (M70 … M73).
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use gr_canon::{Sink, Units};
 use gr_spec::{code, rs274};
@@ -258,7 +258,7 @@ pub(crate) fn check_remap(line: &str, earlier: &[String]) -> Vec<(bool, String)>
 }
 
 /// REMAP lines whose subroutine is nowhere, with the name of its file.
-pub fn remaps_without_file<'s>(setup: &'s Setup, there: &dyn Fn(&std::path::Path) -> bool) -> Vec<(&'s str, String)> {
+pub fn remaps_without_file<'s>(setup: &'s Setup, there: &dyn Fn(&Path) -> bool) -> Vec<(&'s str, String)> {
     let lines = setup.ini.all("rs274ngc", "remap");
     let missing = |line: &'s String| {
         let (r, _) = Remap::of(line).ok().filter(|(r, _)| !r.sub.is_empty())?;
@@ -288,7 +288,7 @@ pub(crate) struct Remapped {
 
 /// Files that an external subroutine may be in, in the order the controller tries them.
 pub fn subroutine_paths(setup: &Setup, name: &str) -> Vec<PathBuf> {
-    let file = format!("{name}.ngc");
+    let files = file_names(setup.dialect, name);
     let ini = &setup.ini;
     let folder = |dir: &str| -> PathBuf {
         let dir = dir.trim();
@@ -301,17 +301,35 @@ pub fn subroutine_paths(setup: &Setup, name: &str) -> Vec<PathBuf> {
             _ => expanded,
         }
     };
-    let mut out = vec![setup.base.as_deref().map_or_else(|| PathBuf::from(&file), |base| base.join(&file))];
-    if let Some(dir) = ini.get("display", "program_prefix") {
-        out.push(folder(dir).join(&file));
-    }
+    let mut folders = vec![setup.base.clone().unwrap_or_default()];
+    folders.extend(ini.get("display", "program_prefix").map(folder));
     if let Some(dirs) = ini.get("rs274ngc", "subroutine_path") {
-        out.extend(dirs.split(':').filter(|d| !d.trim().is_empty()).take(10).map(|d| folder(d).join(&file)));
+        folders.extend(dirs.split(':').filter(|d| !d.trim().is_empty()).take(10).map(folder));
     }
-    if let Some(dir) = ini.get("wizard", "wizard_root") {
-        out.push(folder(dir).join(&file));
+    folders.extend(ini.get("wizard", "wizard_root").map(folder));
+    let open = setup.confined.as_deref();
+    let may = |folder: &Path, path: &Path| open.is_none_or(|open| open.iter().map(PathBuf::as_path).chain([folder]).any(|f| lies_in(path, f)));
+    let paths = folders.iter().flat_map(|f| files.iter().map(move |name| (f, f.join(name))));
+    paths.filter(|(f, path)| may(f, path)).map(|(_, path)| path).collect()
+}
+
+/// Names that the file of a subroutine may have. Programs of a Fanuc control are called O and a number of four digits.
+fn file_names(dialect: &gr_spec::Dialect, name: &str) -> Vec<String> {
+    let mut names = vec![format!("{name}.ngc")];
+    if let (gr_spec::Family::Fanuc, Ok(number)) = (dialect.family, name.parse::<u32>()) {
+        let mut stems = vec![format!("O{number:04}"), format!("O{number}"), name.to_string(), format!("o{number:04}"), format!("o{number}")];
+        stems.sort();
+        stems.dedup();
+        names.extend(stems.iter().flat_map(|s| ["nc", "NC", "ngc"].map(|ending| format!("{s}.{ending}")).into_iter().chain([s.clone()])));
     }
-    out
+    names
+}
+
+/// Whether a file lies below a folder, whatever way its name takes. What is not there can't be read: no matter.
+fn lies_in(path: &Path, folder: &Path) -> bool {
+    let Ok(real) = path.canonicalize() else { return true };
+    let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+    folder.canonicalize().is_ok_and(|f| real.starts_with(f))
 }
 
 impl<S: Sink> Interp<'_, S> {
@@ -417,7 +435,7 @@ impl<S: Sink> Interp<'_, S> {
     fn prolog_values(&self, remap: &Remap) -> Vec<(&'static str, f64)> {
         let pocket = |index: i32| f64::from(self.tool(index).pocket);
         let of_tool = |number: f64| {
-            let index = self.tools.rows.iter().skip(1).position(|t| f64::from(t.number) == number);
+            let index = self.tools.pockets().iter().position(|t| f64::from(t.number) == number);
             vec![("tool", number), ("pocket", index.map_or(0.0, |i| pocket(i as i32 + 1)))]
         };
         match remap.part("prolog") {
@@ -714,7 +732,7 @@ impl<S: Sink> Interp<'_, S> {
     /// The state between two blocks.
     pub fn state(&self) -> crate::State {
         let main = &self.levels[0];
-        let own = |t: &std::sync::Arc<crate::ToolTable>| (**t != self.setup.tools).then(|| t.clone());
+        let own = |t: &crate::Tools| (!t.is(&self.setup.tools)).then(|| t.clone());
         crate::State {
             modal: self.m,
             queue: self.queue.clone(),

@@ -18,7 +18,7 @@ use crate::remap::{Config, Remapped};
 use crate::state::State;
 use crate::statements::FileIndex;
 use crate::world::World;
-use crate::{Fault, Modal, Params, Res, Setup, ToolTable};
+use crate::{Fault, Modal, Params, Res, Setup, Tools};
 
 /// Where the interpreter gets files from.
 pub trait Files {
@@ -123,10 +123,10 @@ pub struct Interp<'a, S: Sink> {
     pub(crate) setup: &'a Setup,
     pub(crate) params: Params,
     pub(crate) sink: S,
-    pub(crate) tools: Arc<ToolTable>,
+    pub(crate) tools: Tools,
     pub(crate) world: World,
     /// The machine's own table; the interpreter's follows after a tool change.
-    pub(crate) world_tools: Arc<ToolTable>,
+    pub(crate) world_tools: Tools,
     pub(crate) config: Arc<Config>,
     /// The codes that the dialect has, when it is a closed list.
     pub(crate) closed: Option<&'static crate::closed::Closed>,
@@ -190,8 +190,7 @@ impl<'a, S: Sink> Interp<'a, S> {
         for (index, value) in &setup.params {
             params.set(*index, *value);
         }
-        let tools = Arc::new(setup.tools.clone());
-        Self::with(files, setup, sink, state, params, tools)
+        Self::with(files, setup, sink, state, params)
     }
 
     /// A run that goes on at a line of the main program, outside of subroutines and loops. `shift` is the line of
@@ -204,8 +203,7 @@ impl<'a, S: Sink> Interp<'a, S> {
         main: FileId,
         (line, shift): (u32, i32),
     ) -> Self {
-        let tools = Arc::new(setup.tools.clone());
-        let mut run = Self::with(files, setup, sink, state, params, tools);
+        let mut run = Self::with(files, setup, sink, state, params);
         run.place = Place { file: main, line, frame: FrameId::MAIN };
         run.note_file(main);
         (run.next, run.shift, run.frontier) = (line, shift, line);
@@ -218,9 +216,15 @@ impl<'a, S: Sink> Interp<'a, S> {
         sink: S,
         state: State,
         params: Params,
-        tools: Arc<ToolTable>,
     ) -> Self {
-        let State { modal, queue, world, saved, tools: own, world_tools } = state;
+        let State { modal, queue, world, saved, tools, world_tools } = state;
+        let (tools, world_tools) = match (tools, world_tools) {
+            (Some(own), Some(world)) => (own, world),
+            (own, world) => {
+                let start = Tools::new(&setup.tools);
+                (own.unwrap_or_else(|| start.clone()), world.unwrap_or(start))
+            }
+        };
         let mut main = Level::new(0);
         main.saved_valid = saved.is_some();
         main.saved = saved;
@@ -231,9 +235,9 @@ impl<'a, S: Sink> Interp<'a, S> {
             setup,
             params,
             sink,
-            tools: own.unwrap_or_else(|| tools.clone()),
+            tools,
             world,
-            world_tools: world_tools.unwrap_or(tools),
+            world_tools,
             config: Arc::new(Config::new(setup)),
             closed: crate::closed::list_of(setup.dialect),
             place: Place::default(),
@@ -548,7 +552,7 @@ impl<'a, S: Sink> Interp<'a, S> {
         &self.params
     }
     /// The tool table as the program left it.
-    pub fn tools(&self) -> &ToolTable {
+    pub fn tools(&self) -> &Tools {
         &self.tools
     }
     /// The sink back.

@@ -1,4 +1,5 @@
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use gr_canon::{Axes, Units, Version};
 use gr_spec::Dialect;
@@ -20,6 +21,9 @@ pub struct Setup {
     pub ini: Ini,
     /// Folder in which files of subroutines are looked for first; none = the folder the command runs in.
     pub base: Option<std::path::PathBuf>,
+    /// Files of subroutines are read only below these folders and below those of the search path; none = wherever a call
+    /// leads.
+    pub confined: Option<Vec<std::path::PathBuf>>,
     /// Skip lines that begin with `/`.
     pub block_delete: bool,
     /// Limits.
@@ -49,6 +53,7 @@ impl Default for Setup {
             params: BTreeMap::new(),
             ini: Ini::default(),
             base: None,
+            confined: None,
             block_delete: false,
             budgets: Budgets::default(),
             user_m_codes: true,
@@ -85,6 +90,52 @@ pub struct ToolTable {
     pub rows: Vec<Tool>,
 }
 
+/// A tool table as a run changes it. Every tool change writes the spindle's row; the others are shared by all states of a
+/// program, as long as no G10 writes one.
+#[derive(Clone, Debug)]
+pub struct Tools {
+    spindle: Option<Arc<Tool>>,
+    /// Its row 0 is not looked at.
+    others: Arc<ToolTable>,
+}
+
+impl Tools {
+    /// As the machine has them at the start.
+    pub fn new(table: &ToolTable) -> Tools {
+        Tools { spindle: table.rows.first().cloned().map(Arc::new), others: Arc::new(table.clone()) }
+    }
+    /// The tool of a row; row 0 is the spindle.
+    pub fn get(&self, row: usize) -> Option<&Tool> {
+        if row == 0 { self.spindle.as_deref() } else { self.others.rows.get(row) }
+    }
+    /// The tools of the pockets.
+    pub fn pockets(&self) -> &[Tool] {
+        self.others.rows.get(1..).unwrap_or_default()
+    }
+    /// Puts a tool into the spindle.
+    pub fn load(&mut self, tool: Tool) {
+        self.spindle = Some(Arc::new(tool));
+    }
+    /// Puts a tool into a row that is there.
+    pub fn put(&mut self, row: usize, tool: Tool) {
+        if row == 0 && self.spindle.is_some() {
+            self.load(tool);
+        } else if row > 0 && row < self.others.rows.len() {
+            Arc::make_mut(&mut self.others).rows[row] = tool;
+        }
+    }
+    /// Whether this is what the machine had at the start.
+    pub fn is(&self, table: &ToolTable) -> bool {
+        self.spindle.as_deref() == table.rows.first() && self.pockets() == table.rows.get(1..).unwrap_or_default()
+    }
+}
+
+impl PartialEq for Tools {
+    fn eq(&self, other: &Tools) -> bool {
+        self.spindle == other.spindle && (Arc::ptr_eq(&self.others, &other.others) || self.pockets() == other.pockets())
+    }
+}
+
 /// One tool, in machine units.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[expect(missing_docs, reason = "named after the table's words")]
@@ -107,4 +158,26 @@ pub struct Ini {
     pub values: BTreeMap<(String, String), Vec<String>>,
     /// Folder of the file, for relative paths in it.
     pub folder: Option<std::path::PathBuf>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A program has many states, and a machine many tools.
+    #[test]
+    fn a_tool_change_leaves_the_other_rows_shared() {
+        let start = Tools::new(&crate::assumed_tools());
+        let mut now = start.clone();
+        now.load(Tool { number: 7, ..Tool::default() });
+        assert!(Arc::ptr_eq(&start.others, &now.others) && start != now && start.get(0) != now.get(0));
+        let mut state = crate::State::start(&Setup::default());
+        (state.tools, state.world_tools) = (Some(now.clone()), Some(now.clone()));
+        assert!(state.key_bytes().len() < 4_096 && state.same_tools(&state.clone()));
+        now.put(5, Tool { number: 5, diameter: 3.0, ..Tool::default() });
+        assert!(now.get(5) != start.get(5) && now.get(6) == start.get(6) && now.pockets().len() == start.pockets().len());
+        assert_ne!(state, crate::State { tools: Some(now.clone()), ..state.clone() });
+        now.put(5, start.get(5).cloned().unwrap_or_default());
+        assert_eq!(now, state.tools.unwrap_or(start));
+    }
 }

@@ -1,5 +1,4 @@
 use std::hash::{Hash, Hasher};
-use std::sync::Arc;
 
 use bytemuck::{Pod, Zeroable};
 use gr_canon::{Axes, Plane, Units};
@@ -7,7 +6,7 @@ use gr_spec::Family;
 
 use crate::queue::Queue;
 use crate::world::World;
-use crate::{Setup, ToolTable};
+use crate::{Setup, Tools};
 
 /// Number of spindles a machine may have.
 pub const SPINDLES: usize = 8;
@@ -198,9 +197,9 @@ pub struct State {
     /// Modes kept by M70 in the main program.
     pub saved: Option<Box<SavedModes>>,
     /// The tool table, once the program changed it or a tool was changed.
-    pub tools: Option<Arc<ToolTable>>,
+    pub tools: Option<Tools>,
     /// The machine's own table, likewise.
-    pub world_tools: Option<Arc<ToolTable>>,
+    pub world_tools: Option<Tools>,
 }
 
 impl State {
@@ -228,7 +227,7 @@ impl State {
         modal.n_number = -1;
         State { modal, queue: Queue::default(), world: World::new(), saved: None, tools: None, world_tools: None }
     }
-    /// The bytes that make two states the same state (`-0.0` counts as `0.0`).
+    /// The bytes that make two states the same state (`-0.0` counts as `0.0`), tool tables and queue aside.
     pub fn key_bytes(&self) -> Vec<u8> {
         let mut out = Vec::with_capacity(1024);
         for part in [self.modal.bytes(), bytemuck::bytes_of(&self.world)] {
@@ -245,23 +244,17 @@ impl State {
             out.extend(saved.g.iter().chain(&saved.m).flat_map(|v| v.to_le_bytes()));
             out.extend(saved.settings.iter().flat_map(|v| (v + 0.0).to_bits().to_le_bytes()));
         }
-        for table in [&self.tools, &self.world_tools].into_iter().flatten() {
-            out.push(2);
-            for tool in &table.rows {
-                out.extend(tool.number.to_le_bytes());
-                out.extend(tool.pocket.to_le_bytes());
-                out.extend(tool.orientation.to_le_bytes());
-                let numbers = tool.offset.iter().chain([&tool.diameter, &tool.front_angle, &tool.back_angle]);
-                out.extend(numbers.flat_map(|v| (v + 0.0).to_bits().to_le_bytes()));
-            }
-        }
         out
+    }
+    /// The same tools.
+    pub fn same_tools(&self, other: &State) -> bool {
+        self.tools == other.tools && self.world_tools == other.world_tools
     }
 }
 
 impl PartialEq for State {
     fn eq(&self, other: &Self) -> bool {
-        self.key_bytes() == other.key_bytes() && self.queue == other.queue
+        self.key_bytes() == other.key_bytes() && self.queue == other.queue && self.same_tools(other)
     }
 }
 

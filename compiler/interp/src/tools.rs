@@ -1,7 +1,5 @@
 //! Tools: T, M6, M61, length offsets, G10 L0, L1, L10, L11.
 
-use std::sync::Arc;
-
 use gr_canon::{Axes, Call, Sink, Version};
 use gr_spec::{code, rs274};
 
@@ -24,7 +22,7 @@ fn near_int(value: f64) -> (i32, bool) {
 impl<S: Sink> Interp<'_, S> {
     /// The tool in a pocket of the interpreter's table.
     pub(crate) fn tool(&self, index: i32) -> Tool {
-        usize::try_from(index).ok().and_then(|i| self.tools.rows.get(i)).cloned().unwrap_or_else(no_tool)
+        usize::try_from(index).ok().and_then(|i| self.tools.get(i)).cloned().unwrap_or_else(no_tool)
     }
 
     /// Index of the pocket that holds a tool: the spindle's row counts last, tool 0 is no tool.
@@ -32,15 +30,15 @@ impl<S: Sink> Interp<'_, S> {
         if number == 0 {
             return Ok(0);
         }
-        let rows = &self.world_tools.rows;
+        let tools = &self.world_tools;
         let found = match number {
             -1 => None,
-            _ => rows
+            _ => tools
+                .pockets()
                 .iter()
-                .skip(1)
                 .position(|t| t.number == number)
                 .map(|i| i + 1)
-                .or_else(|| rows.first().filter(|t| t.number == number).map(|_| 0)),
+                .or_else(|| tools.get(0).filter(|t| t.number == number).map(|_| 0)),
         };
         match found {
             Some(index) => Ok(index as i32),
@@ -62,7 +60,7 @@ impl<S: Sink> Interp<'_, S> {
         self.m.selected_pocket = index;
         self.m.selected_tool = number;
         let Some(offset) = offset else { return Ok(()) };
-        if self.world_tools.rows.first().is_none_or(|t| t.number != number) {
+        if self.world_tools.get(0).is_none_or(|t| t.number != number) {
             self.convert_tool_change()?;
         }
         if offset == 0 {
@@ -110,12 +108,8 @@ impl<S: Sink> Interp<'_, S> {
         let pocket = self.m.selected_pocket;
         self.emit(Call::ChangeTool(pocket));
         // The machine puts the tool into the spindle's row; the interpreter hears of it with the next block.
-        let tool = usize::try_from(pocket).ok().and_then(|i| self.world_tools.rows.get(i)).cloned();
-        let table = Arc::make_mut(&mut self.world_tools);
-        if table.rows.is_empty() {
-            table.rows.push(no_tool());
-        }
-        table.rows[0] = tool.unwrap_or_else(no_tool);
+        let tool = usize::try_from(pocket).ok().and_then(|i| self.world_tools.get(i)).cloned();
+        self.world_tools.load(tool.unwrap_or_else(no_tool));
         self.m.pocket = pocket;
         self.m.tool_changed = 1;
         self.set_tool_parameters();
@@ -138,7 +132,7 @@ impl<S: Sink> Interp<'_, S> {
         let index = self.find_tool(number, b'q')?;
         self.m.pocket = index;
         self.m.tool_changed = 1;
-        self.emit(Call::ChangeToolNumber(index));
+        self.emit(Call::ChangeToolNumber(index, number));
         self.set_tool_parameters();
         Ok(())
     }
@@ -343,15 +337,9 @@ impl<S: Sink> Interp<'_, S> {
         let rows: &[i32] = if loaded { &[index, 0] } else { &[index] };
         self.emit(call(index, &tool));
         for table in [&mut self.tools, &mut self.world_tools] {
-            let table = Arc::make_mut(table);
-            for row in rows {
-                if let Some(t) = table.rows.get_mut(*row as usize) {
-                    let pocket = t.pocket;
-                    *t = tool.clone();
-                    if *row != 0 {
-                        t.pocket = pocket;
-                    }
-                }
+            for row in rows.iter().filter_map(|r| usize::try_from(*r).ok()) {
+                let pocket = table.get(row).map_or(tool.pocket, |t| if row == 0 { tool.pocket } else { t.pocket });
+                table.put(row, Tool { pocket, ..tool.clone() });
             }
         }
         let spindle = self.tool(0);

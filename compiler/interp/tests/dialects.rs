@@ -151,6 +151,25 @@ fn fanuc_cycles_keep_their_levels() {
 
 /// The same: G86 has no P, and takes none over from another cycle.
 #[test]
+fn a_fanuc_cycle_that_is_cancelled_leaves_no_dwell() {
+    let dwells = |text: &str| {
+        let (calls, outcome) = run_in("fanuc-mill", text);
+        assert!(outcome.findings.is_empty(), "{:?}", outcome.findings);
+        calls.iter().filter(|c| c.starts_with("DWELL")).cloned().collect::<Vec<_>>()
+    };
+    let drill = "G21 G90 G0 Z50.\nS500 M3\nG82 X30. Y10. Z-5. R2. P500 F120.\n";
+    let tap = "G84 X50. Y20. Z-10. R5. F500.\nG80\nM30\n";
+    assert_eq!(dwells(&format!("{drill}{tap}")).len(), 2, "without G80 the dwell goes on");
+    for cancel in ["G80", "G0 Z50.", "G80 X40."] {
+        let found = dwells(&format!("{drill}{cancel}\n{tap}"));
+        assert!(found.len() == 1 || found[1..].iter().all(|d| d.contains("0.0000")), "{cancel}: {found:?}");
+    }
+    // The next cycle has to say its own again.
+    let (_, outcome) = run_in("fanuc-mill", &format!("{drill}G80\nG82 X5. Z-5. R2. F100.\nM30\n"));
+    assert_eq!(outcome.findings[0].fault.code, code::CYCLE_WORD_MISSING);
+}
+
+#[test]
 fn a_fanuc_bore_does_not_dwell() {
     let text = "G21 G90 S500 M3\nG0 Z5.\nG82 X1. Z-5. R2. P250 F100.\nG86 X2. Z-5. R2.\nG82 X3. Z-5. R2. P250\nG80\nM30\n";
     let (calls, outcome) = run_in("fanuc-mill", text);
@@ -203,6 +222,8 @@ fn dialects_are_closed_lists() {
         ("grbl", "G81 X1 Z-1 R1"),
         ("grbl", "G33 Z-1 K1"),
         ("grbl", "M6"),
+        ("grbl", "M98 P1"),
+        ("grbl", "M99"),
         ("grbl", "G0 A5"),
         ("grbl", "G0 X1 W2"),
         ("grbl", "G10 L10 P1 X1"),

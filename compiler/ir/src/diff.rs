@@ -3,7 +3,7 @@
 
 use crate::geometry::{ArcShape, Length, length, nurbs_point};
 use crate::measure::{Rates, Totals, measure};
-use crate::{Axes, Cursor, FeedMode, Op, Pose, Program, Source, Spindle, State, Stop, Turn, View};
+use crate::{Axes, Cursor, FeedMode, Op, PathMode, Pose, Program, Source, Spindle, State, Stop, Turn, View};
 
 mod walk;
 
@@ -43,6 +43,8 @@ pub enum Aspect {
     Coolant,
     /// Dwells, stops, inputs, outputs, user M codes.
     Event,
+    /// How the control follows the path, and what the operator may override.
+    Control,
     /// Total time.
     Time,
 }
@@ -104,6 +106,13 @@ pub fn diff(a: &Program, b: &Program, tolerance: &Tolerance) -> Diff {
     if out.differs(Aspect::Path) {
         let mut shape = walk::by_shape(a, b, tolerance);
         shape.resegmented = !shape.differs(Aspect::Path);
+        // Two curves between the same ends are told apart best by how far they are from each other.
+        let curves = out.differences.iter().find(|d| d.aspect == Aspect::Path && !d.message.is_empty());
+        if let Some(d) = shape.differences.iter_mut().find(|d| d.aspect == Aspect::Path)
+            && let Some(c) = curves.filter(|c| (c.a, c.b) == (d.a, d.b))
+        {
+            d.message.clone_from(&c.message);
+        }
         out = shape;
     }
     (out.totals_a, out.totals_b) = (totals(a), totals(b));
@@ -144,7 +153,10 @@ impl Class {
         match self {
             Class::Rapid => "a rapid",
             Class::Feed => "a feed move",
-            Class::Probe(_) => "a probe move",
+            Class::Probe(0) => "a probe move (G38.2)",
+            Class::Probe(1) => "a probe move (G38.3)",
+            Class::Probe(2) => "a probe move (G38.4)",
+            Class::Probe(_) => "a probe move (G38.5)",
             Class::Sync => "a move in step with the spindle",
             Class::Tap => "a rigid tap",
         }
@@ -163,6 +175,49 @@ struct Conditions {
     spindles: [Spindle; 8],
     coolant: (bool, bool),
     work: u8,
+    control: Control,
+}
+
+/// How the control follows the path, and what the operator may override.
+#[derive(Clone, Copy, PartialEq, Debug)]
+struct Control {
+    path: PathMode,
+    feed: bool,
+    speed: u8,
+    adaptive: bool,
+    hold: bool,
+}
+
+impl Control {
+    fn of(state: &State) -> Control {
+        let State { path, feed_override: feed, speed_override: speed, adaptive, feed_hold: hold, .. } = *state;
+        Control { path, feed, speed, adaptive, hold }
+    }
+    fn same(&self, other: &Control, tolerance: &Tolerance) -> bool {
+        let path = match (self.path, other.path) {
+            (PathMode::Blend(p), PathMode::Blend(q)) => (p - q).abs() <= tolerance.length.max(tolerance.rate * p.abs()),
+            (p, q) => p == q,
+        };
+        path && Control { path: other.path, ..*self } == *other
+    }
+    fn text(&self) -> String {
+        let mut text = match self.path {
+            PathMode::ExactStop => "with exact stops (G61.1)".to_string(),
+            PathMode::ExactPath => "on the exact path (G61, or none named)".into(),
+            PathMode::Blend(0.0) => "blending (G64)".into(),
+            PathMode::Blend(t) => format!("blending within {t} mm (G64 P)"),
+        };
+        let locked = [
+            (!self.feed, "without feed override"),
+            (self.speed != 0xff, "without speed override"),
+            (self.adaptive, "with adaptive feed"),
+            (!self.hold, "without feed hold"),
+        ];
+        for (_, word) in locked.into_iter().filter(|(on, _)| *on) {
+            text.push_str(&format!(", {word}"));
+        }
+        text
+    }
 }
 
 impl Conditions {
@@ -184,7 +239,7 @@ impl Conditions {
         };
         let coolant = (state.flood, state.mist);
         let (tool, mode, spindles) = (state.tool, state.feed_mode, state.spindles);
-        Conditions { class, tool, mode, feed, angular, spindles, coolant, work: state.work }
+        Conditions { class, tool, mode, feed, angular, spindles, coolant, work: state.work, control: Control::of(state) }
     }
 }
 
@@ -200,7 +255,7 @@ enum Event {
     Stop(Stop),
     Digital(i32, bool, bool),
     Analog(i32, f64, bool),
-    Input(i32, bool, i32),
+    Input(i32, bool, i32, f64),
     UserM(i32, f64, f64),
     Orient(i32, f64),
 }
@@ -214,7 +269,7 @@ impl Event {
             Op::Stop(stop) => Event::Stop(stop),
             Op::DigitalOut { index, on, synced } => Event::Digital(index, on, synced),
             Op::AnalogOut { index, value, synced } => Event::Analog(index, value, synced),
-            Op::InputWait { index, digital, wait, .. } => Event::Input(index, digital, wait),
+            Op::InputWait { index, digital, wait, timeout } => Event::Input(index, digital, wait, timeout),
             Op::UserM { code, p, q } => Event::UserM(code, p, q),
             Op::SpindleOrient { spindle, angle, .. } => Event::Orient(spindle, angle),
             _ => return None,
@@ -237,17 +292,24 @@ impl Event {
             Event::Dwell(s) => format!("waits {s} s"),
             Event::ToolChange(tool) => format!("changes to tool {tool}"),
             Event::Stop(stop) => format!("stops ({})", format!("{stop:?}").to_lowercase()),
-            Event::Digital(index, on, _) => {
-                format!("switches output {index} {}", if *on { "on" } else { "off" })
+            Event::Digital(index, on, synced) => {
+                format!("switches output {index} {} {}", if *on { "on" } else { "off" }, when(*synced))
             }
-            Event::Analog(index, value, _) => format!("sets analog output {index} to {value}"),
-            Event::Input(index, ..) => format!("waits for input {index}"),
-            Event::UserM(code, ..) => format!("runs M{code}"),
+            Event::Analog(index, value, synced) => format!("sets analog output {index} to {value} {}", when(*synced)),
+            Event::Input(index, digital, wait, timeout) => {
+                let kind = if *digital { "digital" } else { "analog" };
+                format!("waits for {kind} input {index} (M66 L{wait} Q{timeout})")
+            }
+            Event::UserM(code, p, q) => format!("runs M{code} P{p} Q{q}"),
             Event::Orient(spindle, angle) => {
                 format!("turns spindle {spindle} to {:.4}°", angle.to_degrees())
             }
         }
     }
+}
+
+fn when(synced: bool) -> &'static str {
+    if synced { "with the next move" } else { "at once" }
 }
 
 /// What matters of an operation. One at a time is held, so its size does not matter.
@@ -314,7 +376,7 @@ fn by_operation(a: &Program, b: &Program, tolerance: &Tolerance) -> Diff {
             return out;
         }
         if !same_item(&mut out, &x, &y, sa, sb, &mut told, tolerance) {
-            out.note(usize::MAX, Aspect::Path, sa, sb, String::new());
+            out.note(usize::MAX, Aspect::Path, sa, sb, other_curve(&x, &y, tolerance).unwrap_or_default());
             return out;
         }
     }
@@ -355,6 +417,16 @@ fn same_item(
     }
 }
 
+/// What to say of two curves of one kind that end at one place.
+fn other_curve(x: &Item, y: &Item, tolerance: &Tolerance) -> Option<String> {
+    let (Item::Move { conditions: c, end, middle: Some(p) }, Item::Move { conditions: d, end: e, middle: Some(q) }) = (x, y) else {
+        return None;
+    };
+    let same_end = distance(end, e) <= tolerance.length && turned(end, e) <= tolerance.angle && c.class == d.class;
+    let far = libm::hypot(libm::hypot(p[0] - q[0], p[1] - q[1]), p[2] - q[2]);
+    same_end.then(|| format!("goes to {}, the other too on another curve, {far:.3} mm away after a third", walk::point(end)))
+}
+
 fn distance(a: &Axes, b: &Axes) -> f64 {
     let sum: f64 = [0, 1, 2, 6, 7, 8].into_iter().map(|i: usize| (a[i] - b[i]) * (a[i] - b[i])).sum();
     libm::sqrt(sum)
@@ -372,6 +444,7 @@ struct Told {
     spindles: Option<([Spindle; 8], [Spindle; 8])>,
     coolant: Option<((bool, bool), (bool, bool))>,
     works: Option<(u8, u8)>,
+    control: Option<(Control, Control)>,
     /// A difference of rapids, which is told where nothing but rapids follows.
     rapid: Option<(Conditions, Conditions, Spot, Spot)>,
     cut: bool,
@@ -396,6 +469,9 @@ impl Told {
         }
         if cuts && c.class != Class::Tap && (c.class != Class::Sync && (c.mode != d.mode || c.angular != d.angular) || !close(c.feed, d.feed, tolerance.rate)) {
             note(Aspect::Feed, format!("feeds {}, the other {}", feed_text(c), feed_text(d)));
+        }
+        if c.class == Class::Feed && changed(&mut self.control, (c.control, d.control), !c.control.same(&d.control, tolerance)) {
+            note(Aspect::Control, format!("feeds {}, the other {}", c.control.text(), d.control.text()));
         }
         if cuts {
             self.compare_drive(out, (c, d), at, tolerance);

@@ -204,7 +204,7 @@ impl Lowering {
             Call::SelectTool(n) => Op::ToolPrepare(n),
             Call::StartChange => Op::ToolChangeStart,
             Call::ChangeTool(pocket) => Op::ToolChange(pocket),
-            Call::ChangeToolNumber(n) => Op::ToolNumber(n),
+            Call::ChangeToolNumber(_, tool) => Op::ToolNumber(tool),
             Call::ReloadTooldata => Op::ToolReload,
             Call::MistOn => Op::Mist(true),
             Call::MistOff => Op::Mist(false),

@@ -30,13 +30,23 @@ impl Sources for NoSources {
 /// Whole texts by file number.
 pub struct Texts<'a> {
     files: Vec<(FileId, &'a str, gr_text::LineIndex)>,
+    words: bool,
+    increments: bool,
 }
 
 impl<'a> Texts<'a> {
     /// Indexes the lines of some files.
     pub fn new(files: impl IntoIterator<Item = (FileId, &'a str)>) -> Texts<'a> {
         let files = files.into_iter().map(|(id, t)| (id, t, gr_text::LineIndex::new(t.as_bytes())));
-        Texts { files: files.collect() }
+        Texts { files: files.collect(), words: true, increments: false }
+    }
+    /// Of instances of a STEP-NC file: their lines have places and no words.
+    pub fn instances(self) -> Texts<'a> {
+        Texts { words: false, ..self }
+    }
+    /// Of a lathe whose U V W H are increments, if so.
+    pub fn with_increments(self, increments: bool) -> Texts<'a> {
+        Texts { increments, ..self }
     }
     fn span(&self, file: FileId, line: u32) -> Option<(&'a str, Span)> {
         let (_, text, index) = self.files.iter().find(|f| f.0 == file)?;
@@ -55,7 +65,10 @@ impl Sources for Texts<'_> {
         (source.file, self.span(source.file, source.line).map(|s| s.1).unwrap_or_default())
     }
     fn line(&self, file: FileId, line: u32) -> Option<&str> {
-        self.span(file, line).map(|s| s.0)
+        self.span(file, line).filter(|_| self.words).map(|s| s.0)
+    }
+    fn increments(&self) -> bool {
+        self.increments
     }
 }
 

@@ -18,8 +18,21 @@ pub struct Clamping {
     pub from_line: Option<(u32, Span)>,
     /// Workingsteps that are made in it, and where they stand.
     pub workingsteps: Vec<(String, Span)>,
-    /// The part on the table.
-    pub part: Frame,
+    /// The part on the table, as far as the setup says it.
+    part: Frame,
+    /// Whether the setup says position and rotation.
+    says: [bool; 2],
+}
+
+impl Clamping {
+    /// The part on the table. What the setup leaves out is as the machine file has it.
+    pub fn part(&self, file: &Frame) -> Frame {
+        let [position, rotation] = self.says;
+        Frame {
+            position: if position { self.part.position } else { file.position },
+            turn: if rotation { self.part.turn } else { file.turn },
+        }
+    }
 }
 
 /// Reads a job file. Every fault found is in the list.
@@ -59,6 +72,7 @@ fn clamping(t: &Node) -> Clamping {
         from_line: line,
         workingsteps: steps.iter().filter_map(|n| Some((n.text()?.to_string(), span(n.span.clone())))).collect(),
         part: crate::schema::place(t),
+        says: ["position", "rotation"].map(|key| t.get(key).is_some()),
     }
 }
 
@@ -110,6 +124,9 @@ mod tests {
         let job = parse_job(FileId(0), text).unwrap_or_else(|e| panic!("{e:?}"));
         assert_eq!(job.iter().map(|s| s.from_line.map(|(l, _)| l)).collect::<Vec<_>>(), [Some(1), Some(20), None]);
         assert_eq!(job[1].part.position, [0.0, 50.0, 0.0]);
+        // A setup without a place leaves the part where the machine file has it.
+        let file = Frame { position: [1.0, 2.0, 3.0], ..Frame::default() };
+        assert_eq!((job[0].part(&file), job[1].part(&file).position), (file, [0.0, 50.0, 0.0]));
         assert_eq!(job[2].workingsteps.len(), 2);
     }
 

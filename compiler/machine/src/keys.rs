@@ -321,7 +321,7 @@ static AS_BUILT: &[Key] = &[
 
 static DEVIATION: &[Key] = &[
     must("name", Text, "Name of the parameter: `gcc-robot machine show` lists them."),
-    must("deviation", ANY, "Actual less nominal, mm or degrees."),
+    must("deviation", ANY, "Actual less nominal, mm or degrees; what each parameter measures and its sign: docs/accuracy.md."),
 ];
 
 static REFERENCE: &[Key] = &[
@@ -351,8 +351,8 @@ static SETUP: &[Key] = &[
     must("name", Text, "Shown to the operator when the part is to be clamped so."),
     key("from_line", Whole(1, MOST_COUNTED), "Line of the program, from 1, at which the setup begins: a rapid to a height above the work."),
     key("workingsteps", Texts, "Workingsteps of a STEP-NC program that are made in this setup."),
-    key("position", Numbers(3), "Zero point of the part on the table: X Y Z, mm."),
-    key("rotation", Numbers(3), "Turns of the part about the table's fixed X, Y, Z, degrees."),
+    key("position", Numbers(3), "Zero point of the part on the table: X Y Z, mm. Left out: as [frames.part] of the machine file has it."),
+    key("rotation", Numbers(3), "Turns of the part about the table's fixed X, Y, Z, degrees. Left out: as [frames.part] of the machine file has it."),
 ];
 
 /// Words that may stand in `[io]`: `S`, `M3`, `M62P3` for one output alone, and `G38` for the probe.

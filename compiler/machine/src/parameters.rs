@@ -211,7 +211,8 @@ impl Kinematics for Shifted {
     }
 }
 
-/// Linear axes that don't stand square: Y leans towards X by the first angle, Z towards X and Y by the others.
+/// Linear axes that don't stand square. Each number is the angle between the two axes' positive ends less 90°, as a square and an
+/// indicator show it: above zero Y leans away from X by the first, Z away from X and Y by the others.
 struct Skewed {
     inner: Box<dyn Kinematics>,
     skew: [f64; 3],
@@ -220,12 +221,12 @@ struct Skewed {
 impl Skewed {
     fn skewed(&self, [x, y, z]: V3) -> V3 {
         let [xy, xz, yz] = self.skew;
-        [x + xy * y + xz * z, y + yz * z, z]
+        [x - xy * y - xz * z, y - yz * z, z]
     }
     fn straightened(&self, [x, y, z]: V3) -> V3 {
         let [xy, xz, yz] = self.skew;
-        let y = y - yz * z;
-        [x - xy * y - xz * z, y, z]
+        let y = y + yz * z;
+        [x + xy * y + xz * z, y, z]
     }
 }
 
@@ -357,4 +358,92 @@ fn by_inverse(
         out.push(moved);
     }
     Ok(out)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::{dot, sub};
+
+    /// The machine with one number off, mm or degrees.
+    fn off(id: &str, name: &str, by: f64) -> (Machine, Box<dyn Kinematics>) {
+        let m = crate::builtin(id).unwrap();
+        let all = m.parameters();
+        let i = all.iter().position(|p| p.name == name).unwrap();
+        let mut deviations = vec![0.0; all.len()];
+        deviations[i] = if all[i].kind == Angle { by.to_radians() } else { by };
+        let k = m.deviated(&deviations);
+        (m, k)
+    }
+
+    fn at(k: &dyn Kinematics, joints: &[f64]) -> V3 {
+        k.forward_frame(joints).unwrap().position
+    }
+
+    /// +0.02 of `square-xy` is an angle of 90.02° from +X to +Y, as a square shows it; so are the other two, and each is alone.
+    #[test]
+    fn squareness_is_the_angle_between_the_axes() {
+        for (name, pair) in [("square-xy", (0, 1)), ("square-xz", (0, 2)), ("square-yz", (1, 2))] {
+            let (_, k) = off("generic/mill3", name, 0.02);
+            let way = |i: usize| {
+                let mut q = [0.0; 3];
+                q[i] = 100.0;
+                let v = sub(at(&*k, &q), at(&*k, &[0.0; 3]));
+                scale(v, 1.0 / norm(v))
+            };
+            for (a, b) in [(0, 1), (0, 2), (1, 2)] {
+                let angle = libm::acos(dot(way(a), way(b))).to_degrees();
+                let wanted = if (a, b) == pair { 90.02 } else { 90.0 };
+                assert!((angle - wanted).abs() < 1e-6, "{name}: {a} {b} {angle}");
+            }
+        }
+        // A slide whose zero is off by +0.01 stands 0.01 further than its scale shows.
+        let (_, k) = off("generic/mill3", "X.zero", 0.01);
+        assert!((at(&*k, &[5.0, 0.0, 0.0])[0] - 5.01).abs() < 1e-12);
+    }
+
+    /// Where the positive end of a rotary axis leans to, and what its point is.
+    #[test]
+    fn rotary_axes_lean_and_lie() {
+        let lean = 0.01f64.to_radians();
+        let axes = [
+            ([1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]),
+            ([0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]),
+            ([0.0, 0.0, 1.0], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0]),
+        ];
+        for (axis, a, b) in axes {
+            assert!(norm(sub(tilted(axis, lean, 0.0), add(axis, scale(a, lean)))) < 1e-7, "{axis:?}");
+            assert!(norm(sub(tilted(axis, 0.0, lean), add(axis, scale(b, lean)))) < 1e-7, "{axis:?}");
+        }
+        // The axis of the table is 0.1 mm further along +Y than its file says: turned by half a turn about it, the part has moved by
+        // twice that, and the tool at the same joints is so much the other way in the part.
+        let (m, k) = off("generic/mill5-ac-table", "rotary2.y", 0.1);
+        let q = [10.0, 20.0, -30.0, 0.0, std::f64::consts::PI];
+        let moved = sub(at(&*k, &q), at(&*m.kinematics(), &q));
+        assert!(norm(sub(moved, [0.0, 0.2, 0.0])) < 1e-9 || norm(sub(moved, [0.0, -0.2, 0.0])) < 1e-9, "{moved:?}");
+        // A head that is longer by 0.05 has its nose so much lower.
+        let (m, k) = off("generic/mill5-cb-head", "pivot", 0.05);
+        let moved = sub(at(&*k, &[0.0; 5]), at(&*m.kinematics(), &[0.0; 5]));
+        assert!((norm(moved) - 0.05).abs() < 1e-9 || norm(moved) < 1e-12, "{moved:?}");
+    }
+
+    /// Joints of a chain: x, y, z shift the frame of the joint in the one before, a, b, c turn it about its own X, Y and Z; a zero adds
+    /// to what the joint shows.
+    #[test]
+    fn numbers_of_a_chain() {
+        let text = "format = 1\nid = \"test/chain\"\ntitle = \"x\"\nkind = \"robot\"\nsource = \"x\"\n[kinematics]\nkind = \"origins\"\ntip = [100, 0, 0, 0, 0, 0]\n\
+            [[joint]]\nname = \"J1\"\ntype = \"revolute\"\naxis = [0, 0, 1]\norigin = [0, 0, 50, 0, 0, 0]\n";
+        let m = crate::parse(gr_text::FileId(0), text).unwrap();
+        let moved = |name: &str, by: f64| {
+            let all = m.parameters();
+            let i = all.iter().position(|p| p.name == name).unwrap();
+            let mut deviations = vec![0.0; all.len()];
+            deviations[i] = by;
+            sub(at(&*m.deviated(&deviations), &[0.0]), at(&*m.kinematics(), &[0.0]))
+        };
+        assert!(norm(sub(moved("J1.y", 0.1), [0.0, 0.1, 0.0])) < 1e-12);
+        assert!(norm(sub(moved("J1.b", 1e-4), [0.0, 0.0, -0.01])) < 1e-6);
+        assert!(norm(sub(moved("J1.c", 1e-4), [0.0, 0.01, 0.0])) < 1e-6);
+        assert!(norm(sub(moved("J1.zero", 1e-4), [0.0, 0.01, 0.0])) < 1e-6);
+    }
 }

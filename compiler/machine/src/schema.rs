@@ -133,6 +133,13 @@ impl Check {
             let message = format!("`{}` is missing in a machine file: {}", key.name, key.doc);
             self.fault(code::MACHINE_BAD_FILE, &extends.span, &[message]);
         }
+        // Own numbers with the source of another's would be a false witness.
+        for key in ["accuracy", "stiffness", "as_built"] {
+            if let Some(table) = root.get(key).filter(|t| t.get("source").is_none()) {
+                let message = format!("`source` is missing in `[{key}]`: the numbers are this file's, not those of the machine that it extends");
+                self.fault(code::MACHINE_BAD_FILE, &table.span, &[message]);
+            }
+        }
     }
 
     /// Lays the file over the built-in machine it extends. Built-in files extend at most one other.
@@ -181,7 +188,19 @@ impl Check {
         machine
     }
 
+    /// The machine that rotary words are meant for is a mill of the library that turns.
+    fn source_machine(&mut self, raw: &Node) {
+        let Some(node) = raw.get("orientation") else { return };
+        let Some(id) = node.text().and_then(|o| o.strip_prefix("source-machine:")) else { return };
+        match crate::builtin(id).map(|m| matches!(m.chain, Chain::FiveAxis(_))) {
+            Some(true) => {}
+            Some(false) => self.value(&node.span, format!("`{id}` is no mill with two rotary axes, which A B C could be meant for")),
+            None => self.value(&node.span, format!("the library has no machine `{id}`; `gcc-robot machine list` shows the ids")),
+        }
+    }
+
     fn built(&mut self, raw: &Node, joints: Vec<Joint>, chain: Chain) -> Machine {
+        self.source_machine(raw);
         let orientation = raw.get("orientation").and_then(Node::text).map(|o| match o {
             "fixed" => Orientation::Fixed,
             "abc-euler-xyz" => Orientation::AbcEulerXyz,
@@ -325,10 +344,27 @@ impl Check {
         self.kinematics(row.name, table, list, joints).unwrap_or(none)
     }
 
+    /// A `cartesian` machine is told its axes by their order: a slide that says it is another one is refused.
+    fn slides_in_order(&mut self, list: &[Node], joints: &[Joint]) {
+        const ORDER: [char; 3] = ['X', 'Y', 'Z'];
+        for (i, (node, joint)) in list.iter().zip(joints).enumerate() {
+            let mut name = joint.name.chars();
+            let letter = joint.word.or(name.next().filter(|_| name.next().is_none())).map(|c| c.to_ascii_uppercase());
+            let Some(wanted) = letter.and_then(|l| ORDER.iter().position(|o| *o == l)).filter(|at| *at != i) else { continue };
+            let span = node.get("word").or(node.get("name")).map_or(node.span.clone(), |n| n.span.clone());
+            let is = ORDER.get(i).map_or("after Z".to_string(), |c| format!("{c}"));
+            let order = "joints of a `cartesian` machine are in the order X Y Z A B C U V W";
+            self.value(&span, format!("joint `{}` is number {}, which is {is}, and {} is number {}: {order}; a lathe has a Y too, with `min` and `max` near 0 where it can't move", joint.name, i + 1, ORDER[wanted], wanted + 1));
+        }
+    }
+
     fn kinematics(&mut self, kind: &str, table: &Node, list: &[Node], joints: &[Joint]) -> Option<Chain> {
         let number = |key: &str| table.value_of(key).unwrap_or(0.0);
         Some(match kind {
-            "cartesian" => Chain::Cartesian,
+            "cartesian" => {
+                self.slides_in_order(list, joints);
+                Chain::Cartesian
+            }
             "planar-3r" => {
                 let l = self.lengths::<3>(table, "links", "three lengths above zero: upper arm, forearm, tool", |l| l[0] > 0.0 && l[1] > 0.0 && l[2] >= 0.0)?;
                 Chain::Planar3r(l)
@@ -783,6 +819,15 @@ mod tests {
         assert!(all("format = 1\nextends = \"abb/irb2400\"\n").contains("`id` is missing"));
         assert!(all("format = 1\nid = \"shop/x\"\nextends = \"abb/irb240\"\n").contains("did you mean `abb/irb2400`?"));
         assert!(all("format = 1\nid = \"shop/x\"\nextends = \"comau/tricept806\"\n").contains("platform_radius"));
+        // Nor does its source speak for numbers that are the file's own.
+        let legs = "format = 1\nid = \"shop/legs\"\nextends = \"usp/2ups-prp\"\n[accuracy]\njoints = [0.1, 0.1, 0.1]\n";
+        assert!(all(legs).contains("`source` is missing in `[accuracy]`"));
+        assert!(parse(FileId(0), &format!("{legs}source = \"own\"\n")).is_ok());
+        // A lathe of two slides would be taken for X and Y.
+        let slide = |n: &str| format!("[[joint]]\nname = \"{n}\"\ntype = \"prismatic\"\n");
+        let lathe = format!("format = 1\nid = \"shop/lathe\"\ntitle = \"x\"\nkind = \"lathe\"\nsource = \"x\"\n[kinematics]\nkind = \"cartesian\"\n{}", slide("X"));
+        assert!(all(&format!("{lathe}{}", slide("Z"))).contains("joint `Z` is number 2, which is Y, and Z is number 3"));
+        assert!(parse(FileId(0), &format!("{lathe}{}{}", slide("Y"), slide("Z"))).is_ok());
         assert!(faults(&format!("{cell}[[joint]]\nname = \"J1\"\nmin = 200\n"))[0].0 == "machine/bad-value");
         let two = crate::source("usp/2ups-prp").unwrap();
         assert_eq!(faults(&two.replace("2UPS+PRP\"\n\n", "3UPS+PRP\"\n\n").replace("structure = \"3UPS+PRP\"", "structure = \"2UPS+PR\""))[0].0, "machine/mobility");
@@ -797,6 +842,7 @@ mod tests {
         let tricept = "[kinematics]\nbase_radius = 300\nplatform_radius = 150\nwrist_offset = 100\nflange_offset = 50\n";
         let member = "[stiffness]\nsource = \"x\"\nmodulus = 210000\n[[stiffness.member]]\njoint = \"J1\"\nname = \"m\"\n";
         let rows = [
+            ("", "orientation = ", &["\"source-machine:generic/mill6\"", "\"source-machine:generic/mill3\""][..]),
             ("[speed]\n", "joint = ", &["-30", "0", "101"][..]),
             ("[speed]\n", "rapid = ", &["-200", "0", "nan"]),
             ("[zone]\n", "default = ", &["-3", "inf"]),

@@ -14,12 +14,12 @@ pub struct Import {
     pub notes: Vec<String>,
 }
 
-/// Makes a machine file of a URDF: the longest chain of moving joints, base to tool. An arm with an ortho-parallel base
+/// Makes a machine file of a URDF: the chain of joints from the base to the link `tip`, or without one to the end of the arm. An arm with an ortho-parallel base
 /// and a spherical wrist gets OPW lengths, every other one its joint frames and the numerical inverse.
-pub fn import_urdf(id: &str, text: &str) -> Result<Import, String> {
+pub fn import_urdf(id: &str, text: &str, tip: Option<&str>) -> Result<Import, String> {
     let robot = urdf_rs::read_from_string(text).map_err(|e| format!("the file is no URDF: {e}"))?;
-    let path = longest(&robot)?;
     let mut notes = Vec::new();
+    let path = to_tool(&robot, tip, &mut notes)?;
     let (links, names, speeds, tip) = chain(&path, &mut notes)?;
     let chain = Serial::new(links, tip);
     if path.iter().any(|j| j.mimic.is_some()) {
@@ -78,30 +78,61 @@ fn tidy(v: f64) -> String {
     if near == 0.0 { "0".into() } else { format!("{near}") }
 }
 
-/// The joints from the root to the leaf with the most moving ones; among equals the leaf called `tool0` or `flange`.
+/// The joints from the root to the tool: to the link that is named, else as [`longest`] has it. Moving joints that are not
+/// among them are told.
+fn to_tool<'r>(robot: &'r urdf_rs::Robot, tip: Option<&str>, notes: &mut Vec<String>) -> Result<Vec<&'r urdf_rs::Joint>, String> {
+    let path = match tip {
+        Some(tip) if !robot.links.iter().any(|l| l.name == tip) => {
+            let links: Vec<&str> = robot.links.iter().map(|l| l.name.as_str()).collect();
+            return Err(format!("it has no link `{tip}`; its links are {}", links.join(", ")));
+        }
+        Some(tip) => path_to(robot, tip)?,
+        None => longest(robot)?,
+    };
+    if !path.iter().any(|j| moves(j)) {
+        return Err("it has no moving joint".into());
+    }
+    let within = |joint: &urdf_rs::Joint| path.iter().any(|j| j.name == joint.name);
+    let left: Vec<&str> = robot.joints.iter().filter(|j| moves(j) && !within(j)).map(|j| j.name.as_str()).collect();
+    if let (Some(last), false) = (path.last(), left.is_empty()) {
+        notes.push(format!("the arm ends at the link `{}`; left out: {}; `--tip LINK` names another end", last.child.link, left.join(", ")));
+    }
+    Ok(path)
+}
+
+/// The joints from the root to a link.
+fn path_to<'r>(robot: &'r urdf_rs::Robot, link: &str) -> Result<Vec<&'r urdf_rs::Joint>, String> {
+    let mut path: Vec<&urdf_rs::Joint> = Vec::new();
+    let mut at = link;
+    while let Some(joint) = robot.joints.iter().find(|j| j.child.link == at) {
+        path.push(joint);
+        at = joint.parent.link.as_str();
+        if path.len() > robot.joints.len() {
+            return Err(format!("the joints around `{at}` go in a circle"));
+        }
+    }
+    path.reverse();
+    Ok(path)
+}
+
+/// The joints from the root to the end of the arm: a link called `tool0` or `flange` behind six moving joints or more, which
+/// fingers of a gripper follow in some files; else the leaf with the most moving ones.
 fn longest(robot: &urdf_rs::Robot) -> Result<Vec<&urdf_rs::Joint>, String> {
+    const ARM: usize = 6;
     let mut best: Vec<&urdf_rs::Joint> = Vec::new();
     let score = |path: &[&urdf_rs::Joint]| {
         let leaf = path.last().map_or("", |j| j.child.link.as_str());
         let named = if leaf.ends_with("tool0") { 2 } else { usize::from(leaf.contains("flange")) };
-        (path.iter().filter(|j| moves(j)).count(), named, path.len())
+        let moving = path.iter().filter(|j| moves(j)).count();
+        (if moving >= ARM { named } else { 0 }, moving, named, path.len())
     };
     for link in &robot.links {
-        let mut path = Vec::new();
-        let mut at = link.name.as_str();
-        while let Some(joint) = robot.joints.iter().find(|j| j.child.link == at) {
-            path.push(joint);
-            at = joint.parent.link.as_str();
-            if path.len() > robot.joints.len() {
-                return Err(format!("the joints around `{at}` go in a circle"));
-            }
-        }
-        path.reverse();
+        let path = path_to(robot, &link.name)?;
         if score(&path) > score(&best) {
             best = path;
         }
     }
-    if best.iter().any(|j| moves(j)) { Ok(best) } else { Err("it has no moving joint".into()) }
+    Ok(best)
 }
 
 fn moves(joint: &urdf_rs::Joint) -> bool {

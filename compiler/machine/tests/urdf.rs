@@ -83,7 +83,7 @@ fn imported_arms_equal_their_urdf() {
             "fanuc" | "yaskawa" => [3.1415926, -1.570796, 0.0],
             _ => [0.0; 3],
         };
-        let import = import_urdf("test/arm", &urdf(&chain, turn)).unwrap();
+        let import = import_urdf("test/arm", &urdf(&chain, turn), None).unwrap();
         let machine = parse(FileId(0), &import.toml).unwrap_or_else(|e| panic!("{e:?}\n{}", import.toml));
         assert!(matches!(machine.chain, Chain::Opw(_)), "{id}: {:?}\n{}", import.notes, import.toml);
         for q in poses() {
@@ -100,7 +100,7 @@ fn arms_without_closed_form_keep_their_frames() {
     links[4].origin.position[1] = 80.0;
     links[5].origin.position[2] = 40.0;
     let odd = Serial::new(links, *chain.tip());
-    let import = import_urdf("test/odd", &urdf(&odd, [0.0; 3])).unwrap();
+    let import = import_urdf("test/odd", &urdf(&odd, [0.0; 3]), None).unwrap();
     assert!(import.notes.iter().any(|n| n.contains("no closed form")), "{:?}", import.notes);
     let machine = parse(FileId(0), &import.toml).unwrap_or_else(|e| panic!("{e:?}\n{}", import.toml));
     let q = [0.3, -0.2, 0.4, 0.5, -0.6, 0.7];
@@ -111,7 +111,7 @@ fn arms_without_closed_form_keep_their_frames() {
 #[test]
 fn bad_files_are_said_to_be_so() {
     for text in ["", "<robot", "<robot name=\"x\"><link name=\"a\"/></robot>", "{}", "<a/>"] {
-        assert!(import_urdf("test/x", text).is_err(), "{text}");
+        assert!(import_urdf("test/x", text, None).is_err(), "{text}");
     }
 }
 
@@ -123,9 +123,33 @@ fn limits_of_joints() {
     let at = good.find("<limit").unwrap();
     let with = |limit: &str| format!("{}{limit}{}", &good[..at], &good[at + good[at..].find("/>").unwrap() + 2..]);
     for limit in ["lower=\"1\" upper=\"-1\" velocity=\"1\"", "lower=\"nan\" upper=\"1\" velocity=\"1\"", "lower=\"-inf\" upper=\"1\" velocity=\"1\"", "lower=\"-1\" upper=\"1\" velocity=\"-1\""] {
-        let why = import_urdf("test/x", &with(&format!("<limit {limit} effort=\"1\"/>"))).expect_err(limit);
+        let why = import_urdf("test/x", &with(&format!("<limit {limit} effort=\"1\"/>")), None).expect_err(limit);
         assert!(why.contains("correct its <limit>"), "{why}");
     }
-    let none = import_urdf("test/x", &with("<limit velocity=\"1\" effort=\"1\"/>")).unwrap();
+    let none = import_urdf("test/x", &with("<limit velocity=\"1\" effort=\"1\"/>"), None).unwrap();
     assert!(none.notes.iter().any(|n| n.contains("has no limits")), "{:?}", none.notes);
+}
+
+/// Fingers of a gripper are no joints of the arm.
+#[test]
+fn an_arm_ends_where_its_gripper_begins() {
+    let (_, chain, _) = rows().remove(0);
+    let finger = |n: u8| {
+        format!("<link name=\"f{n}\"/><joint name=\"g{n}\" type=\"prismatic\"><parent link=\"hand\"/><child link=\"f{n}\"/><axis xyz=\"0 1 0\"/><limit lower=\"0\" upper=\"0.04\" velocity=\"1\" effort=\"1\"/></joint>\n")
+    };
+    let arm = urdf(&chain, [0.0; 3]);
+    let hand = format!("<link name=\"hand\"/><joint name=\"mount\" type=\"fixed\"><parent link=\"tool0\"/><child link=\"hand\"/></joint>\n{}{}</robot>", finger(1), finger(2));
+    let text = arm.replace("</robot>", &hand);
+    let plain = import_urdf("test/arm", &arm, None).unwrap();
+    let told = |notes: &[String], end: &str| notes.iter().any(|n| n.contains(&format!("ends at the link `{end}`; left out: ")) && n.contains("g2"));
+    for tip in [None, Some("tool0")] {
+        let import = import_urdf("test/arm", &text, tip).unwrap();
+        assert_eq!((import.chain.links().len(), &import.toml), (6, &plain.toml));
+        assert!(told(&import.notes, "tool0"), "{:?}", import.notes);
+    }
+    let hand = import_urdf("test/arm", &text, Some("hand")).unwrap();
+    assert!(hand.chain.links().len() == 6 && told(&hand.notes, "hand"), "{:?}", hand.notes);
+    assert_eq!(import_urdf("test/arm", &text, Some("f1")).unwrap().chain.links().len(), 7);
+    assert!(import_urdf("test/arm", &text, Some("elbow")).unwrap_err().contains("no link `elbow`; its links are "));
+    assert!(plain.notes.iter().all(|n| !n.contains("left out")), "{:?}", plain.notes);
 }

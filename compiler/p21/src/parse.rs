@@ -304,7 +304,7 @@ impl<'t, const KEEP: bool> Parser<'t, KEEP> {
                 }
                 _ => {
                     self.unexpected("an instance (#n=…;) or a section keyword");
-                    true
+                    !self.skip_to_instance()
                 }
             };
             if lost {
@@ -312,6 +312,19 @@ impl<'t, const KEEP: bool> Parser<'t, KEEP> {
                 self.cut |= self.at >= self.text.len();
             }
         }
+    }
+
+    /// What can't stand before an instance: the instance itself is whole.
+    #[cold]
+    #[inline(never)]
+    fn skip_to_instance(&mut self) -> bool {
+        let here = &self.text[self.at..];
+        let Some(n) = memchr::memchr3(b'#', b';', b'\n', here) else { return false };
+        let found = here[n] == b'#' && self.instances && self.starts_statement(self.at + n, false);
+        if found {
+            self.at += n;
+        }
+        found
     }
 
     /// Resumes at the next statement after a fault.

@@ -11,12 +11,25 @@ use gr_planner::{Options, plan};
 use gr_text::FileId;
 use judge::cases::{APPROACHES, STRATEGIES};
 use judge::cells::features;
+use judge::special;
 
 /// One picture per feature.
 fn pictures(folder: &Path) -> Result<(), Box<dyn std::error::Error>> {
-    for (name, _, make) in features() {
+    let cells = features().into_iter().map(|(name, _, make)| {
         let strategy = if name.contains("face") { STRATEGIES[2] } else { "$" };
-        let Some(planned) = plan(make(strategy, "$").part.text().as_bytes(), FileId(0), &Options::default()).0 else { continue };
+        (name, make(strategy, "$").part)
+    });
+    let open = "OPEN_SLOT_END_TYPE()";
+    let others = [
+        ("holes", special::holes()),
+        ("back boring", special::back("10.", true)),
+        ("thread, milled", special::thread(true, "right hand", "CLIMB", 2.0)),
+        ("T-slot", special::tee([open, open], 16.0, 4.0)),
+    ];
+    for (name, part) in cells.chain(others) {
+        let (Some(planned), _) = plan(part.text().as_bytes(), FileId(0), &Options::default()) else {
+            return Err(format!("no path for {name}").into());
+        };
         let file: String = name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).collect();
         let options = plot::Options { width: 700, height: 450, title: name.into(), ..plot::Options::default() };
         std::fs::write(folder.join(file + ".png"), plot::png(&planned.program, None, &options)?)?;

@@ -199,6 +199,12 @@ fn checks(e: &mut Emit<'_>, step: &Workingstep, d: &Drilling, feature: &Feature,
         if whole && tool.diameter > diameter + 0.05 {
             e.say(code::PLAN_TOOL_WIDER_THAN_FEATURE, step.operation.origin, &[&name, &tool.diameter.to_string(), &feature.keyword, &diameter.to_string()]);
         }
+        let slack = 2.0 * feature.tolerance.unwrap_or(0.0).max(0.05);
+        if step.operation.keyword == "TAPPING" && tool.kind == "TAP" && tool.diameter + slack < diameter {
+            let what = format!("#{} {}", step.operation.origin.id, step.operation.keyword);
+            let why = format!("its tap of {} mm is narrower than the hole of {diameter} mm", tool.diameter);
+            e.say(code::PLAN_AIR, step.operation.origin, &[&what, &why]);
+        }
     }
 }
 

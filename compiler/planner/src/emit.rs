@@ -154,6 +154,10 @@ impl<'a> Emit<'a> {
     fn may_be_blocked(&self, a: [f64; 3], b: [f64; 3]) -> Option<f64> {
         self.stock.as_ref()?.may_block(self.upright()?, a, b)
     }
+    /// The same straight down.
+    fn blocked_down(&self, a: [f64; 3], b: [f64; 3]) -> Option<f64> {
+        self.stock.as_ref()?.blocks_way_down(self.upright()?, a, b)
+    }
     /// Rapid as it is written, whatever is in its way.
     pub fn rapid_as_written(&mut self, to: [f64; 3]) {
         if !self.same(to) {
@@ -171,8 +175,7 @@ impl<'a> Emit<'a> {
     pub fn rapid_until_material(&mut self, to: [f64; 3]) {
         let Some(from) = self.at else { return self.rapid_as_written(to) };
         let sideways = (to[0] - from[0]).abs() + (to[1] - from[1]).abs() > TINY;
-        // Sideways a lift more costs little, material between the cells' middles much.
-        let met = if sideways { self.may_be_blocked(from, to) } else { self.blocked(from, to) };
+        let met = if sideways { self.may_be_blocked(from, to) } else { self.blocked_down(from, to) };
         let Some(highest) = met else { return self.rapid_as_written(to) };
         if sideways {
             let over = (highest + CLEARANCE).max(from[2]);
@@ -193,16 +196,26 @@ impl<'a> Emit<'a> {
             stock.cut(tool, a, b);
         }
     }
+    /// A feed has ended here.
+    fn fed_to(&mut self, p: [f64; 3]) {
+        if let (Some(tool), Some(stock)) = (self.upright(), &mut self.stock) {
+            stock.reached(tool, p);
+        }
+    }
     /// The tool has been down at a point and is where it was.
     pub fn drilled(&mut self, bottom: [f64; 3]) {
         self.take_off(self.at.unwrap_or(bottom), bottom);
+        self.fed_to(bottom);
     }
     pub fn line(&mut self, to: [f64; 3]) {
         if !self.same(to) {
             let pose = self.pose(to);
             self.b.push_to(Op::Linear, &pose, self.source);
             self.take_off(self.at.unwrap_or(to), to);
-            self.at.into_iter().chain([to]).for_each(|p| self.reached(p));
+            self.at.into_iter().chain([to]).for_each(|p| {
+                self.reached(p);
+                self.fed_to(p);
+            });
             self.at = Some(to);
         }
     }
@@ -226,6 +239,8 @@ impl<'a> Emit<'a> {
         self.b.push_to(Op::Arc(arc), &pose, self.source);
         if let Some(from) = self.at.filter(|_| self.upright().is_some() && level.abs() > 1.0 - 1e-12) {
             self.take_off_arc(from, middle, to, if level > 0.0 { sweep } else { -sweep });
+            self.fed_to(from);
+            self.fed_to(to);
         }
         self.at = Some(to);
     }

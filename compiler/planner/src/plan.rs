@@ -408,7 +408,8 @@ impl Planner<'_> {
             Some(t) => self.e.tool(t, security),
             None => self.e.say(code::PLAN_MISSING_VALUE, p.origin, &["WORKPIECE_PROBING", "its_probe", "the program would probe with whatever is in the spindle"]),
         }
-        self.e.say(code::PLAN_TAKES_TURNS, p.origin, &["WORKPIECE_PROBING", "it gives no feed: the probe goes at 60 mm/min"]);
+        let measured = format!("it gives no feed: the probe goes at 60 mm/min; what it measures ('{}') changes no motion of this plan", p.variable);
+        self.e.say(code::PLAN_TAKES_TURNS, p.origin, &["WORKPIECE_PROBING", &measured]);
         self.e.stop_spindle();
         self.e.travel(p.start, axis, security);
         let far = p.distance.abs() * 2.0;
@@ -417,8 +418,7 @@ impl Planner<'_> {
         self.e.feed(1.0);
         let source = self.e.source;
         self.e.b.push_to(Op::Probe(0), &pose, source);
-        let what = format!("probed position of {}", p.variable);
-        self.e.push(Op::RunTime(&what));
+        // What follows names its places; a condition on what was measured is refused when the plan is read.
         self.e.at = Some(to);
         self.e.rapid(p.start);
         self.e.lift(security);

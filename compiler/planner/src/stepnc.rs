@@ -77,6 +77,7 @@ pub fn write_at(
     w.finish_step();
     w.load();
     w.needs_a_feed();
+    w.tell_helices();
     if w.out.iter().any(|d| d.severity == gr_text::Severity::Error) {
         return Err(w.out);
     }
@@ -154,6 +155,8 @@ struct Writer<'a> {
     spindle: Option<i32>,
     /// Where a technology was first needed.
     begun: Option<Source>,
+    /// The first helix, how many there are, and their chords.
+    helices: Option<(Source, usize, usize)>,
 }
 
 impl<'a> Writer<'a> {
@@ -195,6 +198,7 @@ impl<'a> Writer<'a> {
             loaded: None,
             spindle: None,
             begun: None,
+            helices: None,
         };
         // Instance 1 is the project; it is written last.
         w.data.push(String::new());
@@ -237,8 +241,9 @@ impl<'a> Writer<'a> {
                 let shape = ArcShape::new(&arc, v.start, v.end);
                 if shape.rise.abs() > 1e-9 {
                     // ISO 14649 has no helix: short chords, no further from it than the tolerance.
-                    let tolerance = if self.options.tolerance > 0.0 { self.options.tolerance } else { 1e-6 };
-                    let chords = shape.pieces(tolerance);
+                    let chords = shape.pieces(self.tolerance());
+                    let all = self.helices.get_or_insert((v.source, 0, 0));
+                    (all.1, all.2) = (all.1 + 1, all.2 + chords);
                     return self.feed(v, words, |_, end| chorded(&shape, chords, end));
                 }
                 self.feed(v, words, |_, end| circle(&shape, arc.turns, end));
@@ -457,6 +462,18 @@ impl<'a> Writer<'a> {
                 }
             }
         }
+    }
+
+    fn tolerance(&self) -> f64 {
+        if self.options.tolerance > 0.0 { self.options.tolerance } else { 1e-6 }
+    }
+
+    fn tell_helices(&mut self) {
+        let Some((first, count, chords)) = self.helices else { return };
+        let (file, span) = (self.place)(first);
+        let all = if count == 1 { "this one is".to_string() } else { format!("this one and {} more are", count - 1) };
+        let args = [all, chords.to_string(), self.tolerance().to_string()];
+        self.out.push(Diagnostic::new(code::STEPNC_HELIX_IN_CHORDS, file, span, &args));
     }
 
     /// Every technology of ISO 14649 for milling has a feed.

@@ -1,6 +1,8 @@
 //! What is left of the raw block while it is cut: heights over a grid, for the planner's own rapids. Feed moves lower
 //! it, rapids ask it. It decides how a place is reached, never what is cut; tools that stand upright only.
 
+use std::collections::BTreeMap;
+
 use crate::process::Tool;
 
 /// Most cells. Larger parts have coarser ones, and none where a cell would be wider than the smallest tool.
@@ -45,10 +47,27 @@ impl Cutter {
         if self.rise > 0.0 {
             d * self.rise
         } else if into > 0.0 && self.edge > 0.0 {
-            self.edge - libm::sqrt((self.edge * self.edge - into * into).max(0.0))
+            self.edge - f64::sqrt((self.edge * self.edge - into * into).max(0.0))
         } else {
             0.0
         }
+    }
+}
+
+/// A disc that goes straight.
+struct Sweep {
+    ends: [[f64; 3]; 2],
+    reach: f64,
+    /// From its way to its left border.
+    across: [f64; 2],
+}
+
+impl Sweep {
+    fn new(a: [f64; 3], b: [f64; 3], reach: f64) -> Sweep {
+        let along = [b[0] - a[0], b[1] - a[1]];
+        let length = f64::sqrt(along[0] * along[0] + along[1] * along[1]);
+        let across = if length > 0.0 { [-along[1] / length * reach, along[0] / length * reach] } else { [0.0; 2] };
+        Sweep { ends: [a, b], reach, across }
     }
 }
 
@@ -59,6 +78,8 @@ pub(crate) struct Stock {
     n: [usize; 2],
     /// Height of the material over each cell, row by row along x.
     z: Vec<f32>,
+    /// Places where a feed has ended, in millionths of a millimetre: with which tool, and how deep.
+    been: BTreeMap<[i64; 2], (Cutter, f64)>,
 }
 
 impl Stock {
@@ -71,12 +92,12 @@ impl Stock {
             return None;
         }
         let wanted = (smallest / FINENESS).clamp(long / ALONG[1], long / ALONG[0]);
-        let cell = wanted.max(libm::sqrt(size[0] * size[1] / MOST_CELLS));
+        let cell = wanted.max(f64::sqrt(size[0] * size[1] / MOST_CELLS));
         if cell > smallest {
             return None;
         }
         let n = size.map(|s| (s / cell).ceil().max(1.0) as usize);
-        Some(Stock { low: [low[0], low[1]], cell, n, z: vec![high[2] as f32; n[0] * n[1]] })
+        Some(Stock { low: [low[0], low[1]], cell, n, z: vec![high[2] as f32; n[0] * n[1]], been: BTreeMap::new() })
     }
 
     fn middle(&self, axis: usize, cell: usize) -> f64 {
@@ -85,29 +106,32 @@ impl Stock {
 
     /// Cells along an axis whose middles lie between two coordinates.
     fn cells(&self, axis: usize, from: f64, to: f64) -> std::ops::Range<usize> {
+        // Numbers of cells are small: their integers are cheaper than a rounding of reals.
         let index = |v: f64| ((v - self.low[axis]) / self.cell - 0.5).clamp(-1.0, self.n[axis] as f64);
-        let (first, last) = (index(from).ceil().max(0.0) as usize, index(to).floor());
-        first..if last < 0.0 { 0 } else { (last as usize + 1).min(self.n[axis]) }
+        let (first, last) = (index(from).max(0.0), index(to));
+        let below = first as usize;
+        let begin = below + usize::from((below as f64) < first);
+        begin..if last < 0.0 { 0 } else { (last as usize + 1).min(self.n[axis]) }
     }
 
-    /// Cells of a row within `reach` of a straight move: what two discs and the strip between them have of it is one piece.
-    fn columns(&self, y: f64, a: [f64; 3], b: [f64; 3], reach: f64) -> std::ops::Range<usize> {
+    /// Cells of a row that a swept disc reaches: what two discs and the strip between them have of it is one piece.
+    fn columns(&self, y: f64, sweep: &Sweep) -> std::ops::Range<usize> {
         let (mut from, mut to) = (f64::INFINITY, f64::NEG_INFINITY);
-        for p in [a, b] {
-            let left = reach * reach - (y - p[1]) * (y - p[1]);
+        for p in sweep.ends {
+            let left = sweep.reach * sweep.reach - (y - p[1]) * (y - p[1]);
             if left >= 0.0 {
-                let half = libm::sqrt(left);
+                let half = f64::sqrt(left);
                 (from, to) = (from.min(p[0] - half), to.max(p[0] + half));
             }
         }
-        let along = [b[0] - a[0], b[1] - a[1]];
-        let length = libm::sqrt(along[0] * along[0] + along[1] * along[1]);
-        if along[1] != 0.0 {
-            for side in [-reach, reach] {
+        let [a, b] = sweep.ends;
+        let rise = b[1] - a[1];
+        if rise != 0.0 {
+            for side in [-1.0, 1.0] {
                 // Where the row crosses the border of the strip.
-                let share = (y - a[1] - side * along[0] / length) / along[1];
+                let share = (y - a[1] - side * sweep.across[1]) / rise;
                 if (0.0..=1.0).contains(&share) {
-                    let x = a[0] + share * along[0] - side * along[1] / length;
+                    let x = a[0] + share * (b[0] - a[0]) + side * sweep.across[0];
                     (from, to) = (from.min(x), to.max(x));
                 }
             }
@@ -117,8 +141,9 @@ impl Stock {
 
     /// The cells under a flat tool on one height, row by row.
     fn under(&self, a: [f64; 3], b: [f64; 3], reach: f64) -> impl Iterator<Item = std::ops::Range<usize>> {
+        let sweep = Sweep::new(a, b, reach);
         self.cells(1, a[1].min(b[1]) - reach, a[1].max(b[1]) + reach).filter_map(move |row| {
-            let columns = self.columns(self.middle(1, row), a, b, reach);
+            let columns = self.columns(self.middle(1, row), &sweep);
             (columns.start < columns.end).then(|| row * self.n[0] + columns.start..row * self.n[0] + columns.end)
         })
     }
@@ -129,17 +154,18 @@ impl Stock {
         let along = [b[0] - a[0], b[1] - a[1]];
         let length2 = along[0] * along[0] + along[1] * along[1];
         let reach2 = reach * reach;
+        let sweep = Sweep::new(a, b, reach);
         for row in self.cells(1, a[1].min(b[1]) - reach, a[1].max(b[1]) + reach) {
             let y = self.middle(1, row);
-            for column in self.columns(y, a, b, reach) {
+            for column in self.columns(y, &sweep) {
                 let x = self.middle(0, column);
                 let (dx, dy) = (x - a[0], y - a[1]);
                 let at = if length2 > 0.0 { ((dx * along[0] + dy * along[1]) / length2).clamp(0.0, 1.0) } else { 0.0 };
                 let (ex, ey) = (dx - at * along[0], dy - at * along[1]);
                 let d2 = ex * ex + ey * ey;
                 if d2 <= reach2 {
-                    let half = if length2 > 0.0 { libm::sqrt((reach2 - d2) / length2) } else { 1.0 };
-                    each(row * self.n[0] + column, libm::sqrt(d2), [at, (at - half).max(0.0), (at + half).min(1.0)]);
+                    let half = if length2 > 0.0 { f64::sqrt((reach2 - d2) / length2) } else { 1.0 };
+                    each(row * self.n[0] + column, f64::sqrt(d2), [at, (at - half).max(0.0), (at + half).min(1.0)]);
                 }
             }
         }
@@ -168,6 +194,22 @@ impl Stock {
             }
         });
         self.z = z;
+    }
+
+    /// A feed has ended at a point: nothing is left over it there.
+    pub fn reached(&mut self, tool: Cutter, at: [f64; 3]) {
+        let depth = self.been.entry(place(at)).or_insert((tool, at[2]));
+        let deepest = if depth.0 == tool { depth.1.min(at[2]) } else { at[2] };
+        *depth = (tool, deepest);
+    }
+
+    /// How high the tip has to stay over a point: no less than material that reaches no middle of a cell wants, no
+    /// more than where the tool has been.
+    pub fn blocks_way_down(&self, tool: Cutter, from: [f64; 3], to: [f64; 3]) -> Option<f64> {
+        let top = self.may_block(tool, from, to)?;
+        let been = self.been.get(&place(to)).filter(|b| b.0 == tool).map_or(f64::INFINITY, |b| b.1);
+        let top = top.min(been);
+        (top > to[2] + FILM).then_some(top)
     }
 
     /// How high the tip has to stay for a straight move to pass over all material; none: it meets none at any height
@@ -212,6 +254,10 @@ impl Stock {
     }
 }
 
+fn place(p: [f64; 3]) -> [i64; 2] {
+    [(p[0] * 1e6).round() as i64, (p[1] * 1e6).round() as i64]
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -236,6 +282,19 @@ mod tests {
         assert_eq!(s.blocks(FLAT, [50.0, 30.0, 25.0], [50.0, 30.0, 15.0]), None);
         // Beside the block there is nothing.
         assert_eq!(s.blocks(FLAT, [-6.0, 0.0, 0.0], [-6.0, 60.0, 0.0]), None);
+    }
+
+    #[test]
+    fn a_way_down_is_free_beside_walls_only_where_the_tool_has_been() {
+        let mut s = block();
+        s.cut(FLAT, [10.0, 30.0, 15.0], [90.0, 30.0, 15.0]);
+        let (high, low) = ([50.0, 30.0, 25.0], [50.0, 30.0, 10.0]);
+        assert_eq!(s.blocks_way_down(FLAT, high, low), Some(20.0));
+        s.reached(FLAT, [50.0, 30.0, 15.0]);
+        assert_eq!(s.blocks_way_down(FLAT, high, low), Some(15.0));
+        assert_eq!(s.blocks_way_down(FLAT, high, [50.0, 30.0, 15.0]), None);
+        // Another tool has not.
+        assert_eq!(s.blocks_way_down(Cutter { radius: 5.02, ..FLAT }, high, low), Some(20.0));
     }
 
     #[test]

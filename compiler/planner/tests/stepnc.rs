@@ -257,3 +257,24 @@ fn an_unknown_tool_is_told() {
     assert_eq!(notes(vec![Described::mill(2, 0.0, 10.0)]), [told("the tool"), told("tool 2")]);
     assert_eq!(notes(vec![Described::mill(2, 6.0, 10.0)]), [told("the tool")]);
 }
+
+/// ISO 14649 has no helix: what stands for it, and how far from it, is told once.
+#[test]
+fn helices_in_chords_are_told() {
+    let mut b = Build::new();
+    b.tool(1);
+    b.feed(5.0);
+    b.to(Op::Rapid, 10.0, 1.0, 5.0);
+    for k in 0..3 {
+        let arc = Arc { plane: ArcPlane::Work(Plane::Xy), center: [0.0, 1.0, 0.0], turns: 1 };
+        b.to(Op::Arc(arc), 10.0, 1.0, 4.0 - f64::from(k));
+    }
+    let program = b.0.finish();
+    let told = |tolerance: f64| {
+        let options = Options { tools: vec![Described::mill(1, 6.0, 0.0)], tolerance, ..Options::default() };
+        let (_, notes) = write(&program, &options).expect("it can be written");
+        notes.into_iter().filter(|d| d.code == code::STEPNC_HELIX_IN_CHORDS).map(|d| d.message).collect::<Vec<_>>()
+    };
+    assert_eq!(told(0.01), ["ISO 14649 has no helix: this one and 2 more are written as 213 straight pieces, no further from it than 0.01 mm"]);
+    assert_eq!(told(0.0).len(), 1);
+}

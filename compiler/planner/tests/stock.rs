@@ -248,6 +248,14 @@ fn feet_of_walls_are_told() {
                 let c = round(&mut p, 30.0);
                 p.machine("GENERAL_OUTSIDE_PROFILE", &[op], [30.0, 25.0, 20.0], Some(5.0), &format!(",#{c}"));
             }
+            "FLOOR" | "BOWL" => {
+                // A floor of 20 mm radius in a pocket of 30 mm, and one that ends inside of the pocket.
+                let (c, depth) = (round(&mut p, 30.0), if feature == "BOWL" { 4.0 } else { 8.0 });
+                let centre = p.point([0.0, 0.0, 20.0 - depth]);
+                let r = p.length(20.0);
+                let bottom = p.add(format!("RADIUSED_POCKET_BOTTOM_CONDITION(#{centre},#{r})"));
+                p.machine("CLOSED_POCKET", &[op], [30.0, 25.0, 20.0], Some(depth), &format!(",(),$,#{bottom},$,$,#{c}"));
+            }
             _ => {
                 let d = p.length(16.0);
                 let r = p.length(8.0);
@@ -259,6 +267,9 @@ fn feet_of_walls_are_told() {
     };
     says(&ball("BOSS"), code::PLAN_UNREACHABLE_CORNER, "a radius of 3 mm all along the foot");
     silent(&ball("HOLE"), code::PLAN_UNREACHABLE_CORNER);
+    // √(20² - 15²) - √(17² - 12²)
+    says(&ball("FLOOR"), code::PLAN_UNREACHABLE_CORNER, "up to 1.1872 mm all along the foot of its walls, where they meet its floor");
+    silent(&ball("BOWL"), code::PLAN_UNREACHABLE_CORNER);
 }
 
 /// A tool path of the file keeps its rapids, and is told of those that go through the block.
@@ -401,4 +412,71 @@ fn the_first_place_is_named() {
     let first_cut = text.lines().position(|l| l.starts_with("G1")).expect("a cut");
     let before: Vec<&str> = text.lines().take(first_cut).collect();
     assert!(before.iter().any(|l| l.contains("X0") && l.contains("Y0")), "{text}");
+}
+
+/// The corners between walls have the radius that the pocket gives them, whatever its outline is drawn as.
+#[test]
+fn corners_of_pockets_are_as_round_as_the_file_says() {
+    // Nearest that the tool's axis comes to a corner that is drawn sharp at X48 Y30.
+    let nearest = |open: bool, corner: f64| {
+        let mut p = Part::new(BLOCK);
+        let tool = p.tool("ENDMILL", 6.0, 0.0, None);
+        let op = p.mill(&Mill::new("BOTTOM_AND_SIDE_ROUGH_MILLING", tool, 2.0, 3.0));
+        let bottom = p.add("PLANAR_POCKET_BOTTOM_CONDITION()".into());
+        let radius = p.length(corner);
+        if open {
+            let walls = p.polyline(&[(-30.0, 10.0), (18.0, 10.0), (18.0, -10.0), (-30.0, -10.0)]);
+            let profile = p.add(format!("GENERAL_PROFILE($,#{walls})"));
+            p.machine("OPEN_POCKET", &[op], [30.0, 20.0, 12.0], Some(2.0), &format!(",(),$,#{bottom},$,#{radius},#{profile},$"));
+        } else {
+            let outline = p.polyline(&[(-18.0, -10.0), (18.0, -10.0), (18.0, 10.0), (-18.0, 10.0), (-18.0, -10.0)]);
+            let profile = p.add(format!("GENERAL_CLOSED_PROFILE($,#{outline})"));
+            p.machine("CLOSED_POCKET", &[op], [30.0, 20.0, 12.0], Some(2.0), &format!(",(),$,#{bottom},$,#{radius},#{profile}"));
+        }
+        let (made, out) = planned(&p);
+        assert!(out.iter().all(|d| d.code != code::PLAN_UNREACHABLE_CORNER) || corner < 3.0, "{out:#?}");
+        let mut least = f64::INFINITY;
+        for s in made.program.steps().filter(|s| s.op.feeds()) {
+            let (a, b) = (s.start.xyz(), s.end.xyz());
+            for k in 0..=100 {
+                let share = f64::from(k) / 100.0;
+                let q = match s.op {
+                    Op::Arc(arc) => ArcShape::new(&arc, &s.start, &s.end).point(share),
+                    _ => std::array::from_fn(|i| a[i] + (b[i] - a[i]) * share),
+                };
+                least = least.min((q[0] - 48.0).hypot(q[1] - 30.0));
+            }
+        }
+        least
+    };
+    let diagonal = |r: f64| r * 2f64.sqrt() - (r - 3.0);
+    for open in [false, true] {
+        // A corner of 6 mm: the axis stays 3 mm inside of its arc.
+        for (corner, wanted) in [(6.0, diagonal(6.0)), (4.5, diagonal(4.5)), (3.0, diagonal(3.0)), (0.5, diagonal(3.0))] {
+            let least = nearest(open, corner);
+            assert!((least - wanted).abs() < 2e-3, "open {open}, corner {corner}: {least}, not {wanted}");
+        }
+    }
+}
+
+/// A radius that takes more than the corners of an outline is refused; one that fills it from wall to wall is not.
+#[test]
+fn arms_of_pockets_are_not_lost_in_their_corners() {
+    let arm = |corner: f64| {
+        let mut p = Part::new(BLOCK);
+        let tool = p.tool("ENDMILL", 4.0, 0.0, None);
+        let op = p.mill(&Mill::new("BOTTOM_AND_SIDE_ROUGH_MILLING", tool, 2.0, 2.0));
+        let outline = p.polyline(&[(-15.0, -11.0), (15.0, -11.0), (15.0, -1.0), (-3.0, -1.0), (-3.0, 11.0), (-15.0, 11.0), (-15.0, -11.0)]);
+        let profile = p.add(format!("GENERAL_CLOSED_PROFILE($,#{outline})"));
+        let (bottom, radius) = (p.add("PLANAR_POCKET_BOTTOM_CONDITION()".into()), p.length(corner));
+        p.machine("CLOSED_POCKET", &[op], [30.0, 20.0, 12.0], Some(2.0), &format!(",(),$,#{bottom},$,#{radius},#{profile}"));
+        let (made, out) = plan(p.text().as_bytes(), FileId(0), &Options::default());
+        let most = made.map(|m| m.program.steps().filter(|s| s.op.feeds()).map(|s| s.end.axes[0]).fold(0.0, f64::max));
+        (most, out.iter().any(|d| d.message.contains("for which its outline has no room")))
+    };
+    for corner in [2.0, 4.0, 5.0] {
+        let (most, refused) = arm(corner);
+        assert!(!refused && most.is_some_and(|x| (x - 43.0).abs() < 1e-4), "{corner}: {most:?}");
+    }
+    assert_eq!(arm(6.0), (None, true));
 }

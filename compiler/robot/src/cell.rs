@@ -125,7 +125,8 @@ impl Cells {
         if self.turning == turn && turn == Turn::Stop {
             return Made::NOTHING;
         }
-        let off = self.left_on(turn_word(self.turning), turn_word(turn));
+        // A standing spindle has nothing on that would have to be let go.
+        let off = if self.turning == Turn::Stop { None } else { self.left_on(turn_word(self.turning), turn_word(turn)) };
         self.turning = turn;
         let mut made = self.turned(turn, speed);
         made.actions.splice(0..0, off);
@@ -187,7 +188,8 @@ impl Cells {
         }
         let opposite = if on { ["M63", "M65"] } else { ["M62", "M64"] };
         if let Some(signal) = opposite.into_iter().find_map(numbered).filter(|s| s.signal.is_some()) {
-            let value = Some(if on { 1.0 } else { 0.0 });
+            // The contrary of what its row says: some outputs are on at 0.
+            let value = Some(signal.value.map_or(f64::from(u8::from(on)), |v| if v == 0.0 { 1.0 } else { 0.0 }));
             return Made { actions: steps(word, None, Signal { value, ..signal }), by_hand: None };
         }
         self.word(word, Some(f64::from(index)))

@@ -103,9 +103,9 @@ impl<'a> Emit<'a> {
         let at_home = self.home_target(g, home, frame, tool);
         // A milling program says itself where the machine goes in the end.
         if here.is_some() && self.machine.kind != gr_machine::Kind::Mill {
-            self.summary.rapid_seconds += self.joint_time(&last, home, 1.0);
             let to = self.keep(at_home);
             let speed = self.machine.cell.joint_share();
+            self.summary.rapid_seconds += self.joint_time(&last, home, speed);
             self.steps.push(Step { action: Action::Joint { to, speed, zone: Zone::Stop }, source: None });
         }
         self.steps.push(Step { action: Action::End, source: None });
@@ -120,6 +120,9 @@ impl<'a> Emit<'a> {
             steps: self.steps,
             curves: std::mem::take(&mut g.curves),
         };
+        if let Some([cut, rapid]) = crate::setpoints::paced(&program) {
+            (self.summary.cut_seconds, self.summary.rapid_seconds, self.summary.accelerates) = (cut, rapid, true);
+        }
         (program, self.summary)
     }
 

@@ -2,6 +2,7 @@
 //! values yet. Frames, tools, tool directions, speeds, signals and the words a robot has no meaning for are settled
 //! here.
 
+mod places;
 pub(crate) mod probing;
 mod setups;
 mod signals;
@@ -10,7 +11,7 @@ use gr_ir::geometry::ArcShape;
 use gr_ir::{FeedMode, Note, Op, PathMode, Pose, Program, Source, Sources, State, Stop, Turn, View};
 use gr_machine::math::{Frame, M3, add, dot, norm, product, rot_z, rotation_vector, scale, sub, transpose};
 use gr_machine::{Chain, Control, Kind, Machine, Rapid};
-use gr_text::{Code, Diagnostic, code};
+use gr_text::{Code, Diagnostic, Severity, code};
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::PI;
 
@@ -110,6 +111,11 @@ impl<'a> Findings<'a> {
             let (file, span) = self.sources.place(source);
             self.list.add(Diagnostic::new(code, file, span, args));
         }
+    }
+    /// As an error, whatever the code is.
+    pub fn fail(&mut self, code: Code, source: Source, args: &[String]) {
+        let (file, span) = self.sources.place(source);
+        self.list.add(Diagnostic { severity: Severity::Error, ..Diagnostic::new(code, file, span, args) });
     }
     /// Once per program.
     pub fn once(&mut self, code: Code, source: Option<Source>, args: &[String]) {
@@ -260,6 +266,7 @@ impl<'a> Gather<'a> {
     }
 
     pub fn run(&mut self, program: &Program) {
+        let mut unnamed = places::Unnamed::new(program, self.machine);
         let mut cursor = program.cursor();
         while let Some(view) = cursor.next() {
             if self.ended || self.findings.list.full() {
@@ -274,6 +281,10 @@ impl<'a> Gather<'a> {
             if !matches!(view.op, Op::Stop(_)) {
                 self.pallet = false;
             }
+            if self.leads_to_machine(program, &view) {
+                continue;
+            }
+            self.rests_on_unnamed(program, &view, &mut unnamed);
             self.op(&view);
         }
         if !self.ended {
@@ -290,7 +301,7 @@ impl<'a> Gather<'a> {
             Op::Linear | Op::Arc(_) | Op::Nurbs { .. } => self.cut(view),
             Op::Probe(kind) => self.probe(view, kind),
             Op::RigidTap { .. } => self.cannot("rigid tapping (G33.1)"),
-            Op::SyncStart(s) if !s.velocity => self.cannot("a motion locked to the spindle's angle (G33)"),
+            Op::SyncStart(s) if !s.velocity => self.cannot("a motion locked to the spindle's angle (G33, G33.1)"),
             Op::IndexerLock(..) => self.cannot("an indexing axis"),
             Op::SpindleOrient { .. } | Op::SpindleWait { .. } if self.control == Control::Position => self.yaws(view),
             Op::SpindleOrient { spindle, angle, direction } => self.orient(spindle, angle, direction),

@@ -8,6 +8,7 @@
 //! |---|---|
 //! | `program` | what the result is |
 //! | `options` | what can be chosen; the summary |
+//! | `opinion` | what a machine says about a program of which nothing is made |
 //! | `plan` | the passes in order, findings |
 //! | `gather` | motion IR → moves in work frames, actions of the cell |
 //! | `cell` | M words → signals, or a request to the operator |
@@ -35,6 +36,7 @@ mod emit;
 mod follow;
 mod gather;
 pub mod joints;
+pub mod opinion;
 mod options;
 mod path;
 mod plan;

@@ -19,6 +19,8 @@ pub struct Options {
     pub reconfigure: Option<f64>,
     /// The controller knows M3, S, M8 … itself: words the machine file says nothing about stay words.
     pub own_words: bool,
+    /// A move can end where an input switches, which joint positions can't say.
+    pub probing: bool,
     /// Setups of a job: each with its own placement of the part. None = the cell's.
     pub setups: Vec<Setup>,
 }
@@ -40,7 +42,7 @@ pub struct Setup {
 
 impl Default for Options {
     fn default() -> Options {
-        Options { name: "program".into(), tolerance: 0.01, approach: 50.0, reconfigure: None, own_words: false, setups: Vec::new() }
+        Options { name: "program".into(), tolerance: 0.01, approach: 50.0, reconfigure: None, own_words: false, probing: true, setups: Vec::new() }
     }
 }
 
@@ -66,8 +68,10 @@ pub struct Summary {
     pub rapids: usize,
     /// Time at feed, s.
     pub cut_seconds: f64,
-    /// Time of rapids, without acceleration, s.
+    /// Time of rapids, s.
     pub rapid_seconds: f64,
+    /// Both with the accelerations of the machine file.
+    pub accelerates: bool,
     /// Time of dwells, s.
     pub wait_seconds: f64,
     /// Least distance of the wrist from the border of its reach, mm, and where.

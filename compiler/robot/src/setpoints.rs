@@ -12,7 +12,7 @@ use std::fmt::Write as _;
 
 use gr_ir::{Source, Sources};
 use gr_machine::JointKind;
-use gr_machine::math::{Frame, turn_of};
+use gr_machine::math::{Frame, norm, sub, turn_of};
 use gr_text::{Diagnostic, code};
 
 use crate::follow::{nearer, unwrap};
@@ -124,6 +124,10 @@ struct Piece {
     /// None: all joints evenly.
     path: Option<(Path, Mount)>,
     stop: bool,
+    /// A rapid of the program; its corner, mm, and its straight length, mm.
+    rapid: bool,
+    corner: f64,
+    length: f64,
     source: Option<Source>,
     /// Greatest rate, and greatest change of rate per second.
     rate: f64,
@@ -166,6 +170,38 @@ pub fn setpoints(program: &RobotProgram, options: &SetpointOptions) -> Result<Se
     }
 }
 
+/// Time at feed and of rapids with the accelerations of the machine file, s; none where it has none. Moves begin and end as
+/// in set-points, but with all of a joint's acceleration, and corners are passed within their zone.
+pub(crate) fn paced(program: &RobotProgram) -> Option<[f64; 2]> {
+    let joints = &program.machine.joints;
+    joints.iter().any(|j| j.acceleration.is_some()).then_some(())?;
+    let options = SetpointOptions { interval: 0.0, smoothing: 0.0, most: 0 };
+    let mut made = Maker::new(program, &options);
+    for (a, j) in made.acceleration.iter_mut().zip(joints) {
+        *a = j.acceleration.unwrap_or(f64::INFINITY);
+    }
+    (made.speed, made.share, made.rounds) = (crate::plan::speeds(&program.machine), 1.0, true);
+    made.pieces();
+    let join = made.joins(1.0);
+    let mut out = [0.0; 2];
+    for (k, p) in made.list.iter().enumerate() {
+        let leg = made.leg(k, &join, 1.0);
+        out[usize::from(p.rapid)] += leg.up + leg.run.max(0.0) / leg.peak + leg.down;
+    }
+    Some(out)
+}
+
+/// The rate along one piece: up from that of its start to the peak, on, and down to that of its end.
+struct Leg {
+    change: f64,
+    start: f64,
+    peak: f64,
+    /// Real time of both slopes, s, and own time between them.
+    up: f64,
+    run: f64,
+    down: f64,
+}
+
 struct Maker<'a> {
     program: &'a RobotProgram,
     options: &'a SetpointOptions,
@@ -173,6 +209,10 @@ struct Maker<'a> {
     limits: Limits,
     speed: Joints,
     acceleration: Joints,
+    /// Of a joint's acceleration, along the path and across it each.
+    share: f64,
+    /// Corners are cut within their zones.
+    rounds: bool,
     list: Vec<Piece>,
     /// Waits: before which piece, s.
     waits: Vec<(usize, f64)>,
@@ -195,6 +235,8 @@ impl<'a> Maker<'a> {
             limits: Limits::new(&program.machine),
             speed,
             acceleration,
+            share: 0.5,
+            rounds: false,
             list: Vec::new(),
             waits: Vec::new(),
             events: Vec::new(),
@@ -233,17 +275,17 @@ impl<'a> Maker<'a> {
                     let to = self.program.targets[*to as usize];
                     let times = (0..self.solver.count).map(|i| (to.joints[i] - here.joints[i]).abs() / self.speed[i]);
                     let seconds = times.fold(0.0, f64::max) / speed;
-                    self.add(&here, &to, seconds, None, *zone);
+                    self.add(&here, &to, seconds, None, *zone, true);
                     here = to;
                 }
-                Action::Linear { to, speed, zone, .. } => {
-                    here = self.cut(&mut g, here, *to, None, *speed, *zone, (tool, frame));
+                Action::Linear { to, speed, zone, rapid } => {
+                    here = self.cut(&mut g, here, *to, None, *speed, (*zone, *rapid), (tool, frame));
                 }
-                Action::Probe { to, speed, .. } => here = self.cut(&mut g, here, *to, None, *speed, Zone::Stop, (tool, frame)),
+                Action::Probe { to, speed, .. } => here = self.cut(&mut g, here, *to, None, *speed, (Zone::Stop, false), (tool, frame)),
                 Action::Arc { via, to, center, normal, angle, speed, zone } => {
                     let via = self.program.targets[*via as usize].position;
                     let arc = ArcPiece { center: *center, normal: *normal, via, angle: *angle };
-                    here = self.cut(&mut g, here, *to, Some(arc), *speed, *zone, (tool, frame));
+                    here = self.cut(&mut g, here, *to, Some(arc), *speed, (*zone, false), (tool, frame));
                 }
                 Action::Dwell(s) => self.wait(*s),
                 Action::ChangeTool { .. } | Action::Signal { .. } | Action::WaitInput { .. } => self.event(i),
@@ -276,7 +318,7 @@ impl<'a> Maker<'a> {
     }
 
     #[allow(clippy::too_many_arguments)]
-    fn cut(&mut self, g: &mut Gathered, here: Target, to: u32, arc: Option<ArcPiece>, speed: f64, zone: Zone, (tool, frame): (u16, u16)) -> Target {
+    fn cut(&mut self, g: &mut Gathered, here: Target, to: u32, arc: Option<ArcPiece>, speed: f64, (zone, rapid): (Zone, bool), (tool, frame): (u16, u16)) -> Target {
         let to = self.program.targets[to as usize];
         g.turns = vec![turn_of(here.quaternion), turn_of(to.quaternion)];
         g.arcs.clear();
@@ -303,11 +345,11 @@ impl<'a> Maker<'a> {
         let asked = if path.length > ON_THE_SPOT { path.length } else { turned };
         let seconds = (asked / speed).max(least);
         let mount = Mount::new(g, &m, 0.0);
-        self.add(&here, &to, seconds, Some((path, mount)), zone);
+        self.add(&here, &to, seconds, Some((path, mount)), zone, rapid);
         to
     }
 
-    fn add(&mut self, from: &Target, to: &Target, seconds: f64, path: Option<(Path, Mount)>, zone: Zone) {
+    fn add(&mut self, from: &Target, to: &Target, seconds: f64, path: Option<(Path, Mount)>, zone: Zone, rapid: bool) {
         if !(seconds > 1e-9) {
             return;
         }
@@ -318,6 +360,9 @@ impl<'a> Maker<'a> {
             branches: [from.branch, to.branch],
             path,
             stop: zone == Zone::Stop,
+            rapid,
+            corner: if let Zone::Blend(r) = zone { r } else { 0.0 },
+            length: norm(sub(to.position, from.position)),
             source: self.source,
             rate: 1.0,
             change: f64::INFINITY,
@@ -363,12 +408,12 @@ impl<'a> Maker<'a> {
                 let v = (all[k + 1][i] - all[k][i]).abs() / h;
                 if v > 0.0 {
                     p.rate = p.rate.min(self.speed[i] / v);
-                    p.change = p.change.min(0.5 * self.acceleration[i] / v);
+                    p.change = p.change.min(self.share * self.acceleration[i] / v);
                 }
                 if k > 0 {
                     let a = (all[k + 1][i] - 2.0 * all[k][i] + all[k - 1][i]).abs() / (h * h);
                     if a > 0.0 {
-                        p.rate = p.rate.min(libm::sqrt(0.5 * self.acceleration[i] / a));
+                        p.rate = p.rate.min(libm::sqrt(self.share * self.acceleration[i] / a));
                     }
                 }
             }
@@ -386,6 +431,9 @@ impl<'a> Maker<'a> {
         if a.stop {
             return 0.0;
         }
+        if self.rounds {
+            return self.rounded(a, b);
+        }
         // A corner of the path is as sharp as it is, however smooth the law: what the joints jump by must be small
         // against what they may change between two set-points.
         let step = self.options.interval * (self.options.interval / self.options.smoothing.max(self.options.interval));
@@ -399,21 +447,51 @@ impl<'a> Maker<'a> {
         if rate < 0.02 { 0.0 } else { rate }
     }
 
-    /// The law: ramps of the rate over real time; and when each piece before which the machine stands is waited for.
-    fn law(&self, slower: f64) -> (Vec<Ramp>, Vec<f64>) {
+    /// The same where the corner is cut within its zone: joints have the time that the way there and back takes.
+    fn rounded(&self, a: &Piece, b: &Piece) -> f64 {
+        let time = a.corner * (a.seconds / a.length.max(ON_THE_SPOT) + b.seconds / b.length.max(ON_THE_SPOT));
+        let mut rate = a.rate.min(b.rate);
+        for i in 0..self.solver.count {
+            let jump = (a.ends[1][i] - b.ends[0][i]).abs();
+            if jump > 0.0 {
+                rate = rate.min(libm::sqrt(self.acceleration[i] * time / jump));
+            }
+        }
+        rate
+    }
+
+    /// Rates at which pieces go over into each other, the first and the last from and to rest.
+    fn joins(&self, slower: f64) -> Vec<f64> {
         let n = self.list.len();
         let mut join = vec![0.0; n + 1];
         for k in 1..n {
             let waits = self.waits.binary_search_by_key(&k, |w| w.0).is_ok();
             join[k] = if waits { 0.0 } else { self.junction(&self.list[k - 1], &self.list[k]) * libm::sqrt(slower) };
         }
-        let change = |k: usize| self.list[k].change * slower;
+        let gain = |k: usize| 2.0 * self.list[k].change * slower * self.list[k].seconds;
         for k in 0..n {
-            join[k + 1] = join[k + 1].min(libm::sqrt(join[k] * join[k] + 2.0 * change(k) * self.list[k].seconds));
+            join[k + 1] = join[k + 1].min(libm::sqrt(join[k] * join[k] + gain(k)));
         }
         for k in (0..n).rev() {
-            join[k] = join[k].min(libm::sqrt(join[k + 1] * join[k + 1] + 2.0 * change(k) * self.list[k].seconds));
+            join[k] = join[k].min(libm::sqrt(join[k + 1] * join[k + 1] + gain(k)));
         }
+        join
+    }
+
+    fn leg(&self, k: usize, join: &[f64], slower: f64) -> Leg {
+        let p = &self.list[k];
+        let (a, top) = (p.change * slower, p.rate * libm::sqrt(slower.min(1.0)));
+        let (v0, v1) = (join[k], join[k + 1]);
+        let peak = libm::sqrt(((v0 * v0 + v1 * v1) / 2.0 + a * p.seconds).max(0.0)).min(top.max(v0).max(v1));
+        let (up, down) = ((peak - v0) / a, (peak - v1) / a);
+        let run = p.seconds - (peak + v0) / 2.0 * up - (peak + v1) / 2.0 * down;
+        Leg { change: a, start: v0, peak, up, run, down }
+    }
+
+    /// The law: ramps of the rate over real time; and when each piece before which the machine stands is waited for.
+    fn law(&self, slower: f64) -> (Vec<Ramp>, Vec<f64>) {
+        let n = self.list.len();
+        let join = self.joins(slower);
         let mut law = Law { ramps: Vec::new(), at: 0.0, time: 0.0, sum: 0.0 };
         let mut done = 0.0;
         let mut reached = Vec::with_capacity(n + 1);
@@ -422,19 +500,14 @@ impl<'a> Maker<'a> {
             let waited = self.waited(k);
             let settle = if join[k] == 0.0 { self.options.smoothing } else { 0.0 };
             law.ramp(waited + settle, 0.0, 0.0);
-            let p = &self.list[k];
-            let (a, top) = (change(k), p.rate * libm::sqrt(slower.min(1.0)));
-            let (v0, v1) = (join[k], join[k + 1]);
-            let peak = libm::sqrt(((v0 * v0 + v1 * v1) / 2.0 + a * p.seconds).max(0.0)).min(top.max(v0).max(v1));
-            let (up, down) = ((peak - v0) / a, (peak - v1) / a);
-            let run = p.seconds - (peak + v0) / 2.0 * up - (peak + v1) / 2.0 * down;
-            law.ramp(up, v0, a);
-            if run > 0.0 {
-                law.ramp(run / peak, peak, 0.0);
+            let leg = self.leg(k, &join, slower);
+            law.ramp(leg.up, leg.start, leg.change);
+            if leg.run > 0.0 {
+                law.ramp(leg.run / leg.peak, leg.peak, 0.0);
             }
-            law.ramp(down, peak, -a);
+            law.ramp(leg.down, leg.peak, -leg.change);
             // Rounding must not add up.
-            done += p.seconds;
+            done += self.list[k].seconds;
             law.time = done;
         }
         reached.push(law.at);

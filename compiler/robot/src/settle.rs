@@ -1,7 +1,7 @@
 //! Where a machine tool stands when its program has not said it, or has said it as a place of the machine: coordinates that no word
 //! has named yet are where the machine stood, and G53, G28, G30 and what a tool change does by itself lead to places that stay where
 //! they are, wherever the part is. A program's motion has numbers for both in its own frame; here they become those of the frame that
-//! the machine file gives the part. Arms have no such places.
+//! the machine file gives the part. Arms have no such places: there both are told.
 
 use gr_backends::sources::{Words as Letters, is_hidden};
 use gr_ir::{ArcPlane, Axes, Builder, Marker, Op, Pose, Program, Sources, State, View, plane_axes};
@@ -166,6 +166,20 @@ fn goal(program: &Program, view: &View<'_, '_>, letters: Letters) -> Goal {
 /// The tool point as a mill's control has it: the nose of the spindle until G43 says otherwise.
 pub(crate) fn control_tool(machine: &Machine, state: &State) -> Frame {
     if state.tool_offset[2] == 0.0 { machine.cell.tool_frame(u32::MAX) } else { tool(machine, state) }
+}
+
+/// The word that leads a move to a place of the machine, if one does.
+pub(crate) fn place_of_machine(program: &Program, view: &View<'_, '_>, sources: &dyn Sources) -> Option<&'static str> {
+    if !view.op.moves() {
+        return None;
+    }
+    let letters = Letters::at(sources, view.source.file, view.source.line)?;
+    match goal(program, view, letters) {
+        Goal::Work => None,
+        Goal::Fixed => Some("G53"),
+        Goal::Home => Some(if letters.g(280) { "G28" } else { "G30" }),
+        Goal::Hidden => Some("the way to the tool change"),
+    }
 }
 
 /// The program with the numbers that such coordinates have in the frame of the part. None on machines that have none: the program is

@@ -36,9 +36,10 @@ impl Slides {
     /// How the machine stands for the words of a program.
     pub fn stand(&self, machine: &Machine, kinematics: &dyn Kinematics, asked: &Asked) -> Option<Stand> {
         let begun = started(machine, asked, &self.sliding, &self.turning);
-        let joints = slid(kinematics, &begun, &self.sliding, asked).ok()?;
+        let mut joints = slid(kinematics, &as_far_as_known(machine, &begun, &self.turning), &self.sliding, asked).ok()?;
         let real = kinematics.forward_frame(&joints).ok()?;
         let lever = sub(real.then(&Frame::shift(asked.tool.position)).position, real.position);
+        self.turning.iter().for_each(|(joint, _)| joints[*joint] = begun[*joint]);
         Some(Stand { joints, lever, axis: real.axis(2) })
     }
 }
@@ -99,6 +100,20 @@ pub fn started(machine: &Machine, asked: &Asked, sliding: &[usize; 3], turning: 
         joints[*joint] = v;
     }
     joints
+}
+
+/// Where the rotary axes of a `cartesian` machine are, its file doesn't say: they are passed on and move no tool point that is known.
+pub fn unplaced(machine: &Machine, joint: usize) -> bool {
+    matches!(machine.chain, Chain::Cartesian) && machine.joints.get(joint).is_some_and(|j| j.kind == JointKind::Revolute)
+}
+
+/// Joint values with the rotary axes at zero that are nobody knows where.
+pub fn as_far_as_known(machine: &Machine, joints: &[f64], turning: &[(usize, usize)]) -> Vec<f64> {
+    let mut out = joints.to_vec();
+    for (joint, _) in turning.iter().filter(|(joint, _)| unplaced(machine, *joint)) {
+        out[*joint] = 0.0;
+    }
+    out
 }
 
 /// Steps of the search for the sliding joints: where they slide straight, one is enough.

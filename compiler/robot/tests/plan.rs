@@ -139,7 +139,7 @@ fn what_goes_wrong() {
     let rows = [
         ("out of reach", "T1 M6\nG0 X0 Y0 Z20\nG1 X3000 F500\nG1 X0\nG1 Y5000\nM30\n"),
         ("unknown tool", "T7 M6\nG0 X0 Y0 Z20\nM30\n"),
-        ("no meaning", "T1 M6\nG0 X0 Y0 Z20\nG38.2 Z0 F100\nM30\n"),
+        ("no meaning", "T1 M6\nG0 X0 Y0 Z20\nM3 S5000\nG33 Z0 K1\nM30\n"),
         ("rotary", "T1 M6\nG0 X0 Y0 Z20\nG1 X50 A20 F600\nM30\n"),
         ("joint speed", "T1 M6\nG0 X0 Y0 Z20\nG1 X400 F900000\nM30\n"),
         ("spindle speed", "T1 M6\nS30000 M3\nG0 X0 Y0 Z20\nM30\n"),
@@ -441,20 +441,16 @@ fn a_turned_work_frame_turns_no_tool() {
     }
 }
 
-/// The cell with a probe on an input.
-fn probing() -> Machine {
-    let text = include_str!("../../../docs/examples/irb2400-cell.toml").to_string() + "\n[io.G38]\nwait = \"diProbe\"\n";
-    gr_machine::parse(FileId(0), &text).unwrap_or_else(|e| panic!("{}", messages(&e, &text)))
-}
-
 #[test]
 fn probe_moves() {
     let text = "G21 G90\nT1 M6\nG43 H1\nG0 X10 Y10 Z20\nG38.2 Z-5 F120\nG0 Z5\nG38.3 X40 F60\nG1 X20 Y20 F600\nG38.5 Z9\nM30\n";
-    insta::assert_snapshot!(told(&planned(text, &probing()).unwrap_or_else(|e| panic!("{}", messages(&e, text)))));
+    insta::assert_snapshot!(told(&planned(text, &cell()).unwrap_or_else(|e| panic!("{}", messages(&e, text)))));
     // Without a row, and as joint positions.
-    assert_eq!(faults(text, &cell()), "E0557 line 5: the machine file doesn't say which input the probe switches\n");
+    let mut bare = cell();
+    bare.cell.io.remove("G38");
+    assert_eq!(faults(text, &bare), "E0557 line 5: the machine file doesn't say which input the probe switches\n");
     let texts = Texts::new([(FileId(0), text)]);
-    let found = plan(&motion(text), &probing(), &texts, &Options { own_words: true, ..Options::default() }).expect_err("no joint positions");
+    let found = plan(&motion(text), &cell(), &texts, &Options { own_words: true, probing: false, ..Options::default() }).expect_err("no joint positions");
     assert!(messages(&found, text).starts_with("E0523 line 5: a probe move in joint positions"), "{found:?}");
 }
 
@@ -468,16 +464,50 @@ fn nothing_rests_on_where_a_probe_stopped() {
         "#1=#<_abs_z>", "G93 G1 Z5 F10\nG94", "G38.3 X20 F60", "G28.1", "G28", "G28 X5", "G10 L10 P1 Z0", "G5.2 X20 Y0 P1 L3\nX30 Y10\nX40 Y0\nG5.3", "G10 L2 P1 R10\nG1 Z5 X20 F600", "G81 X20 Z0 R5 F600",
     ] {
         let text = format!("{head}{bad}{tail}");
-        let found = planned(&text, &probing()).map(|p| told(&p)).map_err(|e| messages(&e, &text));
+        let found = planned(&text, &cell()).map(|p| told(&p)).map_err(|e| messages(&e, &text));
         let told = found.expect_err(bad);
         assert!(told.contains("E0533 line 7") || told.contains("E0533 line 8"), "{bad}: {told}");
     }
     for good in ["G0 Z5\nG1 X20", "G1 Z5 F600\nG2 X20 I5", "G38.3 Z-9 F60", "G1 X20 Y20 Z5 F600", "G53 G0 Z1000\nG0 Z5", "G28 Z5", "G10 L2 P2 X5", "G4 P1\nM8\nG0 Z-5", "#1=#5420", "G43 H1\nG0 Z5", "M3 S5000\nG0 Z5"] {
         let text = format!("{head}{good}{tail}");
-        if let Err(e) = planned(&text, &probing()) {
+        if let Err(e) = planned(&text, &cell()) {
             let told = messages(&e, &text);
             assert!(!told.contains("E0533"), "{good}: {told}");
         }
+    }
+}
+
+/// Places of a machine tool, and what rests on coordinates that nothing has named.
+#[test]
+fn places_that_a_robot_cannot_know() {
+    let told_of = |head: &str, block: &str| {
+        let text = format!("{head}{block}\nG0 X10 Y10 Z40\nM30\n");
+        planned(&text, &cell()).map_or_else(|e| messages(&e, &text), |p| messages(&p.warnings, &text))
+    };
+    let named = "G21 G90\nT1 M6\nG43 H1\nG0 X10 Y10 Z20\n";
+    for (block, word) in [("G28", "G28"), ("G91 G28 Z0\nG90", "G28"), ("G30 Z0", "G30"), ("G53 G0 Z0", "G53"), ("G53 G1 X0 F100", "G53")] {
+        assert_eq!(told_of(named, block), format!("E0558 line 5: {word} leads to a place of a machine tool, which a robot doesn't have\n"), "{block}");
+    }
+    // Without a tool length it would be the program's zero point: a warning. Else an error.
+    let (bare, long) = ("G21 G90\nT1 M6\n", "G21 G90\nT1 M6\nG43.1 Z85\n");
+    for (block, axes, zero, number) in [
+        ("G1 X10 Y10 Z5 F100", "X Y Z", "X0 Y0 Z0", "X0 Y0 Z-85"),
+        ("G0 Z20\nG1 X10 F100", "X Y", "X0 Y0", "X0 Y0"),
+        ("G91 G0 X10 Y10 Z20\nG90", "X Y Z", "X0 Y0 Z0", "X0 Y0 Z-85"),
+        ("G0 X10 Y10\nG2 X20 I5 F100", "Z", "Z0", "Z-85"),
+        ("G92 X5 Z5", "X Z", "X0 Z0", "X0 Z-85"),
+        ("G10 L20 P1 Z5", "Z", "Z0", "Z-85"),
+    ] {
+        let line = |head: &str| head.matches('\n').count() + 1 + usize::from(block.starts_with("G0 "));
+        let wanted = |head: &str, place: &str| format!("E0559 line {}: nothing before this says where the tool is in {axes}: it would be at {place}\n", line(head));
+        assert_eq!(told_of(bare, block), wanted(bare, zero), "{block}");
+        let told = told_of(long, block);
+        assert!(told.contains(&wanted(long, number)), "{block}: {told}");
+        let text = format!("{long}{block}\nG0 X10 Y10 Z40\nM30\n");
+        assert_eq!(planned(&text, &cell()).is_err(), number.contains("-85"), "{block}");
+    }
+    for good in ["G0 X0 Y0 Z20\nG1 Z0 F100", "G0 Z20\nG0 X0 Y0\nG91 G1 Z-20 F100\nG90", "G10 L2 P1 X5", "G92.1", "G0 X10 Y10 Z20\nG92 X0"] {
+        assert_eq!(told_of("G21 G90\nT1 M6\nG43 H1\n", good), "", "{good}");
     }
 }
 
@@ -486,7 +516,7 @@ fn nothing_rests_on_where_a_probe_stopped() {
 fn the_way_home_after_a_probe() {
     let lines = |last: &str| {
         let text = format!("G21 G90\nT1 M6\nG43 H1\nG0 X10 Y10 Z90\n{last}\nM30\n");
-        let p = planned(&text, &probing()).unwrap_or_else(|e| panic!("{}", messages(&e, &text)));
+        let p = planned(&text, &cell()).unwrap_or_else(|e| panic!("{}", messages(&e, &text)));
         let place = |s: &gr_robot::Step| match s.action {
             Action::Linear { to, .. } if s.source.is_none() => Some(p.program.targets[to as usize].position.map(|v| (v * 1e6).round() / 1e6)),
             _ => None,
@@ -502,7 +532,28 @@ fn the_way_home_after_a_probe() {
 #[test]
 fn away_from_a_probe_in_a_line() {
     let text = "G21 G90\nT1 M6\nG43 H1\nG0 X10 Y10 Z20\nG64 P1\nG38.3 X40 F120\nG0 X39\nG38.3 X60\nG0 X30 Y60 Z40\nM30\n";
-    let p = planned(text, &probing()).unwrap_or_else(|e| panic!("{}", messages(&e, text)));
+    let p = planned(text, &cell()).unwrap_or_else(|e| panic!("{}", messages(&e, text)));
     let after: Vec<_> = p.program.steps.iter().filter(|s| matches!(s.source.map(|s| s.line), Some(6 | 8))).map(|s| matches!(s.action, Action::Linear { rapid: true, .. })).collect();
     assert_eq!(after, [true, true], "{}", told(&p));
+}
+
+/// A joint that turns alone: up, on, down, by the sum of two ramps; cuts of a straight line the same; corners cost time.
+#[test]
+fn accelerations_count() {
+    let file = include_str!("../../../docs/examples/irb2400-cell.toml");
+    let with = |more: &str| gr_machine::parse(FileId(0), &format!("{file}{more}")).unwrap();
+    let all = |a: f64| (1..=6).map(|i| format!("\n[[joint]]\nname = \"J{i}\"\nacceleration = {a}\n")).collect::<String>();
+    let part = "G21 G90\nT1 M6\nG43 H1\nG0 X10 Y10 Z20\nG64 P2\nG1 Z0 F6000\nX60\nY60\nX10\nY10\nG61\nG1 X60\nY60\nG0 Z20\nM30\n";
+    let times = |m: &Machine| {
+        let s = planned(part, m).unwrap_or_else(|e| panic!("{}", messages(&e, part))).summary;
+        (s.cut_seconds, s.rapid_seconds, s.accelerates)
+    };
+    let (plain, soft, hard, stiff) = (times(&cell()), times(&with(&all(100.0))), times(&with(&all(1e9))), times(&with(&all(1000.0))));
+    assert!(!plain.2 && soft.2);
+    assert!((hard.0 - plain.0).abs() < 1e-3 && (hard.1 - plain.1).abs() < 1e-3, "{plain:?} {hard:?}");
+    assert!(plain.0 < stiff.0 && stiff.0 < soft.0 && plain.1 < stiff.1 && stiff.1 < soft.1, "{plain:?} {stiff:?} {soft:?}");
+    // Rounded corners cost less than stops.
+    let tight = part.replace("G64 P2", "G61");
+    let stops = planned(&tight, &with(&all(100.0))).unwrap().summary.cut_seconds;
+    assert!(soft.0 < stops - 0.1, "{} {stops}", soft.0);
 }

@@ -93,7 +93,7 @@ impl Check<'_> {
         let alias = known.alias;
         let values = self.file.values_of(n);
         let count = gr_p21::members(values).count();
-        let fits = known.rows.iter().copied().find(|r| self.schema.entities[*r as usize].attributes.len() == count);
+        let fits = known.rows.iter().copied().find(|r| self.schema.entities[*r as usize].attributes().len() == count);
         let Some(row) = fits.or(known.rows.first().copied()) else {
             let keyword = self.file.keyword(n);
             if !keyword.starts_with('!') && !keyword.is_empty() {
@@ -115,7 +115,7 @@ impl Check<'_> {
             self.arity(n, entity, count);
             return;
         }
-        for (attribute, value) in entity.attributes.iter().zip(gr_p21::members(values)) {
+        for (attribute, value) in entity.attributes().iter().zip(gr_p21::members(values)) {
             let kind = value[0].kind();
             if kind == Kind::Unset {
                 if !attribute.optional && matches!(attribute.ty, Type::String) {
@@ -214,9 +214,9 @@ impl Check<'_> {
         };
         let inherited: Vec<&str> = (entity.supertypes.iter())
             .filter_map(|up| schema.find(&up.to_ascii_uppercase()).first())
-            .flat_map(|up| schema.entity(*up).attributes.iter().map(|a| a.name))
+            .flat_map(|up| schema.entity(*up).attributes().iter().map(|a| a.name))
             .collect();
-        let own: Vec<&Attribute> = entity.attributes.iter().filter(|a| !inherited.contains(&a.name)).collect();
+        let own: Vec<&Attribute> = entity.attributes().iter().filter(|a| !inherited.contains(&a.name)).collect();
         let names: Vec<&str> = own.iter().map(|a| a.name).collect();
         if self.own_count(p, entity.keyword, &names, count) {
             return;
@@ -261,7 +261,7 @@ impl Check<'_> {
         // The standard's own example 1 writes CUTTING_COMPONENT with four of its five attributes.
         let code = if entity.keyword == "CUTTING_COMPONENT" && count == 4 { code::STEP_SHORT_CUTTING_COMPONENT } else { code::STEP_ATTRIBUTE_COUNT };
         let full = self.schema.find(entity.keyword).first().map_or(entity, |e| self.schema.entity(*e));
-        let names: Vec<&str> = full.attributes.iter().map(|a| a.name).collect();
+        let names: Vec<&str> = full.attributes().iter().map(|a| a.name).collect();
         let args = vec![entity.keyword.into(), names.len().to_string(), count.to_string(), names.join(", ")];
         self.fault(code, self.keyword_span(n), args);
     }

@@ -1,5 +1,7 @@
 //! Everything there is to say about a file: Part 21, schema, rules and lints, one message per mistake.
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use gr_p21::{Exchange, Fault};
 use gr_spec::{Severity, code};
 use gr_text::{Diagnostic, FileId, Fix, Span};
@@ -39,6 +41,8 @@ pub fn diagnostics_of(text: &[u8], exchange: &Exchange, file: FileId) -> Vec<Dia
         // What was cut off is referred to: that is the same mistake.
         out.list.retain(|d| d.code != code::P21_DANGLING_REFERENCE);
     }
+    out.lost_names();
+    out.in_comments();
     out.list.sort_by_key(|d| (d.primary().1.start, d.primary().1.end));
     out.list
 }
@@ -61,6 +65,27 @@ fn understood(model: &Model<'_>, kind: Dialect) -> bool {
 
 /// Of more choices than these none is proposed.
 const MOST_CHOICES: usize = 4;
+
+/// Names of instances inside of comments, and where the comment begins.
+fn swallowed(text: &[u8]) -> BTreeMap<&[u8], usize> {
+    let find = |from: usize, what: &[u8]| text.get(from..)?.windows(2).position(|w| w == what).map(|n| from + n);
+    let mut out = BTreeMap::new();
+    let mut at = 0;
+    while let Some(begin) = find(at, b"/*") {
+        let end = find(begin + 2, b"*/").unwrap_or(text.len());
+        let mut from = begin + 2;
+        while let Some(n) = text[from..end].iter().position(|b| *b == b'#') {
+            let name = from + n;
+            let digits = text[name + 1..end].iter().take_while(|b| b.is_ascii_digit()).count();
+            from = name + 1 + digits;
+            if digits > 0 && text[from..end].trim_ascii_start().starts_with(b"=") {
+                out.entry(&text[name..from]).or_insert(begin);
+            }
+        }
+        at = end;
+    }
+    out
+}
 
 struct Out<'a> {
     text: &'a [u8],
@@ -198,6 +223,52 @@ impl Out<'_> {
                 }
                 None => !self.list.is_empty(),
             },
+        }
+    }
+
+    /// An instance whose name is damaged is missed where it is referred to: that is one mistake.
+    fn lost_names(&mut self) {
+        let nameless = |d: &Diagnostic| {
+            let before = self.text[..d.primary().1.start as usize].trim_ascii_end();
+            let begins = before.ends_with(b";") || before.strip_suffix(b"#").is_some_and(|b| b.trim_ascii_end().ends_with(b";"));
+            d.code == code::P21_DUPLICATE_ID || d.code == code::P21_UNEXPECTED && begins
+        };
+        let wanted = |d: &Diagnostic| {
+            let written = self.text.get(d.primary().1.range()).unwrap_or_default();
+            (d.code == code::P21_DANGLING_REFERENCE).then(|| String::from_utf8_lossy(written).into_owned())
+        };
+        let missing: BTreeSet<String> = self.list.iter().filter_map(wanted).collect();
+        let nameless: Vec<usize> = (0..self.list.len()).filter(|n| nameless(&self.list[*n])).collect();
+        if missing.is_empty() || missing.len() > nameless.len() {
+            return;
+        }
+        let names = missing.into_iter().collect::<Vec<_>>().join(", ");
+        self.list[nameless[0]].notes.push(format!("other instances refer to {names}, which no instance is: its name may be lost here"));
+        self.list.retain(|d| d.code != code::P21_DANGLING_REFERENCE);
+    }
+
+    /// Instances that a comment has swallowed are told once for each comment.
+    fn in_comments(&mut self) {
+        let missed = |d: &Diagnostic| d.code == code::P21_DANGLING_REFERENCE;
+        if !self.list.iter().any(missed) {
+            return;
+        }
+        let swallowed = swallowed(self.text);
+        let mut told: BTreeMap<usize, usize> = BTreeMap::new();
+        for mut d in std::mem::take(&mut self.list) {
+            let written = self.text.get(d.primary().1.range()).unwrap_or_default();
+            let comment = swallowed.get(written).copied().filter(|_| missed(&d));
+            let before = comment.map_or(0, |c| {
+                let n = told.entry(c).or_default();
+                *n += 1;
+                *n - 1
+            });
+            if let Some(c) = comment.filter(|_| before == 0) {
+                d = d.label(self.file, Span::new(c as u32, c as u32 + 2), "it stands inside this comment");
+            }
+            if before == 0 {
+                self.list.push(d);
+            }
         }
     }
 

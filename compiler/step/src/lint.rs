@@ -266,27 +266,11 @@ impl<'m> Lints<'m, '_> {
 
     /// Ratios and angles, wherever they stand.
     fn numbers(&mut self) {
-        // Places of ratios and angles by row of the table.
-        let mut places: BTreeMap<&'static str, Vec<(usize, &'static str, bool)>> = BTreeMap::new();
-        for e in &crate::schema::schema().entities {
-            for (n, a) in e.attributes.iter().enumerate() {
-                if a.written == "plane_angle_measure" || a.written == "positive_ratio_measure" {
-                    let row = places.entry(e.keyword).or_default();
-                    if !row.iter().any(|r| r.0 == n) {
-                        row.push((n, a.name, a.written == "plane_angle_measure"));
-                    }
-                }
-            }
-        }
-        let keywords = &self.model.file().keywords;
-        let wanted: Vec<Option<&Vec<(usize, &'static str, bool)>>> = keywords
-            .iter()
-            .map(|k| places.get(crate::model::resolve(crate::schema::schema(), k).alias.unwrap_or(k)))
-            .collect();
+        let known = |k: &'m str| crate::model::resolve(crate::schema::schema(), k).alias.unwrap_or(k);
+        let wanted: Vec<Vec<Measure>> = self.model.file().keywords.iter().map(|k| measures(known(k))).collect();
         for node in self.model.instances() {
             let keyword = self.model.file().instances[node.index() as usize].keyword as usize;
-            let Some(row) = wanted[keyword] else { continue };
-            for (place, name, angle) in row {
+            for (place, name, angle) in &wanted[keyword] {
                 let Some(v) = node.parameters().nth(*place) else { continue };
                 let Some(number) = v.real() else { continue };
                 if *angle {
@@ -575,6 +559,24 @@ impl<'m> Lints<'m, '_> {
 }
 
 /// Height of the top of the block a workpiece is bounded by.
+/// Place, name and kind (an angle) of a parameter that is a ratio or an angle.
+type Measure = (usize, &'static str, bool);
+
+/// Those of a keyword, in any edition.
+fn measures(keyword: &str) -> Vec<Measure> {
+    let schema = crate::schema::schema();
+    let mut out: Vec<Measure> = Vec::new();
+    for row in schema.find(keyword) {
+        for (n, a) in schema.entity(*row).attributes().iter().enumerate() {
+            let angle = a.written == "plane_angle_measure";
+            if (angle || a.written == "positive_ratio_measure") && out.iter().all(|m| m.0 != n) {
+                out.push((n, a.name, angle));
+            }
+        }
+    }
+    out
+}
+
 fn block_top(workpiece: Node<'_>) -> Option<f64> {
     let block = workpiece.node("its_bounding_geometry")?;
     let corner = frame(block.node("position")?)?;

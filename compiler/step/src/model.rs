@@ -98,7 +98,7 @@ impl<'a> Model<'a> {
         Some(Node { model: self, n: n as u32 })
     }
     fn known_is_a(&self, known: &Known, kind: &str) -> bool {
-        known.rows.iter().any(|r| self.schema.entities[*r as usize].is_a.iter().any(|n| self.schema.text_of(*n) == kind))
+        self.schema.name(kind).is_some_and(|kind| known.rows.iter().any(|r| self.schema.entities[*r as usize].is_a.contains(&kind)))
     }
 }
 
@@ -167,7 +167,7 @@ impl<'m> Node<'m> {
         let rows = &self.known().rows;
         if rows.len() > 1 && !self.complex() {
             let count = self.parameters().count();
-            if let Some(row) = rows.iter().find(|r| schema.entities[**r as usize].attributes.len() == count) {
+            if let Some(row) = rows.iter().find(|r| schema.entities[**r as usize].attributes().len() == count) {
                 return Some(&schema.entities[*row as usize]);
             }
         }
@@ -197,7 +197,7 @@ impl<'m> Node<'m> {
         if self.complex() {
             return self.part_attr(name);
         }
-        let place = self.entity()?.attributes.iter().position(|a| a.name == name)?;
+        let place = self.entity()?.attributes().iter().position(|a| a.name == name)?;
         self.parameters().nth(place)
     }
     /// Parts of a complex instance have only their own attributes: the last ones of the entity.
@@ -206,8 +206,8 @@ impl<'m> Node<'m> {
             let row = resolve(self.model.schema, &keyword).rows.first().copied();
             let Some(entity) = row.map(|r| &self.model.schema.entities[r as usize]) else { continue };
             let count = gr_p21::members(values).count();
-            let inherited = entity.attributes.len().saturating_sub(count);
-            if let Some(place) = entity.attributes.iter().skip(inherited).position(|a| a.name == name) {
+            let inherited = entity.attributes().len().saturating_sub(count);
+            if let Some(place) = entity.attributes().iter().skip(inherited).position(|a| a.name == name) {
                 return gr_p21::members(values).nth(place).map(|values| Val { model: self.model, values });
             }
         }

@@ -28,12 +28,23 @@ pub struct Entity {
     pub is_abstract: bool,
     /// Direct supertypes.
     pub supertypes: Vec<&'static str>,
-    /// In Part 21 order, inherited ones first.
-    pub attributes: Vec<Attribute>,
+    /// Attributes as the table has them: most files need a few entities only, so that these are read when asked for.
+    written: &'static str,
+    read: OnceLock<Vec<Attribute>>,
     /// WHERE rules as the table has them.
     pub rules: &'static str,
     /// Everything it is, itself included: keywords in lower case.
     pub is_a: Vec<Name>,
+}
+
+impl Entity {
+    /// In Part 21 order, inherited ones first.
+    pub fn attributes(&self) -> &[Attribute] {
+        self.read.get_or_init(|| {
+            let schema = schema();
+            self.written.split("; ").filter(|a| !a.is_empty()).map(|a| schema.attribute(a)).collect()
+        })
+    }
 }
 
 /// A lower-case name, by number.
@@ -100,6 +111,8 @@ pub struct Schema {
     by_keyword: FxHashMap<&'static str, Vec<EntityId>>,
     names: FxHashMap<&'static str, Name>,
     texts: Vec<&'static str>,
+    /// Defined types, enumerations and selects.
+    types: FxHashMap<&'static str, &'static str>,
 }
 
 static ENTITIES: &str = include_str!("../../../spec/step/entities.tsv");
@@ -167,9 +180,8 @@ impl Schema {
         for (text, name) in &names {
             texts[name.0 as usize] = text;
         }
-        let mut schema = Schema { entities: Vec::with_capacity(rows.len()), by_keyword: FxHashMap::default(), names, texts };
+        let mut schema = Schema { entities: Vec::with_capacity(rows.len()), by_keyword: FxHashMap::default(), names, texts, types };
         for (i, row) in rows.iter().enumerate() {
-            let attributes = row[5].split("; ").filter(|a| !a.is_empty()).map(|a| schema.attribute(a, &types)).collect();
             let mut is_a = Vec::new();
             let mut todo = vec![lower[i].as_str()];
             let mut direct = Some(list(row[4]));
@@ -193,7 +205,8 @@ impl Schema {
                 edition: Edition { part: row[0], text: row[1] },
                 is_abstract: row[3] == "A",
                 supertypes: list(row[4]),
-                attributes,
+                written: row[5],
+                read: OnceLock::new(),
                 rules: row.get(6).copied().unwrap_or(""),
                 is_a,
             });
@@ -201,18 +214,18 @@ impl Schema {
         schema
     }
 
-    fn attribute(&self, text: &'static str, types: &FxHashMap<&'static str, &'static str>) -> Attribute {
+    fn attribute(&self, text: &'static str) -> Attribute {
         let (name, written) = text.split_once(':').unwrap_or((text, ""));
         let written = written.trim();
         Attribute {
             name: name.trim_end_matches('?'),
             optional: name.ends_with('?'),
-            ty: self.ty(written, types, 0),
+            ty: self.ty(written, 0),
             written,
         }
     }
 
-    fn ty(&self, written: &'static str, types: &FxHashMap<&'static str, &'static str>, depth: u32) -> Type {
+    fn ty(&self, written: &'static str, depth: u32) -> Type {
         let w = written.trim();
         if depth > 12 {
             return Type::Any;
@@ -230,7 +243,7 @@ impl Schema {
             let of = of.trim_start();
             let of = of.strip_prefix("OF").or(of.strip_prefix("of")).unwrap_or(of).trim_start();
             let of = of.strip_prefix("UNIQUE").unwrap_or(of);
-            return Type::Aggregate { low, high, of: Box::new(self.ty(of, types, depth + 1)), unique: kind == "SET" };
+            return Type::Aggregate { low, high, of: Box::new(self.ty(of, depth + 1)), unique: kind == "SET" };
         }
         if let Some(rest) = w.strip_prefix("ENUMERATION OF") {
             return Type::Enumeration(inner(rest));
@@ -238,7 +251,7 @@ impl Schema {
         if let Some(rest) = w.strip_prefix("SELECT") {
             let (mut instances, mut values) = (Vec::new(), Vec::new());
             for member in inner(rest) {
-                match self.ty(member, types, depth + 1) {
+                match self.ty(member, depth + 1) {
                     Type::Instance(mut n) => instances.append(&mut n),
                     Type::Select { instances: mut i, values: mut v } => {
                         instances.append(&mut i);
@@ -256,8 +269,8 @@ impl Schema {
             "STRING" => Type::String,
             "BOOLEAN" => Type::Boolean,
             "LOGICAL" => Type::Logical,
-            _ => match types.get(w) {
-                Some(definition) => self.ty(definition, types, depth + 1),
+            _ => match self.types.get(w) {
+                Some(definition) => self.ty(definition, depth + 1),
                 None => self.names.get(w).map_or(Type::Any, |n| Type::Instance(vec![*n])),
             },
         }
@@ -299,7 +312,7 @@ mod tests {
         let unknown: Vec<String> = schema()
             .entities
             .iter()
-            .flat_map(|e| e.attributes.iter().map(move |a| (e, a)))
+            .flat_map(|e| e.attributes().iter().map(move |a| (e, a)))
             .filter(|(_, a)| a.written != "*derived*")
             .filter(|(_, a)| {
                 let mut ty = &a.ty;

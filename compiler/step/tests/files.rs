@@ -227,3 +227,32 @@ fn a_cut_file_is_told_once() {
         assert!(errors.iter().all(|d| d.code != code::P21_DANGLING_REFERENCE), "cut at {at}: {errors:#?}");
     }
 }
+
+/// An instance whose name is damaged is missed elsewhere: still one message.
+#[test]
+fn a_lost_name_is_one_message() {
+    let healthy = include_str!("../../../docs/examples/stepnc/case-study.p21");
+    for head in ["#0=", "#-18=", "#4=", "// #18=", "#=", "# 18x="] {
+        let text = healthy.replacen("#18=MILLING", &format!("{head}MILLING"), 1);
+        assert_ne!(text, healthy);
+        let all: Vec<Diagnostic> = diagnostics(&text).into_iter().filter(|d| d.severity == Severity::Error).collect();
+        let places: Vec<_> = all.iter().map(|d| (d.code.def().code, d.message.clone())).collect();
+        assert_eq!(all.len(), 1, "{head}: {places:?}");
+        let line = LineIndex::new(text.as_bytes()).position(all[0].primary().1.start).0;
+        assert_eq!(line, text[..text.find(&format!("{head}MILLING")).unwrap_or(0)].matches('\n').count() as u32, "{head}");
+    }
+    // Without such a name each reference is told.
+    let text = healthy.replacen("#18=MILLING", "#999018=MILLING", 1);
+    assert!(diagnostics(&text).iter().any(|d| d.code == code::P21_DANGLING_REFERENCE));
+}
+
+/// A comment that ends later than was meant: one message, which points at it.
+#[test]
+fn instances_inside_a_comment_are_told_once() {
+    let healthy = include_str!("../../../docs/examples/stepnc/case-study.p21");
+    let text = healthy.replacen("#18=MILLING", "/* #18=MILLING", 1).replacen("#26=MILLING", "*/ #26=MILLING", 1);
+    let all: Vec<Diagnostic> = diagnostics(&text).into_iter().filter(|d| d.severity == Severity::Error).collect();
+    assert_eq!(all.len(), 1, "{all:?}");
+    let comment = all[0].labels.iter().find(|l| l.text.contains("comment")).expect("a label");
+    assert_eq!(comment.span.start as usize, text.find("/* #18").unwrap_or(0));
+}

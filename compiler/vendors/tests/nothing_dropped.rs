@@ -147,7 +147,7 @@ fn motion(text: &str) -> gr_ir::Program {
 fn planned(operation: &str, machine: &Machine, own_words: bool) -> Result<Planned, Vec<Diagnostic>> {
     let text = format!("M61 Q1\nG64 P0.1\nG0 X0 Y0 Z20\nG1 X20 F600\nG1 X25\n{operation}\nG1 X60 Y10 F600\nG1 X70\nG0 Z20\nM30\n");
     let texts = Texts::new([(FileId(0), text.as_str())]);
-    let mut planned = plan(&motion(&text), machine, &texts, &Options { own_words, ..Options::default() })?;
+    let mut planned = plan(&motion(&text), machine, &texts, &Options { own_words, probing: !own_words, ..Options::default() })?;
     // Lines of the source stand in remarks: they would show in any case.
     planned.program.steps.iter_mut().for_each(|s| s.source = None);
     Ok(planned)

@@ -276,6 +276,34 @@ test("build writes the program", function()
   contains(table.concat(vim.fn.readfile(scratch .. "/build/flange.ngc"), "\n"), "M30")
 end)
 
+test("build is told the settings of the server", function()
+  local buffer = open("docs/examples/flange.ngc", "told.ngc")
+  local client = clients(buffer)[1]
+  local settings = { gccRobot = { tools = scratch .. "/told.tbl", blockDelete = true } }
+  vim.fn.writefile({ "T1 P1 Z71 D10", "T2 P2 Z72 D6.8", "T3 P3 Z73 D4.2" }, scratch .. "/told.tbl")
+  client.config.settings = settings
+  client.settings = settings
+  client.notify("workspace/didChangeConfiguration", { settings = settings })
+  wait("the settings", function()
+    local told = request(buffer, "gccRobot/buildOptions", { textDocument = { uri = vim.uri_from_bufnr(buffer) } })
+    return vim.tbl_contains(told.options, "--block-delete")
+  end)
+  local run, command = require("gcc-robot.program").run, nil
+  require("gcc-robot.program").run = function(program, arguments)
+    command = table.concat(arguments, " ")
+    return run(program, arguments)
+  end
+  require("gcc-robot.commands").build({ "canon" })
+  contains(command, "--tools " .. scratch .. "/told.tbl --block-delete")
+  contains(table.concat(vim.fn.readfile(scratch .. "/build/told.canon"), "\n"), "71.0000")
+  -- What is named by hand is not named twice.
+  require("gcc-robot.commands").build({ "canon", "-t", top .. "/docs/examples/tools.tbl" })
+  require("gcc-robot.program").run = run
+  assert(not command:find("told.tbl", 1, true), command)
+  client.config.settings, client.settings = {}, {}
+  client.notify("workspace/didChangeConfiguration", { settings = { gccRobot = {} } })
+end)
+
 test("output beside the source; cursors go together", function()
   local buffer = open("docs/examples/flange.ngc", "beside.ngc")
   local here = vim.api.nvim_get_current_win()

@@ -4,7 +4,7 @@ import { dirname, join } from "node:path";
 import * as vscode from "vscode";
 import { formatOptions, type Outputs, parseOptions } from "./output";
 import type { Previews } from "./preview";
-import { type Choice, choices, explain } from "./protocol";
+import { buildOptions, type Choice, choices, explain } from "./protocol";
 import { LANGUAGES, type Server } from "./server";
 import { task } from "./tasks";
 
@@ -57,8 +57,8 @@ async function build(context: vscode.ExtensionContext, server: Server) {
   await source.save();
   const folder = join(dirname(source.uri.fsPath), "build");
   await vscode.workspace.fs.createDirectory(vscode.Uri.file(folder));
-  const machine = vscode.workspace.getConfiguration("gccRobot", source.uri).get<string>("machine");
-  const args = machine ? ["--machine", machine] : [];
+  const textDocument = { uri: source.uri.toString() };
+  const args = (await server.running()?.sendRequest(buildOptions, { textDocument }))?.options ?? [];
   const definition = {
     type: "gcc-robot",
     command: "build" as const,

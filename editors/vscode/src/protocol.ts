@@ -40,6 +40,9 @@ export const output = new RequestType<
   void
 >("gccRobot/output");
 
+/** The settings as options of `gcc-robot build`, so that what is built is what is shown. */
+export const buildOptions = new RequestType<Document, { options: string[] }, void>("gccRobot/buildOptions");
+
 /** Something that can be chosen. */
 export interface Choice {
   id: string;

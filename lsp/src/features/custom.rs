@@ -12,7 +12,7 @@ use super::Answer;
 use crate::documents::{Kind, Motion, View};
 use crate::host::{Made, OutputJob};
 use crate::protocol::custom::{
-    BlockFacts, Choice, Choices, Explanation, Modes, Output, OutputFile, OutputParams, PreviewParams, State as StateAnswer, base64, integers,
+    BlockFacts, BuildOptions, Choice, Choices, Explanation, Modes, Output, OutputFile, OutputParams, PreviewParams, State as StateAnswer, base64, integers,
 };
 
 /// The tool path: `gr_backends::plot::Trace` as JSON (`docs/editor-features.md`).
@@ -92,6 +92,13 @@ pub fn output(mut view: View, p: &OutputParams) -> Answer<Output> {
         }
     }
     Ok(out)
+}
+
+/// The options with which `gcc-robot build` runs the document as it is run here.
+pub fn build_options(mut view: View) -> Answer<BuildOptions> {
+    view.release();
+    let dialect = if let Kind::Gcode(_, dialect) = view.kind { Some(dialect) } else { None };
+    Ok(BuildOptions { options: view.settings.options(dialect) })
 }
 
 /// A value as an option of the command has it; none: the option is not given.

@@ -83,11 +83,20 @@ pub fn diagnose(mut view: View) -> Answer<(Vec<Diagnostic>, Elsewhere)> {
         }
         Kind::Exchange => {
             view.release();
+            if view.is_overtaken() {
+                return Err(Failure::Overtaken);
+            }
             let exchange = view.exchange();
+            if view.is_overtaken() {
+                return Err(Failure::Overtaken);
+            }
             if exchange.text.len() > MOST_PLANNED {
                 gr_step::diagnostics_of(exchange.text.as_bytes(), &exchange.tables, FileId(0))
             } else {
-                return Ok((view.host.check_exchange(&view.path, &exchange.text, &view.station), others));
+                let mut found = view.host.check_exchange(&view.path, &exchange.text, &view.station);
+                let motion = if asks_machine(&view, &found) { view.motion()? } else { None };
+                found.extend(motion.into_iter().flat_map(|m| of_machine(&view, &m)));
+                return Ok((found, others));
             }
         }
         Kind::Config(schema) => {
@@ -141,18 +150,13 @@ const TOO_LARGE: &str = "the program is too large to be planned while it is edit
 /// Whether the chosen machine is asked what it can't do: when the program itself is good.
 fn asks_machine(view: &View, found: &[Diagnostic]) -> bool {
     let good = found.iter().all(|d| d.severity != Severity::Error);
-    let machine = view.station.machine.as_ref().is_some_and(|m| gr_robot::along::is_planned(m));
+    let machine = view.station.machine.as_ref().is_some_and(|m| gr_robot::opinion::has_a_say(m));
     good && machine && view.text.len() <= MOST_FOR_A_ROBOT && !view.is_overtaken()
 }
 
 /// What the chosen machine has to say about the document.
 fn of_machine(view: &View, motion: &Motion) -> Vec<Diagnostic> {
-    let Some(planning) = view.planning(motion) else { return Vec::new() };
-    let found = match &*planning {
-        Ok(planned) => &planned.warnings,
-        Err(found) => found,
-    };
-    found.iter().filter(|d| d.primary().0 == motion.main).cloned().collect()
+    view.opinion(motion).into_iter().filter(|d| d.primary().0 == motion.main).collect()
 }
 
 /// A `.gcode` file of which nobody says what control it is for: mostly a printer's. Its spelling alone is looked at.

@@ -78,6 +78,14 @@ pub struct OutputFile {
     pub lines: String,
 }
 
+/// `gccRobot/buildOptions`: what `gcc-robot build` must be told to make of the document, as it is saved, what is shown.
+#[derive(Serialize, Clone, Debug, Default, PartialEq)]
+#[serde(rename_all = "camelCase")]
+pub struct BuildOptions {
+    /// Words for the command line: the settings; the project file is found from the program's folder.
+    pub options: Vec<String>,
+}
+
 /// `gccRobot/state`: everything about a block.
 #[derive(Deserialize, Serialize, Clone, Debug)]
 #[serde(rename_all = "camelCase")]

@@ -6,7 +6,7 @@
 //! count from there, and at the zero itself there is none.
 
 use super::{Correction, Corrector, halved};
-use crate::words::{Asked, Slides, Words, frame, rotary, slid, started, tool};
+use crate::words::{Asked, Slides, Words, as_far_as_known, frame, rotary, slid, started, tool};
 use gr_ir::{Axes, Builder, FeedMode, Op, Pose, Program, Source, Sources, State, geometry};
 use gr_machine::math::{Frame, V3, add, rotate, sub, transpose};
 use gr_machine::{Kinematics, KinematicsError, Machine};
@@ -160,7 +160,7 @@ impl Run<'_> {
     }
 
     fn by_joints(&self, asked: &Asked, sliding: &[usize; 3], turning: &[(usize, usize)]) -> Result<(V3, f64), KinematicsError> {
-        let joints = started(self.machine, asked, sliding, turning);
+        let joints = as_far_as_known(self.machine, &started(self.machine, asked, sliding, turning), turning);
         let (nominal, real) = (&*self.corrector.nominal, &*self.corrector.real);
         let planned = slid(nominal, &joints, sliding, asked)?;
         let sent = slid(real, &planned, sliding, asked)?;

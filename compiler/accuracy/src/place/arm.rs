@@ -109,7 +109,7 @@ impl<'a> Arm<'a> {
         }
         let turns = turns(&parts);
         let most =
-            parts.first().map_or(0.0, |p| p.probe.extent().iter().map(|(low, high)| high - low).fold(0.0, f64::max));
+            parts.first().map_or(0.0, |p| p.probe.flange_extent().iter().map(|(low, high)| high - low).fold(0.0, f64::max));
         let few = if turns.len() <= TURNS {
             let one = |(n, p): (usize, &Part<'a>)| {
                 telling(p.cuts.min(p.points.len()), |i| p.points[i]).into_iter().map(move |k| (n, k))
@@ -157,7 +157,7 @@ impl<'a> Arm<'a> {
     }
 
     fn extent(&self) -> [(f64, f64); 3] {
-        self.parts.first().map_or([(0.0, 0.0); 3], |p| p.probe.extent())
+        self.parts.first().map_or([(0.0, 0.0); 3], |p| p.probe.flange_extent())
     }
 
     fn reached(&self, points: &[Point], at: V3) -> bool {
@@ -253,7 +253,7 @@ pub fn around(length: f64) -> impl Iterator<Item = V3> {
 
 impl Reach for Arm<'_> {
     fn room(&self) -> Option<[(f64, f64); 3]> {
-        let extent = self.parts.first()?.probe.extent();
+        let extent = self.parts.first()?.probe.flange_extent();
         Some([0, 1, 2].map(|i| {
             let (low, high) = (extent[i].0 - self.span[i].0, extent[i].1 - self.span[i].1);
             if low <= high { (low, high) } else { ((low + high) / 2.0, (low + high) / 2.0) }
@@ -298,7 +298,7 @@ impl Reach for Arm<'_> {
             let probe = self.probe(group);
             let points: Vec<V3> = group.points.iter().map(|p| add(at, *p)).collect();
             let most = about + 2.0 * group.lattice.step();
-            let most = probe.extent().map(|(low, high)| if high > low { most } else { 0.0 });
+            let most = probe.flange_extent().map(|(low, high)| if high > low { most } else { 0.0 });
             border(&points, most, nodes(probe), &|f| probe.reaches(sub(f, group.offset)))
         };
         groups

@@ -103,7 +103,7 @@ impl Mill<'_> {
         let zero = self.at_zero(state);
         let (source, turns, rotary, point) = (view.source, self.walk.turning, asked.rotary, asked.tip);
         let (axis, lever) = (stand.axis, stand.lever);
-        self.walk.record(&Spot { place, source, joints: stand.joints, point, lever, feed, zero, axis, speed, turns, rotary });
+        self.walk.record(&Spot { place, source, joints: stand.joints, point, tool: asked.tool, lever, feed, zero, axis, speed, turns, rotary });
     }
 
     /// What moves the tool point at the program's zero: the part was touched there, so errors count from there.

@@ -131,7 +131,7 @@ pub(super) fn lowest_crossing(program: &Program, state: &State) -> Option<f64> {
 }
 
 /// Turning: the first cut is in the plane of X and Z, and nothing ever moves in Y.
-pub(super) fn is_lathe(program: &Program) -> bool {
+pub(crate) fn is_lathe(program: &Program) -> bool {
     let mut cursor = program.cursor();
     while let Some(view) = cursor.next() {
         if view.op.feeds() {

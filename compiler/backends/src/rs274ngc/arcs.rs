@@ -68,7 +68,9 @@ impl Emitter<'_> {
     fn arc_as_lines(&mut self, view: &View<'_, '_>, sweep: &Sweep, from: f64, to: f64) {
         let pieces = sweep.shape.pieces(self.options.arc_tolerance) as f64 * (to - from);
         let pieces = libm::ceil(pieces).max(1.0) as usize;
+        self.rounding = true;
         self.lines(pieces, view.state, view.source, &|share| sweep.at(from + (to - from) * share));
+        self.rounding = false;
     }
 
     fn part(
@@ -219,7 +221,10 @@ impl Emitter<'_> {
             self.plane = plane;
         }
         let mut line = vec![if turns > 0 { "G3".to_string() } else { "G2".to_string() }];
-        let words = self.axis_words(start, end, view.source, &[f, s]);
+        self.rounding = true;
+        let forced: Vec<usize> = [f, s].into_iter().filter(|i| self.is_placed(*i, start, end, view.source)).collect();
+        let words = self.axis_words(start, end, view.source, &forced);
+        self.rounding = false;
         let far = words.iter().find(|w| {
             let axis = AXES.iter().position(|a| w.starts_with(*a)).unwrap_or(0);
             match self.options.language {

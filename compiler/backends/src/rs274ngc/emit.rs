@@ -9,6 +9,8 @@ use gr_text::{Code, Diagnostic, FileId, Findings, code};
 
 /// Decimals of compensated contours at least.
 const CONTOUR_PLACES: usize = 7;
+/// Codes, times ten, of the work offsets by their numbers.
+const SYSTEMS: [u32; 10] = [0, 540, 550, 560, 570, 580, 590, 591, 592, 593];
 /// Findings reported at most.
 const MOST_FAULTS: usize = 100;
 
@@ -70,6 +72,19 @@ pub(super) struct Emitter<'a> {
     last_fault: Option<(Source, Code)>,
     /// Operations before this one were written already, together with an earlier one.
     pub done_until: usize,
+    /// The axis across the working plane: cycles move it by R and not by its own letter.
+    pub across: usize,
+    /// Inside a pass of a canned cycle, whose words may be of an earlier block.
+    pub cycling: bool,
+    /// An arc is being written, whose R is a radius.
+    pub rounding: bool,
+    /// The work offset in force was said.
+    pub said_system: bool,
+    /// The program has named a way to follow the path: G61, G61.1, G64.
+    pub said_path: bool,
+    /// The way to follow the path that only the machine knows is kept by M70, to come back with M72.
+    pub kept_path: bool,
+    last_source: Option<Source>,
 }
 
 impl<'a> Emitter<'a> {
@@ -100,6 +115,13 @@ impl<'a> Emitter<'a> {
             words_of: None,
             last_fault: None,
             done_until: 0,
+            across: 2,
+            cycling: false,
+            rounding: false,
+            said_system: false,
+            said_path: false,
+            kept_path: false,
+            last_source: None,
         }
     }
 
@@ -159,6 +181,15 @@ impl<'a> Emitter<'a> {
                 self.adrift |= units != self.units && self.frame.tool_offset != [0.0; 9];
                 self.units = units;
             }
+            self.across = across(view.state.plane);
+            match view.op {
+                Op::Begin { marker: Marker::Cycle, .. } => self.cycling = true,
+                Op::Close(Marker::Cycle) => self.cycling = false,
+                _ => {}
+            }
+            if index >= skip && !self.said_system {
+                self.say_system(&view);
+            }
             if index < skip || index < self.done_until || (epilogue.start..epilogue.end).contains(&index) {
                 self.follow_silently(&view);
             } else if let Op::End = view.op {
@@ -169,6 +200,36 @@ impl<'a> Emitter<'a> {
             }
         }
         self.footer(ends);
+    }
+
+    /// A work offset that the source selects is selected here too, also where the simulation has it already: the control
+    /// may not.
+    fn say_system(&mut self, view: &View<'_, '_>) {
+        const MOST_LINES: u32 = 1000;
+        let source = view.source;
+        let last = self.last_source.replace(source);
+        if matches!(view.op, Op::WorkOffset(..)) {
+            self.said_system = true;
+            return;
+        }
+        let Some(code) = SYSTEMS.get(usize::from(view.state.work)).copied().filter(|c| *c > 0) else {
+            return;
+        };
+        // A line that selects what is in force asks for no operation: it lies between two that do.
+        let from = match last {
+            Some(l) if l == source => return,
+            Some(l) if l.file == source.file && l.frame == source.frame && l.line < source.line => l.line + 1,
+            None if source.line < MOST_LINES && source.file == FileId(0) => 0,
+            _ => source.line,
+        };
+        let lines = from.max(source.line.saturating_sub(MOST_LINES))..=source.line;
+        let words: Vec<Words> = lines.filter_map(|l| Words::at(self.sources, source.file, l)).collect();
+        let jumps = words.iter().rev().skip(1).any(|w| w.has(b'o'));
+        let own = words.last().is_some_and(|w| w.g(code));
+        if own || !jumps && words.iter().any(|w| w.g(code)) {
+            self.said_system = true;
+            self.w.block(super::settings::OFFSETS[usize::from(view.state.work)]);
+        }
     }
 
     fn end(&mut self, index: usize) {
@@ -230,6 +291,7 @@ impl<'a> Emitter<'a> {
         let plane = plane_word(self.plane);
         let rest = match self.options.language {
             Language::Linuxcnc if self.options.arcs == super::Arcs::IjkAbsolute => "G40 G80 G90 G90.1 G94",
+            Language::Linuxcnc if turns(self.program, self.sources) => "G8 G40 G80 G90 G91.1 G94",
             Language::Linuxcnc => "G40 G80 G90 G91.1 G94",
             Language::FanucMill => "G40 G80 G90 G94",
             Language::Grbl => "G40 G80 G90 G91.1 G94",
@@ -351,6 +413,27 @@ pub(super) fn plane_word(plane: Plane) -> &'static str {
         Plane::Uv => "G17.1",
         Plane::Uw => "G18.1",
         Plane::Vw => "G19.1",
+    }
+}
+
+/// A program for a lathe: its control may stand in diameter mode (G7), and what is written has radii.
+fn turns(program: &Program, sources: &dyn Sources) -> bool {
+    if crate::from_line::is_lathe(program) {
+        return true;
+    }
+    let files: std::collections::BTreeSet<_> = program.steps().map(|s| s.source.file).collect();
+    let mut lines = files.into_iter().flat_map(|file| (0u32..).map_while(move |l| sources.line(file, l)));
+    lines.any(|text| text.contains(['7', '8']) && (Words::of(text).g(70) || Words::of(text).g(80)))
+}
+
+fn across(plane: Plane) -> usize {
+    match plane {
+        Plane::Xy => 2,
+        Plane::Xz => 1,
+        Plane::Yz => 0,
+        Plane::Uv => 8,
+        Plane::Uw => 7,
+        Plane::Vw => 6,
     }
 }
 

@@ -4,7 +4,7 @@ use super::Language;
 use super::emit::Emitter;
 use super::write::AXES;
 use crate::sources::Words;
-use gr_ir::{Axes, FeedMode, Op, Plane, Pose, Source, State, View};
+use gr_ir::{Axes, FeedMode, Marker, Op, Plane, Pose, Source, State, View};
 
 impl Emitter<'_> {
     /// Whether the language has these axes; an error if not.
@@ -30,10 +30,22 @@ impl Emitter<'_> {
             _ if source.line == crate::from_line::INSERTED => false,
             Some(words) => {
                 let letter = AXES[axis].to_ascii_lowercase() as u8;
-                words.has(letter) || (axis == 2 && words.has(b'r'))
+                // R of a drilling cycle; that of an arc, of a thread or of roughing is no place.
+                let roughing = || [700, 710, 711, 712, 720, 721, 722, 760].into_iter().any(|g| words.g(g));
+                words.has(letter) || (axis == self.across && words.has(b'r') && !self.rounding && !roughing())
             }
             None => axis < 3,
         }
+    }
+
+    /// Whether the number of an axis at the end of an arc is known: it moves there, or a block has named its place.
+    pub fn is_placed(&mut self, axis: usize, start: &Pose, end: &Pose, source: Source) -> bool {
+        self.anchored[axis] || start.axes[axis] != end.axes[axis] || !self.has_text(source) || self.given(axis, source)
+    }
+
+    /// Whether there is a text that says which axes a block names.
+    fn has_text(&mut self, source: Source) -> bool {
+        source.line != crate::from_line::INSERTED && self.words(source).is_some_and(|w| w.names_axes())
     }
 
     /// The axis words of a move. An axis that stands still has no word, so that where an unknown offset or an
@@ -49,7 +61,9 @@ impl Emitter<'_> {
             let (from, to) = (start.axes[i], end.axes[i]);
             let force = forced.contains(&i) || displaced && i < 3;
             let moves = from.to_bits() != to.to_bits() && from != to;
-            if self.loose[i] && !force && !self.given(i, source) {
+            // A height that no block has named since the frame moved is the machine's, whatever a simulation takes it for.
+            let nameless = !self.anchored[i] && i == self.across && !self.cycling && self.has_text(source);
+            if (self.loose[i] || nameless) && !force && !self.given(i, source) {
                 self.at[i] = to;
                 continue;
             }
@@ -122,7 +136,14 @@ impl Emitter<'_> {
         if self.displaced {
             return self.come_back(view);
         }
+        let (across, cycling) = (self.across, self.cycling);
+        if !cycling && !self.anchored[across] && view.start.axes[across] != view.end.axes[across] {
+            // A cycle that goes on goes to its level first.
+            let begins = |s: gr_ir::Step<'_>| s.source == view.source && matches!(s.op, Op::Begin { marker: Marker::Cycle, .. });
+            self.cycling = (1..=3).any(|n| self.program.get(view.index + n).is_some_and(begins));
+        }
         let words = self.axis_words(view.start, view.end, view.source, &[]);
+        self.cycling = cycling;
         self.motion_block(0, &words, &[]);
     }
 

@@ -6,7 +6,7 @@ use super::write::AXES;
 use gr_ir::{Axes, Op, Override, PathMode, Source, Turn, View};
 use gr_text::code;
 
-const OFFSETS: [&str; 10] = ["", "G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3"];
+pub(super) const OFFSETS: [&str; 10] = ["", "G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3"];
 
 /// Height above the place of tool changes in G55, mm.
 const ABOVE_CHANGE: f64 = 5.0;
@@ -89,6 +89,11 @@ impl Emitter<'_> {
             return self.move_frame(view.state);
         }
         let words = self.changed(offset, &self.offsets[index]);
+        if let Some(block) = self.set_here(n, offset, view) {
+            self.w.block(&block);
+            self.offsets[index] = *offset;
+            return self.motion_unsure();
+        }
         if words.is_empty() || !selected {
             self.w.block(OFFSETS[index]);
         }
@@ -107,6 +112,55 @@ impl Emitter<'_> {
         }
     }
 
+    /// G10 L20: the work offset is set so that the place where the tool stands has these numbers. Where that is, and so
+    /// what the offset becomes, only the machine knows. None: the block is something else.
+    fn set_here(&mut self, n: u8, offset: &Axes, view: &View<'_, '_>) -> Option<String> {
+        let words = self.words(view.source)?;
+        let here = words.g(100) && self.number_of('l', view.source) == Some(20) && self.options.language != Language::FanucMill;
+        let number = self.number_of('p', view.source).filter(|p| *p == 0 || *p == u32::from(n));
+        if !here || number.is_none() || self.frame.work != n || self.frame.work_offset == *offset && !words.names_axes() {
+            return None;
+        }
+        let known = self.anchored;
+        self.move_frame(view.state);
+        let mut block = format!("G10 L20 P{n}");
+        for i in (0..9).filter(|i| words.has(AXES[*i].to_ascii_lowercase() as u8)) {
+            let value = match self.named_here(i, known[i], view) {
+                Some(value) => value,
+                None => {
+                    self.cannot("a value for where a probe stopped that is not a plain number", view.source);
+                    view.end.axes[i]
+                }
+            };
+            let (text, said) = self.w.axis_fine(i, value, self.w.places.max(9));
+            block += &format!(" {}{text}", AXES[i]);
+            self.at[i] = said;
+            self.anchored[i] = true;
+        }
+        Some(block)
+    }
+
+    /// What a block (G92, G10 L20) calls the place where an axis stands: where it was written to, which rounding has moved, or
+    /// where only the machine knows, the number of the source. None: that is no plain number.
+    fn named_here(&self, axis: usize, known: bool, view: &View<'_, '_>) -> Option<f64> {
+        if self.loose[axis] {
+            let scale = if axis >= 3 && axis < 6 { 1f64.to_radians() } else if view.state.units == gr_ir::Units::Inch { 25.4 } else { 1.0 };
+            return Some(self.literal(AXES[axis], view.source)? * scale);
+        }
+        // Behind another work offset the place is not known any more; what rounding has moved it by still is.
+        let rounded = (self.at[axis] - view.end.axes[axis]).abs() <= self.w.unit * 10f64.powi(-(self.w.places as i32));
+        Some(if known || rounded { self.at[axis] } else { view.end.axes[axis] })
+    }
+
+    /// The plain number behind a letter of a source line.
+    fn literal(&self, letter: char, source: Source) -> Option<f64> {
+        let line = self.sources.line(source.file, source.line)?;
+        let code = line.split(['(', ';']).next()?.to_ascii_lowercase();
+        let rest = code.split_once(letter.to_ascii_lowercase())?.1.trim_start();
+        let digits: String = rest.chars().take_while(|c| c.is_ascii_digit() || matches!(c, '.' | '-' | '+')).collect();
+        digits.parse().ok()
+    }
+
     fn rotation(&mut self, angle: f64, view: &View<'_, '_>) {
         let index = usize::from(view.state.work.clamp(1, 9));
         if angle != self.rotations[index] {
@@ -123,7 +177,7 @@ impl Emitter<'_> {
 
     /// G92 and G52: what the axes are called from here on.
     fn local_offset(&mut self, offset: &Axes, view: &View<'_, '_>) {
-        let old = self.frame.local_offset;
+        let (old, known) = (self.frame.local_offset, self.anchored);
         self.move_frame(view.state);
         // Where the source says so it is said again: the control may know more than the simulation.
         let asked = [920, 921, 922, 923, 520].into_iter();
@@ -141,15 +195,31 @@ impl Emitter<'_> {
             }
             Language::Grbl => false,
         };
-        if offset.iter().all(|v| *v == 0.0) && !shift {
+        let text = if inserted { None } else { self.words(view.source) };
+        let stored = [(922, "G92.2"), (923, "G92.3")].into_iter().find(|(g, _)| text.is_some_and(|w| w.g(*g)));
+        if let Some((_, code)) = stored {
+            // What is kept for later, only the control knows.
+            if self.linuxcnc() { self.w.block(code) } else { self.cannot(code, view.source) }
+            return self.motion_unsure();
+        }
+        // G92 with words names the place where the tool stands; where that is only the machine may know.
+        let named = text.filter(|w| w.g(920) && w.names_axes());
+        let shift = shift && named.is_none();
+        if offset.iter().all(|v| *v == 0.0) && !shift && named.is_none() {
             self.w.block("G92.1");
             return self.motion_unsure();
         }
         let places = self.w.places.max(9);
         let mut words = Vec::new();
-        for i in (0..9).filter(|i| offset[*i] != old[*i]) {
+        // What the source names is written, also where the simulation has it already.
+        let spoken = named.or(text.filter(|w| w.g(520)));
+        let said_there = |i: usize| spoken.is_some_and(|w| w.has(AXES[i].to_ascii_lowercase() as u8));
+        for i in (0..9).filter(|i| offset[*i] != old[*i] || said_there(*i)) {
             // G52 names the shift, G92 what the present place is called; the place has been rounded before.
-            let value = if shift { offset[i] } else { self.at[i] };
+            let value = if shift { Some(offset[i]) } else { self.named_here(i, known[i], view) };
+            let Some(value) = value else {
+                return self.cannot("a value for where a probe stopped that is not a plain number", view.source);
+            };
             let (text, said) = self.w.axis_fine(i, value, places);
             words.push(format!("{}{text}", AXES[i]));
             if !shift {
@@ -173,17 +243,31 @@ impl Emitter<'_> {
         let words = self.words(view.source);
         let zero = offset.iter().all(|v| *v == 0.0);
         // A tool that has not been measured has a length of 0 too, so for 0 the source decides.
-        let named = self.tool_with(offset, view.state.tool);
+        // A lathe's T names the offset with its last two digits.
+        let station = self.sources.increments().then(|| self.number_of('t', view.source)).flatten().map(|t| t % 100);
+        let asked = if words.is_some_and(|w| w.g(430)) { self.number_of('h', view.source) } else { station };
+        let named = self.tool_with(offset, asked, view.state.tool);
         let off = match words {
-            Some(w) => w.g(490) || zero && !w.g(430),
+            Some(_) if station.is_some() => station == Some(0),
+            Some(w) => w.g(490) || zero && !w.g(430) && !w.g(432),
             None => zero && (view.state.tool <= 0 || named != Some(view.state.tool)),
         };
         // Nothing is known of the lengths of a machine without a tool table; the program says which it wants.
         let unmeasured = zero && !off && named.is_none();
-        let wanted = words.is_some_and(|w| w.g(430));
-        let said = if unmeasured { self.length_asked(view) } else { None };
+        let wanted = words.is_some_and(|w| w.g(430)) || station.is_some();
+        let added = words.is_some_and(|w| w.g(432)).then(|| self.number_of('h', view.source)).flatten();
+        let said = match station {
+            Some(n) if unmeasured => Some(format!("G43 H{n}")),
+            _ if unmeasured => self.length_asked(view),
+            _ => None,
+        };
         let block = match (named, self.options.language) {
             (None, Language::Linuxcnc | Language::FanucMill) if wanted && said.is_some() => said.unwrap_or_default(),
+            (None, Language::Linuxcnc) if zero && added.is_some() => format!("G43.2 H{}", added.unwrap_or_default()),
+            (None, Language::Grbl) if unmeasured && wanted => {
+                self.cannot("a tool length that no tool table names here (--tools)", view.source);
+                return self.move_frame(view.state);
+            }
             _ if off || (zero && named.is_none()) => "G49".to_string(),
             (Some(n), Language::Linuxcnc | Language::FanucMill) => format!("G43 H{n}"),
             (_, Language::Linuxcnc) => format!("G43.1 {}", self.changed_all(offset)),
@@ -197,7 +281,12 @@ impl Emitter<'_> {
         };
         self.w.block(&block);
         self.motion_unsure();
+        let old = self.frame.tool_offset;
         self.move_frame(view.state);
+        // Lengths are measured again at the machine: the height that stood before is another one now, whatever the table says.
+        for i in (0..9).filter(|i| *i == 2 || offset[*i] != old[*i]) {
+            self.anchored[i] = false;
+        }
     }
 
     fn changed_all(&self, offset: &Axes) -> String {
@@ -228,11 +317,12 @@ impl Emitter<'_> {
         if after == Some('.') { None } else { digits.parse().ok() }
     }
 
-    /// The tool whose offset this is, the one in the spindle first.
-    fn tool_with(&self, offset: &Axes, in_spindle: i32) -> Option<i32> {
+    /// The tool whose offset this is: the one that the source names first, then the one in the spindle.
+    fn tool_with(&self, offset: &Axes, asked: Option<u32>, in_spindle: i32) -> Option<i32> {
+        let asked = asked.and_then(|n| i32::try_from(n).ok());
         let same = |(n, o): &&(i32, Axes)| *n > 0 && (0..9).all(|i| (o[i] - offset[i]).abs() < 1e-9);
         let all = || self.tools.iter().filter(same);
-        all().find(|(n, _)| *n == in_spindle).or_else(|| all().next()).map(|(n, _)| *n)
+        all().find(|(n, _)| Some(*n) == asked).or_else(|| all().find(|(n, _)| *n == in_spindle)).or_else(|| all().next()).map(|(n, _)| *n)
     }
 
     fn tool_change(&mut self, view: &View<'_, '_>) {
@@ -280,13 +370,22 @@ impl Emitter<'_> {
         }
         let places = self.w.places.max(9);
         let old = self.tools.iter().find(|(n, _)| *n == tool).map_or([0.0; 9], |t| t.1);
-        let mut words = self.changed(&offset, &old);
-        words.push(format!("R{}", self.w.length(0.5 * diameter, places).0));
-        if front != 0.0 || back != 0.0 {
+        let text = self.words(view.source).filter(|w| w.g(100));
+        let said = |letter: char| text.is_none_or(|w| w.has(letter.to_ascii_lowercase() as u8));
+        // What the block does not name stays as the control has it.
+        let axes = (0..9).filter(|i| if text.is_some() { said(AXES[*i]) } else { offset[*i] != old[*i] });
+        let mut words: Vec<String> = axes.map(|i| format!("{}{}", AXES[i], self.w.axis_fine(i, offset[i], places).0)).collect();
+        if said('r') {
+            words.push(format!("R{}", self.w.length(0.5 * diameter, places).0));
+        }
+        if (front != 0.0 || back != 0.0) && (said('i') || said('j')) {
             words.push(format!("I{} J{}", self.w.number(front.to_degrees(), 9), self.w.number(back.to_degrees(), 9)));
         }
-        if orientation != 0 {
+        if orientation != 0 && said('q') {
             words.push(format!("Q{orientation}"));
+        }
+        if words.is_empty() {
+            return;
         }
         self.w.block(&format!("G10 L1 P{tool} {}", words.join(" ")));
         self.tools.retain(|(n, _)| *n != tool);
@@ -404,6 +503,10 @@ impl Emitter<'_> {
             // LinuxCNC's cycles switch to exact path by themselves; elsewhere that is the cycle's own affair.
             return;
         }
+        if !asked && !self.said_path {
+            return self.exact_for_a_while(mode, view);
+        }
+        self.said_path = true;
         match (mode, self.options.language) {
             (PathMode::ExactStop, Language::Linuxcnc) => self.w.block("G61.1"),
             (PathMode::ExactPath, Language::Linuxcnc | Language::Grbl) => self.w.block("G61"),
@@ -419,6 +522,34 @@ impl Emitter<'_> {
             (PathMode::ExactPath, Language::FanucMill) => self.as_comment("exact path G61", source),
             (PathMode::Blend(_), Language::Grbl) => self.as_comment("path blending G64", source),
         }
+    }
+
+    /// A cycle in a program that leaves the way to follow the path to the machine: what that is, only M70 and M72 can bring
+    /// back, with the feed of before.
+    fn exact_for_a_while(&mut self, mode: PathMode, view: &View<'_, '_>) {
+        if let PathMode::Blend(_) = mode {
+            if let Some(Op::MergeTolerance(_)) = self.op_after(view.index) {
+                self.done_until = view.index + 2;
+            }
+            if self.kept_path && !self.exact_again(view.index) {
+                self.kept_path = false;
+                self.w.block("M72");
+                self.feed.clear();
+                self.motion_unsure();
+            }
+            return;
+        }
+        if !std::mem::replace(&mut self.kept_path, true) {
+            self.w.block("M70");
+            self.w.block(if mode == PathMode::ExactStop { "G61.1" } else { "G61" });
+        }
+    }
+
+    /// Whether another cycle follows before anything moves.
+    fn exact_again(&self, index: usize) -> bool {
+        const NEAR: usize = 16;
+        let next = (1..NEAR).map_while(|n| self.program.get(index + n)).find(|s| s.op.moves() || matches!(s.op, Op::PathMode(_)));
+        next.is_some_and(|s| s.op == Op::PathMode(PathMode::ExactPath) && crate::Words::at(self.sources, s.source.file, s.source.line).is_some_and(|w| !w.g(610)))
     }
 
     fn blend(&mut self, tolerance: f64, view: &View<'_, '_>) {

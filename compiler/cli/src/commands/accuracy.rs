@@ -7,9 +7,9 @@ use std::path::Path;
 use gr_accuracy::material::{self, Material};
 use gr_accuracy::map::{DOUBT, turns_part};
 use gr_accuracy::report::{BeyondLaw, CutData, Lack, Operations, Report, Row, Stretch, Unforced, Work, report, report_of_words};
-use gr_accuracy::{Budget, BudgetOptions, put_down};
+use gr_accuracy::{Budget, BudgetOptions, put_down, unplaced};
 use gr_ir::{Source, Sources as _};
-use gr_machine::Machine;
+use gr_machine::{Kind, Machine};
 use gr_machine::math::{Frame, norm};
 use gr_planner::process::{Element, OperationKind, Origin, Process, Workingstep};
 use gr_text::{Diagnostic, FileId, Severity, Span, code};
@@ -21,7 +21,7 @@ use crate::exit::Exit;
 use crate::options::{AccuracyArgs, AccuracyReference, Global, LintArgs, TableFormat};
 use crate::pipeline::{Motion, Unit, load, motion};
 use crate::progress::Progress;
-use crate::setup::station;
+use crate::setup::{beside, station};
 use crate::sources::Sources;
 
 /// Three numbers with commas between them.
@@ -44,7 +44,7 @@ pub fn run(global: &Global, args: &AccuracyArgs) -> Exit {
     let refuse = |what: &str, why: &str| {
         super::refuse(global, &args.file, code::ACCURACY_BAD_OPTION, &[what.to_string(), why.to_string()])
     };
-    let Some(station) = station(&args.setup, &LintArgs::default(), Path::new("."), &mut sources, &mut renderer) else {
+    let Some(station) = station(&args.setup, &LintArgs::default(), beside(&args.file), &mut sources, &mut renderer) else {
         renderer.finish(false);
         return renderer.failed();
     };
@@ -85,7 +85,7 @@ pub fn run(global: &Global, args: &AccuracyArgs) -> Exit {
     };
     let result = predict(args, &unit, &motion, &machine, &budget, part, &progress).and_then(|(text, found, of)| {
         let Some(goal) = &args.map else { return Ok(((text, Vec::new()), found)) };
-        match super::map::beside(global, &machine, &budget, &of, goal) {
+        match super::map::beside(global, &machine, &budget, of.as_ref(), goal) {
             Ok(files) => Ok(((text, files), found)),
             Err((what, why)) => Err(vec![Diagnostic::new(code::ACCURACY_BAD_OPTION, FileId(0), Span::default(), &[what, why])]),
         }
@@ -163,12 +163,18 @@ fn place(motion: &Motion, source: Source) -> (FileId, Span) {
     texts.place(source)
 }
 
-/// What the map beside a report is of.
+/// What the map beside a report is of: the place of the largest error.
 pub struct Beside {
-    /// Its height in the base, mm.
-    pub height: f64,
-    /// Where the part was touched, in the base, mm.
-    pub zero: Option<[f64; 3]>,
+    /// Tool point in the base, mm.
+    pub point: [f64; 3],
+    /// Joints there.
+    pub joints: Vec<f64>,
+    /// The tool's name, and its point on the flange.
+    pub tool: (String, Frame),
+    /// Line of the program.
+    pub line: String,
+    /// What moves the tool point at the program's zero, where errors count from there.
+    pub zero: Option<gr_accuracy::Sensitivity>,
 }
 
 fn predict(
@@ -179,10 +185,10 @@ fn predict(
     budget: &Budget,
     part: Option<Frame>,
     progress: &Progress,
-) -> Result<(String, Vec<Diagnostic>, Beside), Vec<Diagnostic>> {
+) -> Result<(String, Vec<Diagnostic>, Option<Beside>), Vec<Diagnostic>> {
     let process = unit.exchange.then(|| crate::exchange::process(unit).ok().map(|(p, _, _)| p)).flatten();
     let mut operations = Operations::new(&motion.program);
-    let Cutting { fits, stated } = cutting(&mut operations, args, unit, motion, process.as_ref());
+    let Cutting { fits, stated } = cutting(&mut operations, args, (unit, machine), motion, process.as_ref());
     let global = process.as_ref().and_then(|p| p.workpieces.iter().find_map(|w| w.tolerance)).filter(|t| *t > 0.0);
     operations.list.iter_mut().for_each(|o| o.tolerance = args.tolerance.or(o.tolerance).or(global));
     let top = (FileId(0), Span::default());
@@ -240,7 +246,7 @@ fn predict(
         }
     };
     // Without a place of the part nobody knows where its zero was touched.
-    let strange = crate::robot::missing_axes(&motion.program, machine, &texts);
+    let strange = gr_robot::opinion::missing_axes(&motion.program, machine, &texts);
     if !strange.is_empty() {
         return Err(strange);
     }
@@ -268,9 +274,15 @@ fn predict(
         TableFormat::Json => format!("{:#}\n", as_json(&report, motion, machine, material, budget, args)),
         TableFormat::Csv => csv(&report, motion),
     };
-    let worst = report.rows.iter().filter_map(|r| r.worst.as_ref()).max_by(|a, b| a.errors.sum().total_cmp(&b.errors.sum()));
-    let height = worst.map_or(0.0, |w| (w.point[2] * 10.0).round() / 10.0 + 0.0);
-    Ok((text, found, Beside { height, zero: report.touched }))
+    let worst = report.rows.iter().filter_map(|r| r.worst.as_ref().map(|w| (w, r))).max_by(|a, b| a.0.errors.sum().total_cmp(&b.0.errors.sum()));
+    let beside = worst.map(|(w, r)| Beside {
+        point: w.point,
+        joints: w.joints.clone(),
+        tool: (format!("T{}", r.operation.tool), w.tool),
+        line: line_of(motion, w.source),
+        zero: w.zero.as_deref().cloned(),
+    });
+    Ok((text, found, beside))
 }
 
 /// A joint beyond its limit.
@@ -292,7 +304,7 @@ fn unread(fits: Vec<(String, Origin)>) -> Vec<Diagnostic> {
     }
     let one = |(fit, operations): (Origin, Vec<String>)| {
         let names: Vec<&str> = operations.iter().map(String::as_str).collect();
-        let why = "a `grade` of LIMITS_AND_FITS is the width of the band, a length above 0 and below 1 mm; the number of a grade is not read. `--tolerance` says what is allowed";
+        let why = "PLUS_MINUS_VALUE needs a limit above 0; a `grade` of LIMITS_AND_FITS is the width of the band, a length above 0 and below 1 mm; the number of a grade is not read. `--tolerance` says what is allowed";
         let what = [format!("the tolerance #{} of {}", fit.id, listed(&names)), why.to_string()];
         Diagnostic::new(code::ACCURACY_NO_DATA, FileId(0), fit.span, &what)
     };
@@ -353,6 +365,11 @@ pub fn unsaid(machine: &Machine, budget: &Budget) -> Vec<[String; 2]> {
     if budget.joints.is_none() {
         none("the error by the joints", format!("the file of {id} has no `joints` in `[accuracy]`"));
     }
+    let unplaced: Vec<&str> = (0..machine.joints.len()).filter(|j| unplaced(machine, *j)).map(|j| machine.joints[j].name.as_str()).collect();
+    if !unplaced.is_empty() && (budget.joints.is_some() || budget.tells_geometry()) {
+        let why = format!("a `cartesian` machine's file has no key for where its axis is, so nobody knows what it moves on the part: taken as exact (`five-axis` has such keys)");
+        none(&format!("the error by joint {}", unplaced.join(", ")), why);
+    }
     if !budget.tells_geometry() {
         none("the error by the geometry", format!("the file of {id} has neither `parameter` nor a `grade` that fits in `[accuracy]`"));
     }
@@ -386,6 +403,11 @@ fn missing(
     let soft = soft(machine);
     if !soft.is_empty() {
         found.push(none(top, "the deflection", format!("the file of {} has no `[stiffness]` of {}", machine.id, soft.join(", "))));
+        return;
+    }
+    // Of turning no material gives a force.
+    let turning = |n: usize| operations.works(n).iter().all(|w| *w == Work::Turn);
+    if !operations.list.is_empty() && (0..operations.list.len()).all(turning) {
         return;
     }
     if material.is_none() {
@@ -497,6 +519,7 @@ fn lawless(found: &mut Vec<Diagnostic>, row: &Row, machine: &Machine, motion: &M
     for (source, why) in &row.unforced {
         let why = match why {
             Unforced::Axial => "the tool is fed along its axis, and the force law is that of milling across it (a drill is known by its cycle: G73 G81 G82 G83)",
+            Unforced::Turned => "the part turns, and the force law is that of milling and drilling, not of turning, whose force is along the cut of the turning part",
             Unforced::NoLaw => "the force law is that of milling and drilling, not of centre drilling, tapping, threading, boring, reaming and countersinking",
             Unforced::Across => "a drill is fed another way than along its axis, and the law of its thrust is that along it",
             Unforced::Turning => "only rotary axes move: the tool turns about its point, which stays where it is on the part, and no force law is about that",
@@ -584,11 +607,11 @@ struct Cutting {
     stated: Vec<Option<Stated>>,
 }
 
-/// How each operation cuts: the file's word, then the tool table's, then the options'.
+/// How each operation cuts: the file's word, then the tool table's, the machine file's, the options'.
 fn cutting(
     operations: &mut Operations,
     args: &AccuracyArgs,
-    unit: &Unit,
+    (unit, machine): (&Unit, &Machine),
     motion: &Motion,
     process: Option<&Process>,
 ) -> Cutting {
@@ -601,6 +624,7 @@ fn cutting(
         ..CutData::default()
     };
     let tools = tool_rows(motion, unit);
+    let turning_dialect = unit.setup.dialect.id == "fanuc-turn";
     let (mut steps, mut fits, mut stated) = (Vec::new(), Vec::new(), Vec::new());
     if let Some(p) = process {
         p.elements.iter().for_each(|e| collect(e, &mut steps));
@@ -611,8 +635,10 @@ fn cutting(
         o.tolerance = step.and_then(|s| s.feature.tolerance);
         fits.extend(step.and_then(|s| s.feature.fit).map(|fit| (o.name.clone(), fit)));
         let row = tools.iter().find(|t| i64::from(t.number) == i64::from(o.tool) && t.diameter > 0.0);
-        let table = CutData { diameter: row.map(|t| t.diameter), ..CutData::default() };
+        let of_machine = machine.cell.tools.get(&o.tool).and_then(|t| t.diameter);
+        let table = CutData { diameter: row.map(|t| t.diameter).or(of_machine), ..CutData::default() };
         o.work = step.map(|s| work_of(s));
+        o.turned = machine.kind == Kind::Lathe || turning_dialect || step.is_some_and(|s| turns(&s.operation.keyword));
         o.cut = own.or(table).or(said);
         stated.push(step.map(|s| Stated { tool: s.operation.tool.origin, operation: s.operation.origin }));
     }
@@ -647,6 +673,12 @@ fn of_step(step: &Workingstep) -> CutData {
         OperationKind::Other => {}
     }
     cut
+}
+
+/// Whether an operation of ISO 14649 is one of turning (part 12).
+fn turns(keyword: &str) -> bool {
+    const TURNING: [&str; 6] = ["CONTOURING", "FACING", "GROOVING", "CUTTING_IN", "THREADING", "KNURLING"];
+    TURNING.iter().any(|t| keyword.starts_with(t))
 }
 
 fn work_of(step: &Workingstep) -> Work {

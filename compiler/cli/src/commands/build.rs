@@ -1,6 +1,6 @@
 //! `gcc-robot build`
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 
@@ -13,12 +13,12 @@ use super::complain;
 use crate::emit::{Artifact, Built, Goal, TargetOptions, build, stem};
 use crate::exit::Exit;
 use crate::options::{BuildArgs, Global};
-use crate::output::{Pending, depfile, same_file, to_stdout, write_with};
+use crate::output::{Pending, depfile, from_here, same_file, to_stdout, write_with};
 use crate::pipeline::load;
 use crate::progress::Progress;
 use crate::project::Project;
 use crate::render::Renderer;
-use crate::setup::{Station, station};
+use crate::setup::{Station, Stations, station};
 use crate::sources::{Sources, reason};
 
 /// How often `--watch` looks.
@@ -40,13 +40,30 @@ pub fn run(global: &Global, args: &BuildArgs) -> Exit {
         // What changed during the round may have been read before that.
         let late = begun..=SystemTime::now();
         if !seen.values().flatten().any(|t| late.contains(t)) {
+            let mut looks = 0_u32;
             while stamps(&round.files) == seen {
                 std::thread::sleep(POLL);
+                looks += 1;
+                // Patterns of a project are looked up less often: they walk through folders.
+                if looks % 4 == 0 && round.project.as_ref().is_some_and(|p| listed(p, args) != round.listed) {
+                    break;
+                }
             }
         }
         begun = SystemTime::now();
         round = Round::new(global, args).run();
     }
+}
+
+/// What the patterns of a project name now.
+fn listed(project: &Project, args: &BuildArgs) -> BTreeSet<PathBuf> {
+    rows(project, args).flat_map(|(_, patterns)| project.files(patterns).0).collect()
+}
+
+/// The results that are asked for, each with the patterns of its sources.
+fn rows<'p>(project: &'p Project, args: &'p BuildArgs) -> impl Iterator<Item = (&'p crate::project::Target, &'p [String])> {
+    let asked = project.file.targets.iter().filter(|t| args.target.as_ref().is_none_or(|id| *id == t.target));
+    asked.map(|t| (t, if t.sources.is_empty() { &project.file.project.sources[..] } else { &t.sources[..] }))
 }
 
 /// When files were changed last; a file that is not there has no time.
@@ -55,8 +72,10 @@ fn stamps(files: &[PathBuf]) -> BTreeMap<&PathBuf, Option<SystemTime>> {
 }
 
 /// One thing to make.
-struct Job {
+struct Job<'s> {
     source: PathBuf,
+    /// What it is run with.
+    station: &'s Station,
     target: &'static TargetDef,
     options: TargetOptions,
     /// None: standard output.
@@ -67,6 +86,9 @@ struct Job {
 struct Ended {
     exit: Exit,
     files: Vec<PathBuf>,
+    /// The project that was built as a whole, and the sources that its patterns named.
+    project: Option<Project>,
+    listed: BTreeSet<PathBuf>,
 }
 
 /// One round of building: everything is made, or nothing is written.
@@ -77,6 +99,7 @@ struct Round<'a> {
     sources: Sources,
     exit: Exit,
     files: Vec<PathBuf>,
+    listed: BTreeSet<PathBuf>,
     results: Vec<(PathBuf, Vec<u8>)>,
     /// Findings that were shown: several targets of one program find the same.
     told: Vec<(PathBuf, Diagnostic)>,
@@ -97,6 +120,7 @@ impl<'a> Round<'a> {
             sources: Sources::default(),
             exit: Exit::Ok,
             files: args.files.clone(),
+            listed: BTreeSet::new(),
             results: Vec::new(),
             told: Vec::new(),
             written: Vec::new(),
@@ -110,24 +134,30 @@ impl<'a> Round<'a> {
         if self.args.project.is_some() && !from.join(crate::project::NAME).is_file() {
             eprintln!("there is no {} in {}", crate::project::NAME, from.display());
             self.fail(Exit::Usage);
-            return self.end(false);
+            return self.end(false, None);
         }
         let mut setup = self.args.setup.clone();
         if self.args.options.reference == Some(crate::emit::Reference::Ufmg2008) {
             // The reference mode chooses the dialect too.
             setup.dialect.get_or_insert_with(|| "ufmg2008".into());
         }
-        let found = station(&setup, &self.args.lints, from, &mut self.sources, &mut self.renderer);
-        let Some(station) = found else {
-            self.fail(self.renderer.failed());
-            return self.end(false);
+        let named = !self.args.files.is_empty() && self.args.project.is_none();
+        let found = if named {
+            Stations::of(&setup, &self.args.lints, &self.args.files, &mut self.sources, &mut self.renderer)
+        } else {
+            let one = station(&setup, &self.args.lints, from, &mut self.sources, &mut self.renderer);
+            one.map(|s| Stations::one(s, self.args.files.len()))
         };
-        self.files.extend(station.files.iter().cloned());
-        match self.jobs(&station) {
+        let Some(mut stations) = found else {
+            self.fail(self.renderer.failed());
+            return self.end(false, None);
+        };
+        self.files.extend(stations.iter().flat_map(|s| s.files.iter().cloned()));
+        match self.jobs(&stations) {
             Ok(jobs) => {
-                self.renderer.tally.files = jobs.iter().map(|j| &j.source).collect::<std::collections::BTreeSet<_>>().len();
+                self.renderer.tally.files = jobs.iter().map(|j| &j.source).collect::<BTreeSet<_>>().len();
                 for job in &jobs {
-                    self.job(job, &station);
+                    self.job(job, job.station);
                 }
                 if self.exit == Exit::Ok {
                     self.write();
@@ -138,14 +168,16 @@ impl<'a> Round<'a> {
                 self.fail(Exit::Usage);
             }
         }
-        self.end(true)
+        let whole = self.args.files.is_empty();
+        let project = stations.iter_mut().find_map(|s| s.project.take()).filter(|_| whole);
+        self.end(true, project)
     }
 
-    fn end(mut self, ran: bool) -> Ended {
+    fn end(mut self, ran: bool, project: Option<Project>) -> Ended {
         crate::output::drop_all(std::mem::take(&mut self.written));
         let something = self.renderer.tally.errors + self.renderer.tally.warnings > 0;
         self.renderer.finish(ran && something && !self.global.quiet);
-        Ended { exit: self.exit, files: self.files }
+        Ended { exit: self.exit, files: self.files, project, listed: self.listed }
     }
 
     fn fail(&mut self, exit: Exit) {
@@ -177,15 +209,16 @@ impl<'a> Round<'a> {
         (a.from_line.is_some() && a.files.len() > 1).then_some("--from-line goes with one program")
     }
 
-    fn jobs(&mut self, station: &Station) -> Result<Vec<Job>, String> {
+    fn jobs<'s>(&mut self, stations: &'s Stations) -> Result<Vec<Job<'s>>, String> {
         if let Some(why) = self.misused() {
             return Err(why.into());
         }
         if self.args.files.is_empty() {
-            let Some(project) = &station.project else {
+            let of_project = stations.iter().find_map(|s| Some((s, s.project.as_ref()?)));
+            let Some((station, project)) = of_project else {
                 return Err(format!("name the programs to build, or add them to {}", crate::project::NAME));
             };
-            return self.project_jobs(project);
+            return self.project_jobs(station, project);
         }
         let target = target(self.args.target.as_deref().unwrap_or("rs274ngc"))?;
         let several = self.args.files.len() > 1;
@@ -193,18 +226,17 @@ impl<'a> Round<'a> {
         if several && out.is_none_or(|o| !is_folder(o)) {
             return Err("several programs need a folder: -o FOLDER/".into());
         }
-        let mut options = self.args.options.clone();
-        options.reference = options.reference.or(station.project.as_ref().and_then(|p| p.file.project.reference));
-        let job = |source: &PathBuf| Job {
-            source: source.clone(),
-            target,
-            options: options.clone(),
-            goal: out.map(|o| if is_folder(o) { o.join(file_name(source, target)) } else { o.to_path_buf() }),
+        let job = |(n, source): (usize, &PathBuf)| {
+            let station = stations.get(n)?;
+            let mut options = self.args.options.clone();
+            options.reference = options.reference.or(station.project.as_ref().and_then(|p| p.file.project.reference));
+            let goal = out.map(|o| if is_folder(o) { o.join(file_name(source, target)) } else { o.to_path_buf() });
+            Some(Job { source: source.clone(), station, target, options, goal })
         };
-        Ok(self.args.files.iter().map(job).collect())
+        Ok(self.args.files.iter().enumerate().filter_map(job).collect())
     }
 
-    fn project_jobs(&mut self, project: &Project) -> Result<Vec<Job>, String> {
+    fn project_jobs<'s>(&mut self, station: &'s Station, project: &Project) -> Result<Vec<Job<'s>>, String> {
         let mut jobs = Vec::new();
         if project.file.targets.is_empty() {
             return Err(format!("{} has no [[targets]]", project.path.display()));
@@ -213,12 +245,12 @@ impl<'a> Round<'a> {
             target(id)?;
             return Err(format!("{} has no [[targets]] entry for {id}", project.path.display()));
         }
-        for row in project.file.targets.iter().filter(|t| self.args.target.as_ref().is_none_or(|id| *id == t.target)) {
+        for (row, patterns) in rows(project, self.args) {
             let target = target(&row.target)?;
             let mut options = options_of(&row.options).map_err(|e| format!("{}: target {}: {e}", project.path.display(), row.target))?;
             options.reference = options.reference.or(project.file.project.reference);
             options.reference_config = options.reference_config.map(|p| project.path_of(&p));
-            let patterns = if row.sources.is_empty() { &project.file.project.sources } else { &row.sources };
+            options.robot.job = options.robot.job.map(|p| project.path_of(&p));
             let (sources, closed) = project.files(patterns);
             if !closed.is_empty() {
                 super::unreadable(&closed, &mut self.sources, &mut self.renderer);
@@ -232,13 +264,14 @@ impl<'a> Round<'a> {
                 let output = row.output.as_deref().unwrap_or("{name}.{extension}");
                 let name = output.replace("{name}", &stem(&source)).replace("{extension}", target.extension);
                 self.files.push(source.clone());
-                jobs.push(Job { source, target, options: options.clone(), goal: Some(project.path_of(Path::new(&name))) });
+                self.listed.insert(source.clone());
+                jobs.push(Job { source, station, target, options: options.clone(), goal: Some(project.path_of(Path::new(&name))) });
             }
         }
         Ok(jobs)
     }
 
-    fn job(&mut self, job: &Job, station: &Station) {
+    fn job(&mut self, job: &Job<'_>, station: &Station) {
         let progress = Progress::new(self.global.quiet, format!("building {} ({})", job.source.display(), job.target.id));
         let from_line = self.args.from_line.map(|l| (l, self.args.safe_z));
         let file = job.goal.clone().unwrap_or_else(|| std::env::temp_dir().join("gcc-robot"));
@@ -262,7 +295,7 @@ impl<'a> Round<'a> {
     }
 
     /// Shows findings that no other target of the program had.
-    fn show_new(&mut self, job: &Job, mut checked: Checked) {
+    fn show_new(&mut self, job: &Job<'_>, mut checked: Checked) {
         let told = &self.told;
         checked.found.retain(|d| !told.iter().any(|(path, t)| *path == job.source && t == d));
         show(&mut self.renderer, &checked);
@@ -270,7 +303,7 @@ impl<'a> Round<'a> {
     }
 
     /// Keeps a result for writing.
-    fn keep(&mut self, job: &Job, station: &Station, mut built: Built) {
+    fn keep(&mut self, job: &Job<'_>, station: &Station, mut built: Built) {
         built.found.iter_mut().for_each(|d| station.lints.harden(d));
         let bad = built.found.iter().any(|d| d.severity == Severity::Error);
         let checked = Checked { sources: built.sources, found: built.found, ..Checked::nothing() };
@@ -319,7 +352,12 @@ impl<'a> Round<'a> {
             complain(&mut self.renderer, &mut self.sources, &name, code::FILE_OVERWRITES_SOURCE, std::slice::from_ref(&name));
             return self.fail(Exit::Findings);
         }
-        self.rules.push_str(&depfile(&goals, &read));
+        // A project names its files itself; those of the command line stay as they are.
+        let named = |paths: &[PathBuf]| match self.args.files.is_empty() {
+            true => paths.iter().map(|p| from_here(p)).collect(),
+            false => paths.to_vec(),
+        };
+        self.rules.push_str(&depfile(&named(&goals), &named(&read)));
         self.written.extend(built.written.map(|p| (goal.clone(), p)));
         for artifact in built.artifacts {
             self.results.push((path_of(&artifact), artifact.bytes));
@@ -362,8 +400,7 @@ impl<'a> Round<'a> {
             .and_then(|()| spooled.into_iter().try_for_each(|(path, p)| p.to_stdout().map_err(|e| (path, e))));
         match written {
             Ok(()) if !self.global.quiet && self.args.files.is_empty() => {
-                let here = std::env::current_dir().unwrap_or_default();
-                names.iter().for_each(|p| eprintln!("built {}", p.strip_prefix(&here).unwrap_or(p).display()));
+                names.iter().for_each(|p| eprintln!("built {}", from_here(p).display()));
             }
             Ok(()) => {}
             Err((path, e)) => {

@@ -13,7 +13,7 @@ use crate::exit::Exit;
 use crate::options::{CheckArgs, Global};
 use crate::progress::Progress;
 use crate::render::{Renderer, Tally};
-use crate::setup::{Levels, Station, is_program, station};
+use crate::setup::{Levels, Station, Stations, is_program, station};
 use crate::sources::{Sources, read_program, walk};
 
 /// What came of one file.
@@ -53,22 +53,27 @@ impl Checked {
 pub fn run(global: &Global, args: &CheckArgs) -> Exit {
     let mut renderer = global.renderer(false);
     let mut sources = Sources::default();
-    let Some(station) = station(&args.setup, &args.lints, Path::new("."), &mut sources, &mut renderer) else {
-        renderer.finish(!global.quiet);
-        return renderer.failed();
-    };
-    let (files, mut exit) = match programs(&args.paths, &station, &mut sources, &mut renderer) {
-        Some(found) => found,
-        None => {
+    let (files, stations, mut exit) = match programs(args, &mut sources, &mut renderer) {
+        Named::Programs(files, stations, exit) => (files, stations, exit),
+        Named::Faulty => {
+            renderer.finish(!global.quiet);
+            return renderer.failed();
+        }
+        Named::Nothing => {
             eprintln!("name the programs to check, or add sources to gcc-robot.toml");
             return Exit::Usage;
         }
     };
+    let no_robot = |s: &Station| s.machine.as_ref().is_none_or(|m| m.kind != gr_machine::Kind::Robot);
+    if args.job.is_some() && stations.iter().any(no_robot) {
+        eprintln!("--job needs --machine with a robot: it places parts for one");
+        return Exit::Usage;
+    }
     renderer.tally.files = files.len();
     let jobs = args.jobs.or_else(|| std::thread::available_parallelism().ok()).map_or(1, std::num::NonZero::get);
     let mut held = Vec::new();
     let progress = Progress::new(global.quiet, "checking");
-    each(&files, &station, jobs, |n, checked| {
+    each(&files, &stations, jobs, |n, checked| {
         progress.tell(|| format!("checked {} of {} files", n + 1, files.len()));
         // Findings and progress must not meet on one line.
         if std::io::IsTerminal::is_terminal(&std::io::stderr()) {
@@ -99,41 +104,59 @@ pub fn show(renderer: &mut Renderer, checked: &Checked) {
     renderer.flush();
 }
 
-/// The programs that paths name: files, and what lies in folders. None: nothing was named at all.
-fn programs(
-    paths: &[PathBuf],
-    station: &Station,
-    sources: &mut Sources,
-    renderer: &mut Renderer,
-) -> Option<(Vec<PathBuf>, Exit)> {
-    let mut exit = Exit::Ok;
-    if paths.is_empty() {
-        let project = station.project.as_ref()?;
-        let (files, closed) = project.files(&project.file.project.sources);
-        if !closed.is_empty() {
-            super::unreadable(&closed, sources, renderer);
-            exit = Exit::Io;
-        } else if files.is_empty() {
-            nothing(project.path.display().to_string(), sources, renderer);
-        }
-        return Some((files, exit));
+/// What the command line names.
+enum Named {
+    /// Programs, and what they are run with.
+    Programs(Vec<PathBuf>, Stations, Exit),
+    /// What they are run with is wrong.
+    Faulty,
+    /// Nothing at all.
+    Nothing,
+}
+
+/// The programs that paths name: files, and what lies in folders; or else those of the project.
+fn programs(args: &CheckArgs, sources: &mut Sources, renderer: &mut Renderer) -> Named {
+    if args.paths.is_empty() {
+        return sources_of_project(args, sources, renderer);
     }
+    let mut exit = Exit::Ok;
     let mut files = Vec::new();
-    for path in paths {
+    let dialect = args.setup.dialect.as_deref().and_then(gr_spec::Dialect::find);
+    let mut empty = Vec::new();
+    for path in &args.paths {
         if !path.is_dir() {
             files.push(path.clone());
             continue;
         }
         let before = files.len();
-        let closed = walk(path, &is_program(station.dialect), &mut files);
+        let closed = walk(path, &is_program(dialect), &mut files);
         if !closed.is_empty() {
             super::unreadable(&closed, sources, renderer);
             exit = Exit::Io;
         } else if files.len() == before {
-            nothing(path.display().to_string(), sources, renderer);
+            empty.push(path);
         }
     }
-    Some((files, exit))
+    let Some(mut stations) = Stations::of(&args.setup, &args.lints, &files, sources, renderer) else { return Named::Faulty };
+    stations.iter_mut().for_each(|s| s.job.clone_from(&args.job));
+    empty.into_iter().for_each(|path| nothing(path.display().to_string(), sources, renderer));
+    Named::Programs(files, stations, exit)
+}
+
+fn sources_of_project(args: &CheckArgs, sources: &mut Sources, renderer: &mut Renderer) -> Named {
+    let Some(mut station) = station(&args.setup, &args.lints, Path::new("."), sources, renderer) else { return Named::Faulty };
+    let Some(project) = &station.project else { return Named::Nothing };
+    let mut exit = Exit::Ok;
+    let (files, closed) = project.files(&project.file.project.sources);
+    if !closed.is_empty() {
+        super::unreadable(&closed, sources, renderer);
+        exit = Exit::Io;
+    } else if files.is_empty() {
+        nothing(project.path.display().to_string(), sources, renderer);
+    }
+    station.job.clone_from(&args.job);
+    let stations = Stations::one(station, files.len());
+    Named::Programs(files, stations, exit)
 }
 
 fn nothing(name: String, sources: &mut Sources, renderer: &mut Renderer) {
@@ -141,7 +164,7 @@ fn nothing(name: String, sources: &mut Sources, renderer: &mut Renderer) {
 }
 
 /// Checks files in parallel; results arrive in the order of the files.
-fn each(files: &[PathBuf], station: &Station, jobs: usize, mut done: impl FnMut(usize, Checked)) {
+fn each(files: &[PathBuf], stations: &Stations, jobs: usize, mut done: impl FnMut(usize, Checked)) {
     let next = AtomicUsize::new(0);
     let (sender, receiver) = mpsc::channel();
     std::thread::scope(|scope| {
@@ -150,7 +173,7 @@ fn each(files: &[PathBuf], station: &Station, jobs: usize, mut done: impl FnMut(
             scope.spawn(move || {
                 loop {
                     let n = next.fetch_add(1, Ordering::Relaxed);
-                    let Some(path) = files.get(n) else { return };
+                    let (Some(path), Some(station)) = (files.get(n), stations.get(n)) else { return };
                     if sender.send((n, check(path, station))).is_err() {
                         return;
                     }
@@ -233,8 +256,12 @@ pub fn unreadable(name: &str, code: Code, args: &[String]) -> Checked {
 }
 
 fn checked(name: &str, path: &Path, text: &Text, station: &Station) -> Checked {
+    let machine = station.machine.as_ref().filter(|m| gr_robot::opinion::has_a_say(m));
     if exchange::is_exchange(path, text) {
-        return exchange::check(name, text, path, station);
+        return match machine {
+            Some(machine) => exchange::check_on(machine, name, text, path, station),
+            None => exchange::check(name, text, path, station),
+        };
     }
     if station.undeclared(path, text) {
         return syntax_only(name, text, station);
@@ -242,8 +269,9 @@ fn checked(name: &str, path: &Path, text: &Text, station: &Station) -> Checked {
     let mut options = Options::new(station.setup_for(path, text));
     station.lints.put_into(&mut options.rules);
     let mut checked = Checked::of(name, text, options, &station.lints);
-    if let Some(machine) = &station.machine {
-        crate::robot::ask(name, text, machine, &station.setup_for(path, text), &mut checked);
+    if let Some(machine) = machine.filter(|_| checked.found.iter().all(|d| d.severity != Severity::Error)) {
+        let motion = crate::pipeline::motion_for(name, text, &station.setup_for(path, text), machine);
+        crate::robot::ask(motion, machine, station.job.as_deref(), &mut checked);
     }
     checked
 }

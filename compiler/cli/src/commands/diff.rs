@@ -1,6 +1,6 @@
 //! `gcc-robot diff` and `gcc-robot verify`
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use gr_ir::Source;
 use gr_ir::diff::{Aspect, Diff, Spot, Tolerance, diff};
@@ -10,28 +10,30 @@ use serde_json::json;
 use super::check::show;
 use crate::emit::{Goal, build};
 use crate::exit::Exit;
-use crate::options::{DiffArgs, Global, LintArgs, SetupArgs, UnitArg, VerifyArgs};
-use crate::pipeline::{Motion, load, motion, motion_of};
+use crate::options::{DiffArgs, Global, LintArgs, SetupArgs, VerifyArgs};
+use crate::pipeline::{Motion, Unit, load, motion, motion_of};
 use crate::progress::Progress;
 use crate::render::{MessageFormat, Renderer};
-use crate::setup::{Station, station};
+use crate::setup::{Station, Stations};
 use crate::sources::Sources;
 
 pub fn run(global: &Global, args: &DiffArgs) -> Exit {
     let mut renderer = global.renderer(true);
-    let Some(mut station) = prepare(&args.setup, &mut renderer) else { return renderer.failed() };
+    let both = [args.a.clone(), args.b.clone()];
+    let Some(mut stations) = prepare(&args.setup, &both, &mut renderer) else { return renderer.failed() };
     let progress = Progress::new(global.quiet, "comparing");
-    let first = read(&args.a, &station);
+    let first = stations.get(0).map(|s| read(&args.a, s));
     if let Some(name) = &args.second_dialect {
         match Dialect::find(name) {
-            Some(d) => station.dialect = Some(d),
+            Some(d) => stations.iter_mut().for_each(|s| s.dialect = Some(d)),
             None => {
                 eprintln!("there is no dialect {name}; known: {}", super::explain::dialects());
                 return Exit::Usage;
             }
         }
     }
-    let second = read(&args.b, &station);
+    let second = stations.get(1).map(|s| read(&args.b, s));
+    let (Some(first), Some(second)) = (first, second) else { return Exit::Usage };
     let (a, b) = match (first, second) {
         (Ok(a), Ok(b)) => (a, b),
         (a, b) => {
@@ -46,22 +48,44 @@ pub fn run(global: &Global, args: &DiffArgs) -> Exit {
         }
     };
     let tolerance = Tolerance { length: args.tolerance, rate: args.rate, limit: args.limit, work_frame: args.work_frame, ..Tolerance::default() };
-    let result = diff(&a.program, &b.program, &tolerance);
+    let mut result = diff(&a.motion.program, &b.motion.program, &tolerance);
+    if a.unit.setup.dialect.id != b.unit.setup.dialect.id || a.unit.exchange != b.unit.exchange {
+        // Each control has its own way to begin with, and a plan none.
+        forget(&mut result, &[Aspect::Control]);
+    }
+    if !args.work_frame && !a.unit.exchange && !b.unit.exchange && !result.differs(Aspect::Path) {
+        result = crate::elsewhere::compared(result, [&a.unit, &b.unit], &tolerance);
+    }
     drop(progress);
-    tell(global, &result, &a.sources, &b.sources)
+    tell(global, &result, &a.motion.sources, &b.motion.sources)
 }
 
-fn prepare(setup: &SetupArgs, renderer: &mut Renderer) -> Option<Station> {
+/// Leaves these differences out.
+fn forget(result: &mut Diff, aspects: &[Aspect]) {
+    let before = result.differences.len();
+    result.differences.retain(|d| !aspects.contains(&d.aspect));
+    result.count -= before - result.differences.len();
+}
+
+fn prepare(setup: &SetupArgs, programs: &[PathBuf], renderer: &mut Renderer) -> Option<Stations> {
     let mut sources = Sources::default();
-    let found = station(setup, &LintArgs::default(), Path::new("."), &mut sources, renderer);
+    let found = Stations::of(setup, &LintArgs::default(), programs, &mut sources, renderer);
     if found.is_none() {
         renderer.finish(false);
     }
     found
 }
 
-fn read(path: &Path, station: &Station) -> Result<Motion, super::check::Checked> {
-    Ok(motion(&load(path, station)?, None)?.0)
+/// A program and its motion.
+struct Side {
+    unit: Unit,
+    motion: Motion,
+}
+
+fn read(path: &Path, station: &Station) -> Result<Side, super::check::Checked> {
+    let unit = load(path, station)?;
+    let motion = motion(&unit, None)?.0;
+    Ok(Side { unit, motion })
 }
 
 /// Prints what differs.
@@ -102,6 +126,7 @@ fn word(aspect: Aspect) -> &'static str {
         Aspect::Spindle => "spindle",
         Aspect::Coolant => "coolant",
         Aspect::Event => "event",
+        Aspect::Control => "control",
         Aspect::Time => "time",
     }
 }
@@ -125,16 +150,17 @@ fn as_json(result: &Diff, a: &Sources, b: &Sources) -> String {
 /// Builds normalised G-code, reads it back and compares it with the source as motion.
 pub fn verify(global: &Global, args: &VerifyArgs) -> Exit {
     let mut renderer = global.renderer(true);
-    let Some(station) = prepare(&args.setup, &mut renderer) else { return renderer.failed() };
+    let Some(stations) = prepare(&args.setup, std::slice::from_ref(&args.file), &mut renderer) else { return renderer.failed() };
+    let Some(station) = stations.get(0) else { return Exit::Usage };
     if let Some(machine) = station.machine.as_ref().filter(|m| gr_robot::along::is_planned(m)) {
-        return on_robot(global, args, &station, machine, &mut renderer);
+        return on_robot(global, args, station, machine, &mut renderer);
     }
     if args.output.is_some() {
         eprintln!("-o goes with --machine and a robot: without one there is no table of points to write");
         return Exit::Usage;
     }
     let goal = Goal { target: "rs274ngc", options: &args.options, machine: None, from_line: None, file: None };
-    let made = load(&args.file, &station).and_then(|unit| {
+    let made = load(&args.file, station).and_then(|unit| {
         let a = motion(&unit, station.machine.as_ref())?.0;
         // An arm that is not planned is asked about every point all the same.
         let found = station.machine.as_ref().map_or_else(Vec::new, |m| crate::robot::opinion(&a, m));
@@ -169,15 +195,25 @@ pub fn verify(global: &Global, args: &VerifyArgs) -> Exit {
         setup.machine_units = gr_canon::Units::Mm;
     }
     let b = motion_of("<translation>", text, &setup);
-    let tolerance = Tolerance { length: allowed(args), rate: 1e-3, ..Tolerance::default() };
+    let tolerance = Tolerance { length: crate::emit::allowed(&args.options), rate: 1e-3, ..Tolerance::default() };
     let mut result = diff(&a.program, &b.program, &tolerance);
-    if args.options.to.as_deref() == Some("grbl") {
-        // grbl has no tool changes: they are stops with a remark.
-        let before = result.differences.len();
-        result.differences.retain(|d| !matches!(d.aspect, Aspect::Tool | Aspect::Event));
-        result.count -= before - result.differences.len();
+    match args.options.to.as_deref() {
+        // It has no tool changes: they are stops with a remark.
+        Some("grbl") => forget(&mut result, &[Aspect::Tool, Aspect::Event, Aspect::Control]),
+        // A plan knows nothing of the exact path that LinuxCNC's cycles follow.
+        _ if unit.exchange => forget(&mut result, &[Aspect::Control]),
+        // Its words for them are others; what it lacks has been told.
+        Some(other) if !other.starts_with("linuxcnc") => forget(&mut result, &[Aspect::Control]),
+        _ => {}
     }
-    tell(global, &result, &a.sources, &b.sources)
+    let state = built.found.into_iter().filter(|d| d.code == gr_text::code::EMIT_ELSEWHERE);
+    let mut told = Exit::Ok;
+    for finding in state {
+        renderer.show(&built.sources, &finding);
+        told = Exit::Findings;
+    }
+    renderer.finish(false);
+    tell(global, &result, &a.sources, &b.sources).max(told)
 }
 
 /// What matters to the joint values.
@@ -214,16 +250,3 @@ fn on_robot(global: &Global, args: &VerifyArgs, station: &Station, machine: &gr_
     super::print(&report.table())
 }
 
-/// One unit of the last decimal that is written. With straight pieces for arcs, their tolerance too; with arcs, what
-/// rounding of both ends and the centre makes of them at most: half a unit in each coordinate moves the centre by 0.71
-/// units and each radius by 1.42, and a helix has its own half in depth.
-fn allowed(args: &VerifyArgs) -> f64 {
-    let o = &args.options;
-    let inch = o.units == Some(UnitArg::Inch);
-    let fanuc = o.to.as_deref().is_some_and(|t| !t.starts_with("linuxcnc"));
-    let decimals = o.decimals.unwrap_or(4 + usize::from(inch) - usize::from(fanuc)) as i32;
-    let unit = 10_f64.powi(-decimals) * if inch { 25.4 } else { 1.0 };
-    let pieces = o.arcs == Some(crate::emit::ArcsArg::Lines) || o.plane == Some(crate::emit::PlaneArg::Xy);
-    let curve = if pieces { o.arc_tolerance.unwrap_or(0.001) } else { 1.25 * unit };
-    (unit + curve).max(1e-6)
-}

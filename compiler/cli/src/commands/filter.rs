@@ -14,7 +14,7 @@ use crate::options::{FilterArgs, Global, LintArgs};
 use crate::output::{same_file, to_stdout, write_all};
 use crate::pipeline::load;
 use crate::render::{MessageFormat, Renderer};
-use crate::setup::{Station, station};
+use crate::setup::{Station, beside, station};
 use crate::sources::{Sources, reason};
 
 /// LinuxCNC tells the programs it starts where the machine's settings are.
@@ -46,9 +46,8 @@ fn filter(args: &FilterArgs, renderer: &mut Renderer) -> Exit {
     if setup.ini.is_none() {
         setup.ini = std::env::var_os(INI_VARIABLE).filter(|v| !v.is_empty()).map(PathBuf::from);
     }
-    let from = args.file.parent().filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let mut sources = Sources::default();
-    let Some(mut station) = station(&setup, &LintArgs::default(), from, &mut sources, renderer) else { return renderer.failed() };
+    let Some(mut station) = station(&setup, &LintArgs::default(), beside(&args.file), &mut sources, renderer) else { return renderer.failed() };
     if args.write_tools.is_some() {
         station.tools = None;
     }

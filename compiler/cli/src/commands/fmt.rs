@@ -13,21 +13,20 @@ use crate::exit::Exit;
 use crate::options::{CaseArg, FmtArgs, Global, LintArgs, RenumberArgs, SetupArgs, StyleArgs, ZerosArg};
 use crate::output::{to_stdout, write_all};
 use crate::render::Renderer;
-use crate::setup::{self, Station, station};
+use crate::setup::{self, Station, Stations};
 use crate::sources::{Sources, read_program, reason, walk};
 
 pub fn run(global: &Global, args: &FmtArgs) -> Exit {
-    let mut work = match Work::new(global, args.dialect.as_ref()) {
-        Ok(work) => work,
-        Err(exit) => return exit,
-    };
+    let mut work = Work::new(global, args.dialect.as_ref());
     let options = style(&args.style);
     let mut exit = Exit::Ok;
+    let dialect = args.dialect.as_deref().and_then(Dialect::find);
+    let mut all = Vec::new();
     for path in &args.paths {
         let mut files = vec![path.clone()];
         if path.is_dir() {
             files.clear();
-            let closed = walk(path, &setup::is_program(work.station.dialect), &mut files);
+            let closed = walk(path, &setup::is_program(dialect), &mut files);
             if closed.is_empty() && files.is_empty() {
                 work.complain(path, code::PROJECT_NOTHING_TO_DO, &[path.display().to_string()]);
                 exit = exit.max(Exit::Findings);
@@ -36,23 +35,25 @@ pub fn run(global: &Global, args: &FmtArgs) -> Exit {
                 exit = exit.max(work.complain(&at, code::FILE_UNREADABLE, &[at.display().to_string(), reason(&e)]));
             }
         }
-        for file in files {
-            exit = exit.max(work.format(&file, args.check, &options));
-        }
+        all.extend(files);
+    }
+    let Some(stations) = work.stations(&all) else { return work.failed() };
+    for (n, file) in all.iter().enumerate() {
+        let Some(station) = stations.get(n) else { break };
+        exit = exit.max(work.format(file, station, args.check, &options));
     }
     work.renderer.finish(false);
     exit
 }
 
 pub fn renumber(global: &Global, args: &RenumberArgs) -> Exit {
-    let mut work = match Work::new(global, args.dialect.as_ref()) {
-        Ok(work) => work,
-        Err(exit) => return exit,
-    };
+    let mut work = Work::new(global, args.dialect.as_ref());
+    let Some(stations) = work.stations(std::slice::from_ref(&args.file)) else { return work.failed() };
+    let Some(station) = stations.get(0) else { return Exit::Usage };
     let exit = match read_program(&args.file) {
         Ok(decoded) if is_exchange(&args.file, &decoded.text) => work.exchange(args, &decoded),
         Ok(decoded) => {
-            let dialect = work.station.dialect_of(&args.file, &decoded.text);
+            let dialect = station.dialect_of(&args.file, &decoded.text);
             let scan = gr_gcode::scan(&decoded.text, dialect);
             let numbers = Renumber { start: args.start, step: args.step, all: args.all };
             let text = renumbered(&decoded.text, &scan, dialect, numbers);
@@ -164,21 +165,22 @@ fn formatted(path: &Path, text: &str, station: &Station, options: &FormatOptions
 struct Work {
     renderer: Renderer,
     sources: Sources,
-    station: Station,
+    setup: SetupArgs,
 }
 
 impl Work {
-    fn new(global: &Global, dialect: Option<&String>) -> Result<Work, Exit> {
-        let mut renderer = global.renderer(true);
-        let mut sources = Sources::default();
+    fn new(global: &Global, dialect: Option<&String>) -> Work {
         let setup = SetupArgs { dialect: dialect.cloned(), ..SetupArgs::default() };
-        match station(&setup, &LintArgs::default(), Path::new("."), &mut sources, &mut renderer) {
-            Some(station) => Ok(Work { renderer, sources, station }),
-            None => {
-                renderer.finish(false);
-                Err(renderer.failed())
-            }
-        }
+        Work { renderer: global.renderer(true), sources: Sources::default(), setup }
+    }
+
+    fn stations(&mut self, programs: &[PathBuf]) -> Option<Stations> {
+        Stations::of(&self.setup, &LintArgs::default(), programs, &mut self.sources, &mut self.renderer)
+    }
+
+    fn failed(mut self) -> Exit {
+        self.renderer.finish(false);
+        self.renderer.failed()
     }
 
     fn complain(&mut self, path: &Path, code: gr_text::Code, args: &[String]) -> Exit {
@@ -186,7 +188,7 @@ impl Work {
         Exit::Io
     }
 
-    fn format(&mut self, path: &PathBuf, check: bool, options: &FormatOptions) -> Exit {
+    fn format(&mut self, path: &PathBuf, station: &Station, check: bool, options: &FormatOptions) -> Exit {
         let decoded: Decoded = match read_program(path) {
             Ok(d) => d,
             Err((code, args)) => return self.complain(path, code, &args),
@@ -200,8 +202,8 @@ impl Work {
             self.renderer.show(&sources, &d);
             return Exit::Findings;
         }
-        self.doubt_mark(path, &decoded);
-        let text = formatted(path, &decoded.text, &self.station, options);
+        self.doubt_mark(path, &decoded, station);
+        let text = formatted(path, &decoded.text, station, options);
         if check {
             if text == decoded.text {
                 return Exit::Ok;
@@ -217,12 +219,12 @@ impl Work {
 
     /// The byte order mark stays, as the spelling of the file does, but not in silence. No mark keeps a program from being
     /// laid out.
-    fn doubt_mark(&mut self, path: &Path, decoded: &Decoded) {
+    fn doubt_mark(&mut self, path: &Path, decoded: &Decoded, station: &Station) {
         if !is_marked(decoded.encoding) {
             return;
         }
         let text = decoded.text.as_str().into();
-        let Some(mut mark) = byte_order_mark(decoded.encoding, path, &text, &self.station) else { return };
+        let Some(mut mark) = byte_order_mark(decoded.encoding, path, &text, station) else { return };
         mark.severity = mark.severity.max(Severity::Warning);
         let mut sources = Sources::default();
         sources.add(path.display().to_string(), text);

@@ -75,8 +75,9 @@ fn own_station(path: &Path, settings: &Settings) -> (crate::setup::Station, Sour
     let mut renderer = Renderer::collecting();
     let from = path.parent().unwrap_or(Path::new("."));
     let mut station = assembled(&setup_args(settings), &lints, from, &mut sources, &mut renderer);
-    // Where the server was started says nothing about the program.
+    // Where the server was started says nothing about the program, and a call leads to no file that the user did not name.
     station.setup.base = Some(from.to_path_buf());
+    station.setup.confined = Some(settings.folders.clone());
     (station, sources, renderer.into_collected())
 }
 

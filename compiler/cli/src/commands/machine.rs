@@ -13,7 +13,7 @@ pub fn run(global: &Global, args: &MachineArgs) -> Exit {
     match &args.action {
         MachineAction::List => super::print(&catalogue()),
         MachineAction::Show { machine, toml } => show(global, machine, *toml),
-        MachineAction::Import { file, id, output } => import(global, file, id, output.as_deref()),
+        MachineAction::Import { file, id, tip, output } => import(global, file, (id, tip.as_deref()), output.as_deref()),
         MachineAction::Check { files } => {
             files.iter().map(|f| check(global, f, false, false)).max().unwrap_or(Exit::Ok)
         }
@@ -88,12 +88,12 @@ fn said(global: &Global, path: &Path, machine: &gr_machine::Machine) -> Exit {
 }
 
 /// Makes a machine file of a URDF.
-fn import(global: &Global, path: &Path, id: &str, output: Option<&Path>) -> Exit {
+fn import(global: &Global, path: &Path, (id, tip): (&str, Option<&str>), output: Option<&Path>) -> Exit {
     let text = match read(path) {
         Ok(d) => d.text,
         Err((code, args)) => return super::refuse(global, path, code, &args),
     };
-    let made = match gr_machine::import_urdf(id, &text) {
+    let made = match gr_machine::import_urdf(id, &text, tip) {
         Ok(made) => made,
         Err(why) => {
             eprintln!("{}: {why}", path.display());

@@ -158,7 +158,8 @@ fn area(global: &Global, args: &MapArgs, machine: &Machine, plane: Plane, budget
     heeds("--force", args.force.is_some(), by_force, "deflections and the total")?;
     heeds("--it", args.grade.is_some(), by_grade, "errors by the geometry and the total")?;
     graded(args.grade, args.deviations.as_deref())?;
-    let probe = probe(machine, args.tool_turn.as_deref())?.touched(zero(machine, args)?);
+    let held = Held::new(machine, args.tool, args.tool_length, args.tool_turn.as_deref())?;
+    let probe = held.probe(machine)?.touched(zero(machine, args)?);
     let size = size(&probe, machine, args, 400)?;
     // The publication counts nodes on the border too.
     let window = args.reference.map(|_| {
@@ -207,8 +208,9 @@ fn area(global: &Global, args: &MapArgs, machine: &Machine, plane: Plane, budget
     if total && !elastic && force != [0.0; 3] {
         left_out.push(["the deflection".into(), format!("the file of {} has no `[stiffness]` of {}", machine.id, soft.join(", "))]);
     }
-    let title = format!("{}: {what}, {} = {} mm", machine.id, ["X", "Y", "Z"][plane.axis], plane.at);
-    let mut text = told(&map, machine, &what);
+    let with = if args.reference.is_some() { String::new() } else { format!(", {}", held.words(&probe)) };
+    let title = format!("{}: {what}, {} = {} mm{with}", machine.id, ["X", "Y", "Z"][plane.axis], plane.at);
+    let mut text = told(&map, machine, &what, &with);
     let flat = probe.extent().iter().any(|(low, high)| high - low < 1e-6);
     if quantity == Quantity::Workspace && !flat {
         let tell = |done: usize, of: usize| progress.tell(|| format!("volume of {}: layer {done} of {of}", machine.id));
@@ -216,7 +218,7 @@ fn area(global: &Global, args: &MapArgs, machine: &Machine, plane: Plane, budget
         let _ = writeln!(text, "volume {volume:.1} dm³ (by {layers} layers of {nodes} × {nodes} nodes)");
     }
     drop(progress);
-    let mut notes: Vec<String> = stands(&probe, args.tool_turn.as_deref());
+    let mut notes: Vec<String> = held.notes(&probe);
     notes.extend(framed(machine));
     if geometry && probe.counts_from_zero() {
         notes.push(format!("geometry: {}", counted(machine, args)?));
@@ -228,7 +230,7 @@ fn area(global: &Global, args: &MapArgs, machine: &Machine, plane: Plane, budget
             notes.push("so it is by build: with the tool upright an axis turns it about itself; `--tool-turn` leans it".to_string());
         }
     }
-    let held = notes.len();
+    let of_places = notes.len();
     if map.elastic && by_force {
         notes.push(format!("force X {} Y {} Z {} N", force[0], force[1], force[2]));
     }
@@ -250,43 +252,107 @@ fn area(global: &Global, args: &MapArgs, machine: &Machine, plane: Plane, budget
     // Lines of a picture are short.
     let lines: Vec<String> = notes.iter().flat_map(|n| n.split("; ")).flat_map(wrapped).collect();
     let picture = Picture::map(&map, &title, &lines);
-    let without: Vec<String> = notes[..held].iter().cloned().chain(without).collect();
+    let without: Vec<String> = notes[..of_places].iter().cloned().chain(without).collect();
     Ok(Made { text, files: files(&args.output, &picture, || map.csv(&without))?, left_out })
 }
 
-/// The machine with its tool turned as asked: straight down on arms, upright on mills, as at the start on planar arms.
-pub fn probe<'m>(machine: &'m Machine, turn: Option<&str>) -> Result<Probe<'m>, Refused> {
-    let probe = Probe::downward(machine);
-    let Some(text) = turn else { return Ok(probe) };
-    let why = |why: &str| Err(("--tool-turn".to_string(), why.to_string()));
-    let Some(words) = triple(text).filter(|w| w.iter().all(|v| v.abs() <= 360.0)) else {
-        return why("three angles in degrees are wanted, A,B,C: -30,0,45");
-    };
-    if !probe.turns_as_asked() {
-        return why(&format!("{} has no joint that turns its tool as one likes", machine.id));
-    }
-    let turn = product(&euler(words.map(f64::to_radians)), &gr_robot::Turns::new(machine).still());
-    Ok(probe.held(Frame::IDENTITY, turn))
+/// What a map or a rectangle without a program is of: a tool of the machine file, else the nose of its spindle or the flange.
+pub struct Held<'a> {
+    /// Its name; none without a tool.
+    tool: Option<String>,
+    /// Its point on the flange.
+    frame: Frame,
+    /// How it is turned, as the user wrote it.
+    turn: Option<&'a str>,
+    /// The machine has a spindle of its own on the flange.
+    spindle: bool,
+    /// The machine file has tools.
+    tools: bool,
 }
 
-/// How the tool stands in a map or a rectangle, where the machine can turn it, and which of its ways to stand an arm takes.
-pub fn stands(probe: &Probe<'_>, turn: Option<&str>) -> Vec<String> {
-    if !probe.turns_as_asked() {
-        return Vec::new();
+impl<'a> Held<'a> {
+    /// By the options `--tool`, `--tool-length` and `--tool-turn`.
+    pub fn new(machine: &Machine, tool: Option<u32>, length: Option<f64>, turn: Option<&'a str>) -> Result<Held<'a>, Refused> {
+        let cell = &machine.cell;
+        let (tool, frame) = match (tool, length) {
+            (Some(n), _) => match cell.tools.get(&n) {
+                Some(t) => (Some(format!("tool {n} ({})", t.name)), cell.tool_frame(n)),
+                None => {
+                    let list: Vec<String> = cell.tools.keys().map(u32::to_string).collect();
+                    let has = if list.is_empty() { "no `[[tool]]`".to_string() } else { format!("the tools {}", list.join(", ")) };
+                    return Err((format!("--tool {n}"), format!("the file of {} has {has}; `--tool-length` says the length of another", machine.id)));
+                }
+            },
+            (None, Some(length)) if length.is_finite() && length.abs() <= LONGEST => {
+                (Some(format!("a tool of {length} mm")), machine.tool_of_length(length))
+            }
+            (None, Some(length)) => return Err(("--tool-length".into(), format!("no tool is {length} mm long"))),
+            (None, None) => (None, cell.tool_frame(u32::MAX)),
+        };
+        Ok(Held { tool, frame, turn, spindle: cell.spindle.is_some(), tools: !cell.tools.is_empty() })
     }
-    let held = match turn {
-        Some(text) => format!("tool turned by A,B,C {text}°"),
-        None if probe.leans() => "tool upright".to_string(),
-        None => match probe.planar_angle() {
-            Some(angle) => format!("tool turned as at the start: C {:.1}°", angle.to_degrees()),
-            None => "tool straight down".to_string(),
-        },
-    };
-    let mut out = vec![format!("{held}, at every place (`--tool-turn`)")];
-    if !probe.leans() {
-        out.push("where the arm can stand in several ways: the one nearest to its start".to_string());
+
+    /// The machine with it, turned as asked: straight down on arms, upright on mills, elsewhere as at the start.
+    pub fn probe<'m>(&self, machine: &'m Machine) -> Result<Probe<'m>, Refused> {
+        let probe = Probe::downward(machine).holding(self.frame);
+        let Some(text) = self.turn else { return Ok(probe) };
+        let why = |why: &str| Err(("--tool-turn".to_string(), why.to_string()));
+        let Some(words) = triple(text).filter(|w| w.iter().all(|v| v.abs() <= 360.0)) else {
+            return why("three angles in degrees are wanted, A,B,C: -30,0,45");
+        };
+        if !probe.turns_as_asked() {
+            return why(&format!("{} has no joint that turns its tool as one likes", machine.id));
+        }
+        let turn = product(&euler(words.map(f64::to_radians)), &gr_robot::Turns::new(machine).still());
+        Ok(probe.held(self.frame, turn))
     }
-    out
+
+    /// What it is, in words.
+    fn thing(&self, probe: &Probe<'_>) -> String {
+        match &self.tool {
+            Some(tool) => tool.clone(),
+            None if self.spindle || probe.leans() => "the spindle's nose".into(),
+            None => "the flange".into(),
+        }
+    }
+
+    /// What it is and how it stands.
+    pub fn words(&self, probe: &Probe<'_>) -> String {
+        match (&self.tool, self.turn) {
+            (tool, _) if !probe.turns_as_asked() => tool.clone().unwrap_or_else(|| "without a tool".into()),
+            (_, Some(text)) => format!("{} turned by A,B,C {text}°", self.thing(probe)),
+            _ => format!("{} {}", self.thing(probe), direction(probe)),
+        }
+    }
+
+    /// How it stands in a map or a rectangle, where the machine can turn it, and which of its ways to stand an arm takes; what a tool
+    /// that is not there would change.
+    pub fn notes(&self, probe: &Probe<'_>) -> Vec<String> {
+        let mut out = Vec::new();
+        if probe.turns_as_asked() {
+            out.push(format!("{}, at every place (`--tool-turn`)", self.words(probe)));
+            if !probe.leans() {
+                out.push("where the arm can stand in several ways: the one nearest to its start".to_string());
+            }
+        }
+        if self.tool.is_none() && self.tools {
+            out.push("without a tool (`--tool`): its length is not in it".to_string());
+        }
+        out
+    }
+}
+
+/// Longer than any tool, mm.
+const LONGEST: f64 = 10_000.0;
+
+/// Which way a tool points that the machine can turn.
+fn direction(probe: &Probe<'_>) -> String {
+    if let Some(angle) = probe.planar_angle() {
+        return format!("turned as at the start: C {:.1}°", angle.to_degrees());
+    }
+    let straight = if probe.leans() { "upright" } else { "straight down" };
+    let lean = probe.lean().to_degrees();
+    if lean < 0.05 { straight.to_string() } else { format!("leaning {lean:.1}° from {straight}") }
 }
 
 /// The zero of a machine tool that errors by the geometry count from: the base's where none is given.
@@ -440,14 +506,14 @@ fn signs(text: &str, count: usize) -> Option<Vec<f64>> {
     all.filter(|s| s.len() == count)
 }
 
-fn told(map: &Map, machine: &Machine, what: &str) -> String {
+fn told(map: &Map, machine: &Machine, what: &str, with: &str) -> String {
     let (a, b) = map.plane.axes();
     let name = |i: usize| ["X", "Y", "Z"][i];
     let unit = match map.quantity.unit() {
         "" => String::new(),
         unit => format!(" {unit}"),
     };
-    let mut out = format!("{}: {what} in the plane {} = {} mm\n", machine.id, name(map.plane.axis), map.plane.at);
+    let mut out = format!("{}: {what} in the plane {} = {} mm{with}\n", machine.id, name(map.plane.axis), map.plane.at);
     let Some(s) = map.summary() else { return out };
     let step = map.step();
     let _ = writeln!(out, "area {:.2} dm² ({} nodes of {:.3} × {:.3} mm)", s.area / 1e4, s.nodes, step[0], step[1]);
@@ -471,7 +537,8 @@ fn bars(global: &Global, machine: &Machine, plane: Plane, args: &MapArgs) -> Res
     if args.signs.is_some() || args.force.is_some() || args.grade.is_some() || args.deviations.is_some() {
         return Err(("--quantity sensitivity".into(), "it goes by the geometry alone: no `--signs`, `--force`, `--deviations` or `--it`".into()));
     }
-    let probe = probe(machine, args.tool_turn.as_deref())?.touched(zero(machine, args)?);
+    let held = Held::new(machine, args.tool, args.tool_length, args.tool_turn.as_deref())?;
+    let probe = held.probe(machine)?.touched(zero(machine, args)?);
     let size = size(&probe, machine, args, 120)?;
     let progress = Progress::new(global.quiet, format!("sensitivities of {}", machine.id));
     probe.extent();
@@ -521,8 +588,10 @@ fn bars(global: &Global, machine: &Machine, plane: Plane, args: &MapArgs) -> Res
     }
     text.push('\n');
     let plane = format!("{} = {} mm", ["X", "Y", "Z"][plane.axis], plane.at);
-    let mut notes = vec![format!("mean over the places within reach in the plane {plane}")];
-    notes.extend(stands(&probe, args.tool_turn.as_deref()));
+    // Where the tool can be turned a note says how it is.
+    let with = if args.reference.is_some() || probe.turns_as_asked() { String::new() } else { format!(", {}", held.words(&probe)) };
+    let mut notes = vec![format!("mean over the places within reach in the plane {plane}{with}")];
+    notes.extend(held.notes(&probe));
     notes.extend(framed(machine));
     if probe.counts_from_zero() {
         notes.push(counted(machine, args)?);
@@ -571,18 +640,20 @@ fn bars_csv(all: &[Bar], columns: &[&str], notes: &[String]) -> String {
     out
 }
 
-/// The map that belongs to a report: errors by joints and geometry, those that are known, at a height.
-pub fn beside(global: &Global, machine: &Machine, budget: &Budget, of: &Beside, goal: &PathBuf) -> Result<Vec<(PathBuf, Vec<u8>)>, Refused> {
+/// The map that belongs to a report: errors by joints and geometry, those that are known, in the plane of the largest one, with the
+/// tool that makes it, standing as it does there: at that place it is what the table says.
+pub fn beside(global: &Global, machine: &Machine, budget: &Budget, of: Option<&Beside>, goal: &PathBuf) -> Result<Vec<(PathBuf, Vec<u8>)>, Refused> {
     let length = gr_accuracy::map::Part::Length;
+    let no = |why: String| ("--map".to_string(), why);
     let (quantity, what) = match (budget.joints.is_some(), budget.tells_geometry()) {
         (true, true) => (Quantity::Total, "sum of the longest errors of joints and geometry".to_string()),
         (false, true) => (Quantity::Geometric(length), Quantity::Geometric(length).words()),
         (true, false) => (Quantity::Kinematic(length), Quantity::Kinematic(length).words()),
-        _ => return Err(("--map".into(), format!("the file of {} says nothing of its errors: there is nothing to draw", machine.id))),
+        _ => return Err(no(format!("the file of {} says nothing of its errors: there is nothing to draw", machine.id))),
     };
-    let height = of.height;
-    let plane = Plane { axis: 2, at: height };
-    let probe = Probe::downward(machine).touched(of.zero.unwrap_or_default());
+    let of = of.ok_or_else(|| no("the program cuts nothing: there is no place to draw".into()))?;
+    let plane = Plane { axis: 2, at: of.point[2] };
+    let probe = Probe::downward(machine).standing(of.tool.1, &of.joints).map_err(|e| no(e.to_string()))?.since(of.zero.clone());
     let request = Request { quantity, plane, size: (400, 400), window: None, force: [0.0; 3], signs: None };
     let progress = Progress::new(global.quiet, format!("map of {}", machine.id));
     probe.extent();
@@ -598,10 +669,18 @@ pub fn beside(global: &Global, machine: &Machine, budget: &Budget, of: &Beside, 
         }
     });
     drop(progress);
-    let title = format!("{}: {what}, Z = {height} mm", machine.id);
+    let height = (plane.at * 1e3).round() / 1e3 + 0.0;
+    if map.summary().is_none() {
+        return Err(no(format!("nothing of the plane Z = {height} mm is within reach with {}", of.tool.0)));
+    }
+    let stands = if probe.turns_as_asked() { format!(" {}", direction(&probe)) } else { String::new() };
+    let title = format!("{}: {what}, Z = {height} mm, {}{stands}", machine.id, of.tool.0);
     let mut notes: Vec<String> = unsaid(machine, budget).iter().map(without).collect();
     notes.push("left out: the deflection".to_string());
-    notes.extend(stands(&probe, None));
+    notes.push(format!("{} as in line {}, where the error is largest, at every place", of.tool.0, of.line));
+    if probe.turns_as_asked() && !probe.leans() {
+        notes.push("where the arm can stand in several ways: the one nearest to how it stands there".to_string());
+    }
     notes.extend(framed(machine));
     if probe.counts_from_zero() {
         notes.push("geometry: counted from the program's zero, which is touched on this machine".to_string());

@@ -19,7 +19,7 @@ use crate::exit::Exit;
 use crate::options::{Global, LintArgs, PlaceAim, PlaceArgs, TableFormat};
 use crate::pipeline::{Motion, load, motion};
 use crate::progress::Progress;
-use crate::setup::station;
+use crate::setup::{beside, station};
 use crate::sources::Sources;
 
 /// The path is looked at this often, mm: reach is not convex, so the ends of a move don't speak for what lies between.
@@ -33,7 +33,8 @@ pub fn run(global: &Global, args: &PlaceArgs) -> Exit {
     let mut renderer = global.renderer(true);
     let mut sources = Sources::default();
     let name = args.file.clone().unwrap_or_else(|| "place".into());
-    let Some(station) = station(&args.setup, &LintArgs::default(), Path::new("."), &mut sources, &mut renderer) else {
+    let from = args.file.as_deref().map_or(Path::new("."), beside);
+    let Some(station) = station(&args.setup, &LintArgs::default(), from, &mut sources, &mut renderer) else {
         renderer.finish(false);
         return renderer.failed();
     };
@@ -57,9 +58,10 @@ pub fn run(global: &Global, args: &PlaceArgs) -> Exit {
         }
         return largest(global, args, &machine);
     };
-    if args.tool_turn.is_some() {
-        let why = "the program says itself how the tool is turned".to_string();
-        return super::refuse(global, &name, code::ACCURACY_BAD_OPTION, &["--tool-turn".to_string(), why]);
+    let for_stock = [("--tool-turn", args.tool_turn.is_some()), ("--tool", args.tool.is_some()), ("--tool-length", args.tool_length.is_some())];
+    if let Some((option, _)) = for_stock.into_iter().find(|(_, given)| *given) {
+        let why = "the program says itself which tool it has and how that is turned".to_string();
+        return super::refuse(global, &name, code::ACCURACY_BAD_OPTION, &[option.to_string(), why]);
     }
     let progress = Progress::new(global.quiet, format!("placing {}", file.display()));
     let made = load(file, &station).and_then(|unit| motion(&unit, Some(&machine)).map(|(m, _)| m));
@@ -156,7 +158,7 @@ impl Wish<'_> {
         };
         let nowhere = || Diagnostic::new(code::PLACE_DOES_NOT_FIT, FileId(0), Span::default(), std::slice::from_ref(&self.machine.id));
         if let Some(mill) = Mill::new(self.machine, (program, &texts), true) {
-            let strange = crate::robot::missing_axes(program, self.machine, &texts).into_iter();
+            let strange = gr_robot::opinion::missing_axes(program, self.machine, &texts).into_iter();
             let beyond: Vec<Diagnostic> = strange.chain(mill.beyond.iter().filter_map(limits)).collect();
             if !beyond.is_empty() {
                 return Err(beyond);
@@ -425,22 +427,22 @@ fn largest(global: &Global, args: &PlaceArgs, machine: &Machine) -> Exit {
     let (low, high) = (ends[0], *ends.last().unwrap_or(&ends[0]));
     let layers = ((high - low).abs() / 20.0).ceil() as usize;
     let heights: Vec<f64> = (0..=layers).map(|i| low + (high - low) * i as f64 / layers.max(1) as f64).collect();
-    let probe = match super::map::probe(machine, args.tool_turn.as_deref()) {
-        Ok(probe) => probe,
+    let held = super::map::Held::new(machine, args.tool, args.tool_length, args.tool_turn.as_deref());
+    let (held, probe) = match held.and_then(|held| held.probe(machine).map(|probe| (held, probe))) {
+        Ok(both) => both,
         Err((what, why)) => return super::refuse(global, Path::new("place"), code::ACCURACY_BAD_OPTION, &[what, why]),
     };
-    let held = super::map::stands(&probe, args.tool_turn.as_deref());
+    let held = held.words(&probe);
     let Some(Rectangle { x: (x0, x1), middle, half }) = rectangle(&probe, &heights) else {
         let why = format!("no rectangle is within reach from there to there; {}", super::map::reach_along(&probe, 2));
         return super::refuse(global, Path::new(&machine.id), code::ACCURACY_BAD_OPTION, &[format!("--heights {}", args.heights), why]);
     };
     let (y0, y1) = (middle - half, middle + half);
     super::print(&match args.format {
-        TableFormat::Json => format!("{:#}\n", json!({ "machine": machine.id, "heights": [low, high], "x": [x0, x1], "y": [y0, y1], "tool": held.first() })),
+        TableFormat::Json => format!("{:#}\n", json!({ "machine": machine.id, "heights": [low, high], "x": [x0, x1], "y": [y0, y1], "tool": held })),
         TableFormat::Csv => format!("x from,x to,y from,y to,z from,z to\n{x0},{x1},{y0},{y1},{low},{high}\n"),
         TableFormat::Text => {
-            let held = held.first().map_or(String::new(), |h| format!("{h}\n"));
-            format!("largest rectangle in reach of {} from Z {low} to {high} mm, symmetric about Y {middle}:\nX {x0} to {x1}, Y {y0} to {y1} mm\n{held}", machine.id)
+            format!("largest rectangle in reach of {} from Z {low} to {high} mm, symmetric about Y {middle}:\nX {x0} to {x1}, Y {y0} to {y1} mm\n{held}, at every place\n", machine.id)
         }
     })
 }

@@ -1,6 +1,5 @@
 //! `gcc-robot preview part.ngc -o part.svg`; served pages: see `preview_serve`
 
-use std::path::Path;
 
 use gr_backends::plot::{Options, Show};
 use gr_text::Severity;
@@ -11,7 +10,7 @@ use crate::exit::Exit;
 use crate::options::{Global, LintArgs, PreviewArgs, ViewArg};
 use crate::pipeline::{load, motion};
 use crate::progress::Progress;
-use crate::setup::station;
+use crate::setup::{beside, station};
 use crate::sources::Sources;
 
 pub fn run(global: &Global, args: &PreviewArgs) -> Exit {
@@ -20,7 +19,7 @@ pub fn run(global: &Global, args: &PreviewArgs) -> Exit {
     };
     let mut renderer = global.renderer(false);
     let mut sources = Sources::default();
-    let Some(station) = station(&args.setup, &LintArgs::default(), Path::new("."), &mut sources, &mut renderer) else {
+    let Some(station) = station(&args.setup, &LintArgs::default(), beside(&args.file), &mut sources, &mut renderer) else {
         renderer.finish(false);
         return renderer.failed();
     };

@@ -7,7 +7,7 @@
 
 use std::io::{BufRead as _, BufReader, Read, Write};
 use std::net::{Ipv4Addr, TcpListener, TcpStream};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard};
@@ -21,7 +21,7 @@ use super::check::Checked;
 use crate::exit::Exit;
 use crate::options::{Global, LintArgs, PreviewArgs};
 use crate::pipeline::{Unit, load, motion};
-use crate::setup::{Station, station};
+use crate::setup::{Station, beside, station};
 use crate::sources::{Positions, Sources};
 
 /// How often the file is looked at.
@@ -73,7 +73,7 @@ impl Shared {
 pub fn run(global: &Global, args: &PreviewArgs) -> Exit {
     let mut renderer = global.renderer(true);
     let mut sources = Sources::default();
-    let Some(station) = station(&args.setup, &LintArgs::default(), Path::new("."), &mut sources, &mut renderer) else {
+    let Some(station) = station(&args.setup, &LintArgs::default(), beside(&args.file), &mut sources, &mut renderer) else {
         renderer.finish(false);
         return renderer.failed();
     };
@@ -131,9 +131,10 @@ fn say(message: &Value) {
 }
 
 fn listen_to_editor(tell: &Sender<News>) {
-    for line in std::io::stdin().lock().lines() {
+    // A line that is no text is none of ours, as every other that is no message.
+    for line in std::io::stdin().lock().split(b'\n') {
         let Ok(line) = line else { break };
-        let Ok(message) = serde_json::from_str::<Value>(&line) else { continue };
+        let Ok(message) = serde_json::from_slice::<Value>(&line) else { continue };
         if let Some(text) = message["text"].as_str() {
             let _ = tell.send(News::Text(text.to_string()));
         } else if let Some(line) = message["line"].as_i64() {

@@ -63,7 +63,8 @@ impl Client {
         }
         let mut child = Command::new(env!("CARGO_BIN_EXE_gcc-robot"))
             .arg("lsp")
-            .current_dir(folder.path())
+            // Where the server is started says nothing about the programs.
+            .current_dir(std::env::temp_dir())
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .stderr(Stdio::null())

@@ -277,3 +277,31 @@ fn choices_and_explanations() {
     assert!(e["markdown"].as_str().is_some_and(|m| m.starts_with("**G83**")));
     c.shut_down();
 }
+
+/// What the command is told makes of a saved program what the editor shows of it.
+#[test]
+fn builds_are_told_the_settings() {
+    let settings = json!({ "dialect": "grbl", "machine": "generic/mill3", "tools": "t.tbl", "subs": ["lib"], "machineUnits": "inch", "blockDelete": true, "lints": { "strict": true, "allow": ["E0284"] } });
+    let mut c = Client::new(&[("a.nc", "G21\nM2\n"), ("b.nc", "(gcc-robot: dialect=linuxcnc)\nG21\nM2\n"), ("t.tbl", "T1 P1 D10 Z50\n")], settings);
+    let at = |c: &Client, name: &str| c.path(name).display().to_string();
+    let rest = ["--machine", "generic/mill3", "--tools", &at(&c, "t.tbl"), "--machine-units", "inch", "--subs", &at(&c, "lib"), "--allow", "E0284", "--block-delete", "--strict"].map(str::to_string);
+    for (name, dialect) in [("a.nc", "grbl"), ("b.nc", "linuxcnc-2.9")] {
+        let uri = c.open(name, None);
+        let told = c.request("gccRobot/buildOptions", json!({ "textDocument": { "uri": uri } }));
+        let mut wanted = vec!["--dialect".to_string(), dialect.to_string()];
+        wanted.extend(rest.iter().cloned());
+        assert_eq!(told["options"], json!(wanted), "what the program says itself goes before the setting");
+    }
+    c.shut_down();
+    // A tool table of the settings: what the command writes is what the editor shows.
+    let text = "G21 G90 G17 F300\nT1 M6\nG43 H1\nG0 X0 Y0 Z5\nG1 Z-1\nM2\n";
+    let mut c = Client::new(&[("shop/a.ngc", text), ("t.tbl", "T1 P1 D10 Z50\n")], json!({ "tools": "t.tbl" }));
+    let uri = c.open("shop/a.ngc", None);
+    let shown = c.request("gccRobot/output", json!({ "textDocument": { "uri": uri }, "target": "canon" }));
+    let told = c.request("gccRobot/buildOptions", json!({ "textDocument": { "uri": uri } }));
+    let options: Vec<String> = serde_json::from_value(told["options"].clone()).expect("words");
+    let built = std::process::Command::new(env!("CARGO_BIN_EXE_gcc-robot")).arg("build").arg(c.path("shop/a.ngc")).args(["--target", "canon"]).args(&options).output().expect("it runs");
+    assert_eq!(String::from_utf8_lossy(&built.stdout), shown["files"][0]["text"].as_str().expect("a text"));
+    assert!(shown["files"][0]["text"].as_str().is_some_and(|t| t.contains("50.0000")), "{shown}");
+    c.shut_down();
+}

@@ -984,6 +984,31 @@ fn values_in_hints_are_values() {
 }
 
 #[test]
+fn what_other_machines_cannot_do() {
+    let errors = |c: &mut Client, uri: &str| -> Vec<String> {
+        let found = c.diagnostics(uri);
+        let found: Vec<&Value> = found.iter().filter(|d| d["severity"] == 1).collect();
+        found.iter().map(|d| format!("{} {}", d["code"].as_str().unwrap_or(""), c.place(uri, &d["range"]))).collect()
+    };
+    // Axes of a mill; the planar arm, which has no plan; STEP-NC files.
+    let turns = ("a.ngc", "G21 G90 F600\nG1 X10 Y0\nG1 A30\nM2\n");
+    let reaches = ("a.ngc", "G21 G90 F600\nG1 X10 Y0\nG1 X9 Y5\nG1 X900\nM2\n");
+    let plan = ("a.p21", include_str!("../fixtures/probe.p21"));
+    let cases = [(turns, "generic/mill3", "E0553 a.ngc:3 G1 A30"), (reaches, "ufmg/plano-3r", "E0504 a.ngc:4 G1 X900"), (plan, "abb/irb140", "E0521 a.p21:28 ")];
+    for ((name, text), machine, wanted) in cases {
+        let mut c = Client::new(&[(name, text)], json!({ "machine": machine }));
+        let uri = c.open(name, None);
+        let found = errors(&mut c, &uri);
+        assert!(found.iter().any(|f| f.starts_with(wanted)), "{machine}: {found:?}");
+        c.shut_down();
+        let mut c = Client::new(&[(name, text)], json!({}));
+        let uri = c.open(name, None);
+        assert_eq!(errors(&mut c, &uri), [""; 0], "without a machine");
+        c.shut_down();
+    }
+}
+
+#[test]
 fn what_the_chosen_robot_cannot_do() {
     let cell = include_str!("../../../../docs/examples/irb2400-cell.toml");
     let mut c = Client::new(&[("cell.toml", cell)], json!({ "machine": "cell.toml" }));

@@ -392,6 +392,83 @@ fn callers_are_looked_at_again() {
     c.shut_down();
 }
 
+/// A called file is opened with a text that is not on disk, and closed without being saved.
+#[test]
+fn callers_are_looked_at_again_when_a_called_file_is_opened_and_closed() {
+    let mut c = Client::new(&[("m.ngc", "G21 F100\no<p> call\nM2\n"), ("p.ngc", "o<p> sub\nG1 X1\no<p> endsub\nM2\n")], json!({}));
+    let m = c.open("m.ngc", None);
+    assert_eq!(c.diagnostics(&m), Vec::<Value>::new());
+    let p = c.open("p.ngc", Some("o<p> sub\nG1 XO\no<p> endsub\nM2\n"));
+    let found = c.next_diagnostics(&m);
+    assert!(found.iter().any(|d| d["range"]["start"]["line"] == 1 && d["severity"] == 1), "{found:?}");
+    c.notify("textDocument/didClose", json!({ "textDocument": { "uri": p } }));
+    assert_eq!(c.next_diagnostics(&m), Vec::<Value>::new());
+    c.shut_down();
+}
+
+/// A call that leads out of the folders that are open, and out of those that are configured, finds nothing there.
+#[test]
+fn calls_lead_to_no_other_folders() {
+    let outside = tempfile::tempdir().expect("a folder");
+    std::fs::write(outside.path().join("out.ngc"), "o<out> sub\nG1 X77\no<out> endsub\nM2\n").expect("written");
+    let name = outside.path().join("out").display().to_string();
+    let below = outside.path().file_name().expect("a name").to_string_lossy().into_owned();
+    let program = |call: &str| format!("G21 F100\no<{call}> call\nM2\n");
+    let codes = |found: &[Value]| found.iter().filter(|d| d["severity"] == 1).map(|d| d["code"].clone()).collect::<Vec<_>>();
+    let files = [("a.ngc", program(&name)), ("b.ngc", program(&format!("../{below}/out"))), ("s.ngc", "o<in> sub\nG1 X5\no<in> endsub\nM2\n".into()), ("d/c.ngc", program("../in"))];
+    let files: Vec<(&str, &str)> = files.iter().map(|(name, text)| (*name, text.as_str())).collect();
+    let mut c = Client::new(&files, json!({}));
+    std::fs::rename(c.path("s.ngc"), c.path("in.ngc")).expect("renamed");
+    for file in ["a.ngc", "b.ngc"] {
+        let uri = c.open(file, None);
+        let found = c.diagnostics(&uri);
+        assert_eq!(codes(&found), ["E0250"], "{file}: {found:?}");
+        let p = c.request("gccRobot/preview", json!({ "textDocument": { "uri": uri } }));
+        assert_eq!(p["files"].as_array().map(Vec::len), Some(1), "{file}");
+        let o = c.request("gccRobot/output", json!({ "textDocument": { "uri": uri }, "target": "canon" }));
+        assert_eq!(o["files"], json!([]), "{file}");
+    }
+    // Folders above the program that are open are others' business too.
+    let uri = c.open("d/c.ngc", None);
+    let found = c.diagnostics(&uri);
+    assert_ne!(codes(&found), ["E0250"], "{found:?}");
+    c.shut_down();
+    // The same program where the folder is configured.
+    let mut c = Client::new(&[("e.ngc", &program("out"))], json!({ "subs": [outside.path()] }));
+    let uri = c.open("e.ngc", None);
+    let found = c.diagnostics(&uri);
+    assert_eq!(codes(&found), Vec::<Value>::new(), "{found:?}");
+    c.shut_down();
+}
+
+const CELL: &str = include_str!("../../../../docs/examples/irb2400-cell.toml");
+const FAST: &str = "G21 G90 G17 G54\nT1 M6\nS12000 M3\nG0 X5000 Y0 Z5\nG1 X5100 F600\nM2\n";
+
+/// Names in a project file are relative to it, wherever it lies in the workspace and wherever the server runs.
+#[test]
+fn a_project_names_its_machine_from_where_it_lies() {
+    let project = "schema = 1\n[project]\nsources = [\"*.ngc\"]\nmachine = \"cell.toml\"\n";
+    let mut c = Client::new(&[("cell/gcc-robot.toml", project), ("cell/cell.toml", CELL), ("cell/a.ngc", FAST)], json!({}));
+    let uri = c.open("cell/a.ngc", None);
+    let found = c.diagnostics(&uri);
+    assert!(found.iter().any(|d| d["code"].as_str().is_some_and(|c| c.starts_with("E05"))), "the robot has its say: {found:?}");
+    let toml = c.open("cell/gcc-robot.toml", None);
+    assert_eq!(c.diagnostics(&toml), Vec::<Value>::new());
+    c.shut_down();
+}
+
+/// Paths in the settings are relative to the folder that holds the program.
+#[test]
+fn settings_name_files_from_their_folder() {
+    let settings = json!({ "machine": "cell.toml", "tools": "shop/t.tbl" });
+    let mut c = Client::new(&[("cell.toml", CELL), ("shop/t.tbl", "T1 P1 D10 Z50 ;mill\n"), ("parts/a.ngc", FAST)], settings);
+    let uri = c.open("parts/a.ngc", None);
+    let found = c.diagnostics(&uri);
+    assert!(found.iter().any(|d| d["code"].as_str().is_some_and(|c| c.starts_with("E05"))), "the robot has its say: {found:?}");
+    assert_eq!(c.said, [""; 0]);
+    c.shut_down();
+}
+
 #[test]
 fn clients_without_snippets_get_text() {
     let mut c = Client::bare(&[("a.ngc", "G21 F100\nG8\nM2\n")]);

@@ -42,7 +42,7 @@ fn missing(doc: Doc<'_>, at: Span) -> Option<Action> {
     let a = attribute(model.at(n)?, place)?;
     let keyword = wanted(&a.ty)?;
     let row = schema().entity(*schema().find(&keyword).first()?);
-    let values: Vec<&str> = row.attributes.iter().map(|a| placeholder(a).trim_start_matches('\\')).collect();
+    let values: Vec<&str> = row.attributes().iter().map(|a| placeholder(a).trim_start_matches('\\')).collect();
     let end = doc.file.instances[n as usize].end;
     let text = format!("\n#{id}={keyword}({});", values.join(","));
     Some(Action {

@@ -54,7 +54,7 @@ pub fn complete(doc: Doc<'_>, offset: u32) -> Vec<Completion> {
     let own = text.trim_start_matches('#').chars().take_while(char::is_ascii_digit).collect::<String>().parse().unwrap_or(0);
     let model = super::model(doc);
     for row in rows {
-        if let Some(a) = schema().entity(*row).attributes.get(place) {
+        if let Some(a) = schema().entity(*row).attributes().get(place) {
             values(&model, a, &a.ty, own, replace, &mut found);
             break;
         }
@@ -111,7 +111,7 @@ fn entities(typed: &str, replace: Span) -> Vec<Completion> {
         if !seen.insert(e.keyword) {
             continue;
         }
-        let places: Vec<String> = e.attributes.iter().enumerate().map(|(i, a)| format!("${{{}:{}}}", i + 1, placeholder(a))).collect();
+        let places: Vec<String> = e.attributes().iter().enumerate().map(|(i, a)| format!("${{{}:{}}}", i + 1, placeholder(a))).collect();
         found.push(Completion {
             label: e.keyword.into(),
             insert: format!("{}({});", e.keyword, places.join(",")),
@@ -150,7 +150,7 @@ pub fn signature(doc: Doc<'_>, offset: u32) -> Option<Signature> {
     let row = schema().entity(*schema().find(&keyword).first()?);
     let mut label = format!("{keyword}(");
     let mut parameters = Vec::new();
-    for (i, a) in row.attributes.iter().enumerate() {
+    for (i, a) in row.attributes().iter().enumerate() {
         if i > 0 {
             label.push_str(", ");
         }

@@ -89,9 +89,9 @@ fn entity(doc: Doc<'_>, node: Node<'_>) -> String {
     let Some(row) = node.entity() else {
         return format!("{text}\n\nISO 14649 has no entity {}.", node.keyword());
     };
-    if !node.complex() && !row.attributes.is_empty() {
+    if !node.complex() && !row.attributes().is_empty() {
         text.push_str("\n\n| attribute | value | |\n|---|---|---|\n");
-        for (a, v) in row.attributes.iter().zip(node.parameters()).take(MOST_ROWS) {
+        for (a, v) in row.attributes().iter().zip(node.parameters()).take(MOST_ROWS) {
             text.push_str(&format!("| {} | {} | {} |\n", a.name, value(v), unit(a, doc.units)));
         }
     }

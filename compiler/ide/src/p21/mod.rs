@@ -158,7 +158,7 @@ pub fn attribute<'m>(node: Node<'m>, place: usize) -> Option<&'static Attribute>
         return None;
     }
     let entity: &'static Entity = node.entity()?;
-    entity.attributes.get(place)
+    entity.attributes().get(place)
 }
 
 /// Its name, in quotes, as far as it has one: `'WS ROUGH'`.

@@ -23,10 +23,10 @@ pub fn page(name: &str) -> Option<String> {
         }
         let part = if row.edition.part == "10303" { "ISO 10303 resources".to_string() } else { format!("ISO 14649-{}", row.edition.part) };
         text.push_str(&format!("\nAttributes in {part} ({}), in the order in which they are written:\n\n", row.edition.text));
-        for (n, a) in row.attributes.iter().enumerate() {
+        for (n, a) in row.attributes().iter().enumerate() {
             text.push_str(&format!("{}. {}", n + 1, attribute(a)));
         }
-        if row.attributes.is_empty() {
+        if row.attributes().is_empty() {
             text.push_str("none\n");
         }
     }

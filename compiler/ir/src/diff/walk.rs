@@ -200,7 +200,7 @@ fn between(a: &Axes, b: &Axes, share: f64) -> Axes {
     std::array::from_fn(|i| a[i] + (b[i] - a[i]) * share)
 }
 
-fn point(p: &Axes) -> String {
+pub(super) fn point(p: &Axes) -> String {
     let mut text = format!("X{:.4} Y{:.4} Z{:.4}", p[0], p[1], p[2]);
     for (i, name) in [(3, 'A'), (4, 'B'), (5, 'C')] {
         if p[i] != 0.0 {

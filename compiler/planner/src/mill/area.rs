@@ -11,6 +11,8 @@ use crate::process::*;
 
 /// More levels for one wall than this are a mistake.
 const MOST_WALLS: usize = 5_000;
+/// Less radius than this, mm, is none.
+const HAIR: f64 = 1e-5;
 
 /// A floor that is not flat: on every level it leaves a disk, which shrinks on the way down.
 #[derive(Clone, Copy)]
@@ -38,6 +40,17 @@ impl Floor {
                 let left = radius - (y - from) * t + edge * (1.0 + t - 1.0 / libm::cos(half));
                 (left > 0.0).then(|| if y < from { f64::INFINITY } else { left.min(radius) })
             }
+        }
+    }
+    /// How high material stays at a wall that is upright and so far from the floor's middle.
+    fn corner(self, wall: f64, edge: f64) -> f64 {
+        let side = |a: f64, b: f64| libm::sqrt((a * a - b * b).max(0.0));
+        match self {
+            Floor::Flat => edge,
+            // It ends below the top of the feature, inside the wall.
+            Floor::Ball(_, centre, ball) if wall >= ball || centre + side(ball, wall) <= 0.0 => 0.0,
+            Floor::Ball(_, _, ball) => side(ball, wall) - side(ball - edge, wall - edge),
+            Floor::Cone(_, _, half) => edge * libm::tan(half / 2.0),
         }
     }
     fn middle(self) -> P2 {
@@ -208,6 +221,69 @@ pub(crate) fn half_angle(angle: f64) -> f64 {
     if angle < std::f64::consts::FRAC_PI_2 - 1e-9 { angle } else { angle / 2.0 }
 }
 
+/// An outline whose inner corners have at least this radius.
+fn rounded(sharp: Path2, radius: f64) -> Done<Path2> {
+    let region = Region::new(sharp.clone(), Vec::new()).map_err(words)?;
+    let most = corners(region.outer(), radius);
+    // As wide as twice the radius is room enough.
+    for r in [radius, radius - HAIR] {
+        if !(r > 0.0) {
+            continue;
+        }
+        let inner = tp::erode(&region, r).map_err(words)?;
+        let [inner] = inner.as_slice() else { continue };
+        let grown = tp::grow(std::slice::from_ref(inner.outer()), r).map_err(words)?;
+        let [grown] = grown.as_slice() else { continue };
+        let lost = region.area() - grown.area();
+        // What is round enough stays as it was written.
+        if lost <= 1e-6 * radius {
+            return Ok(sharp);
+        }
+        if lost <= most {
+            return Ok(grown.outer().clone());
+        }
+    }
+    Err(no_room(radius))
+}
+
+/// The same of an open line, for corners on its left, or with a negative radius on its right.
+fn rounded_open(sharp: &Path2, radius: f64) -> Done<Path2> {
+    let around = |line: &Path2| {
+        let back = tp::Seg::Line { a: line.end(), b: line.start() };
+        tp::Path2::from_segs(line.segs().iter().copied().chain([back]), true).map(|p| p.area().abs())
+    };
+    let inner = tp::offset_open(sharp, radius).map_err(words)?;
+    let line = tp::offset_open(&inner, -radius).map_err(words)?;
+    let moved = line.start().dist(sharp.start()).max(line.end().dist(sharp.end()));
+    let left = if radius > 0.0 { sharp.clone() } else { sharp.mirrored() };
+    let lost = around(sharp).map_err(words)? - around(&line).map_err(words)?;
+    if moved > 1e-6 || lost > corners(&left, radius.abs()) {
+        return Err(no_room(radius.abs()));
+    }
+    Ok(if lost <= 1e-6 * radius.abs() { sharp.clone() } else { line })
+}
+
+fn no_room(radius: f64) -> String {
+    format!("its orthogonal_radius of {radius} mm, for which its outline has no room")
+}
+
+/// The most that rounding takes off corners to the left of a line: more means that a neck has gone with them.
+fn corners(line: &Path2, radius: f64) -> f64 {
+    // Curves drawn as chords turn by little, and each such corner shares its room with the next.
+    let off = |turn: f64, r2: f64| r2 * (libm::tan((turn / 2.0).min(1.5)) - turn / 2.0) * if turn < 0.4 { 4.0 } else { 1.05 };
+    let segs = line.segs();
+    let next = segs.iter().skip(1).chain(segs.first().filter(|_| line.is_closed()));
+    let turns = segs.iter().zip(next).map(|(a, b)| {
+        let (a, b) = (a.tangent(1.0), b.tangent(0.0));
+        off(libm::atan2(a.cross(b), a.dot(b)).max(0.0), radius * radius)
+    });
+    let arcs = segs.iter().filter_map(|s| {
+        let r = s.radius().filter(|r| *r < radius && s.bulge() > 0.0)?;
+        Some(off(4.0 * libm::atan(s.bulge()), radius * radius - r * r))
+    });
+    turns.sum::<f64>() + arcs.sum::<f64>() + 1e-3 * line.length()
+}
+
 impl Job<'_> {
     /// What a rounded edge gains against a flat one on a wall of this slope.
     fn gain(&self, slope: f64) -> f64 {
@@ -258,10 +334,10 @@ impl Job<'_> {
                 a.fillet = self.fillet(planar_radius.unwrap_or(0.0));
                 a
             }
-            Shape::OpenPocket { boundary, bosses, slope, bottom: floor, planar_radius, .. } => {
+            Shape::OpenPocket { boundary, bosses, slope, bottom: floor, planar_radius, orthogonal_radius } => {
                 bottom(floor, *planar_radius)?;
                 let lean = self.slope(*slope)?;
-                let mut a = plain(self.opened(boundary, self.depth * libm::tan(lean))?)?;
+                let mut a = plain(self.opened(boundary, *orthogonal_radius, self.depth * libm::tan(lean))?)?;
                 a.islands = self.islands(bosses)?;
                 (a.slope, a.open) = (lean, true);
                 a.fillet = self.fillet(planar_radius.unwrap_or(0.0));
@@ -321,13 +397,19 @@ impl Job<'_> {
                 let outline = tp::profile::rectangle(*length, *width, r).map_err(words)?;
                 Ok(outline.rotated(turn).moved(P2::new(frame.origin[0], frame.origin[1])))
             }
-            _ => path(&boundary.contour().ok_or("its profile has no size")?),
+            _ => {
+                let sharp = path(&boundary.contour().ok_or("its profile has no size")?)?;
+                match corner.filter(|r| *r > 0.0 && !matches!(boundary, Closed::Circle { .. })) {
+                    Some(r) => rounded(sharp, r),
+                    None => Ok(sharp),
+                }
+            }
         }
     }
 
     /// An open boundary closed over its mouth, out in the air far enough for the tool's centre to pass the mouth.
-    fn opened(&self, boundary: &Contour, lean: f64) -> Done<Path2> {
-        let line = path(boundary)?;
+    fn opened(&self, boundary: &Contour, corner: Option<f64>, lean: f64) -> Done<Path2> {
+        let mut line = path(boundary)?;
         if line.is_closed() {
             return Err("its open boundary is closed".into());
         }
@@ -339,6 +421,9 @@ impl Job<'_> {
         // The pocket is on one side of the chord, the air on the other.
         let area: f64 = tp::Path2::from_segs(line.segs().iter().copied().chain([tp::Seg::Line { a: b, b: a }]), true).map_err(words)?.area();
         let out = if area > 0.0 { mouth.left() * (1.0 / mouth.norm()) } else { mouth.left() * (-1.0 / mouth.norm()) };
+        if let Some(r) = corner.filter(|r| *r > 0.0) {
+            line = rounded_open(&line, if area > 0.0 { r } else { -r })?;
+        }
         let far = self.radius + self.m.allowance_side + RUN_OUT + lean;
         // Walls that go apart are prolonged, so that nothing is left beside the mouth.
         let prolonged = |t: P2, sideways: P2| {
@@ -452,6 +537,11 @@ impl Job<'_> {
         let through = self.bottom > self.depth;
         if !through && matches!(area.floor, Floor::Flat) {
             self.foot(e, asked);
+        }
+        // The wall that is nearest stands most upright on it.
+        let high = area.floor.corner(area.outline.outer().dist(area.floor.middle()), self.edge);
+        if !through && !matches!(area.floor, Floor::Flat) && high > self.tolerance {
+            self.leaves(e, &format!("up to {high:.4} mm all along the foot of its walls, where they meet its floor"));
         }
         if !area.steady() && !self.m.finish {
             self.leaves(e, &format!("stairs of up to {:.4} mm on its walls; a finishing workingstep takes them", self.stairs(&area)));

@@ -353,6 +353,9 @@ impl Job<'_> {
             let why = if open { "the tool passes open sides by its radius and 1 mm" } else { "it goes neither through nor over an edge" };
             say(e, o.origin, "overcut_length", &o.keyword, why);
         }
+        if self.m.allowance_bottom != 0.0 && self.bottom > self.depth {
+            say(e, o.origin, "allowance_bottom", &o.keyword, "it goes through: there is no floor");
+        }
         if self.start().is_some() && (face || matches!(shape, Shape::Slot { .. })) {
             say(e, o.origin, "start_point", &o.keyword, "where it begins follows from the feature");
         }

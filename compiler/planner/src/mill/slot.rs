@@ -84,7 +84,20 @@ impl Job<'_> {
             self.foot(e, radius[0].min(radius[1]));
         }
         self.slot_rest(e, &line, &cut, floor, ends, closed);
+        let open = closed || ends.iter().all(|e| *e == SlotEnd::Open);
+        let several = self.narrowed(cut.across(floor)).iter().any(|(a, b)| b - a > 1e-5);
+        if open && several || ball && !cut.steady {
+            self.no_pattern(e);
+        }
         Ok(moves)
+    }
+
+    /// Where all strokes go along the course, a strategy has no say in it.
+    fn no_pattern(&self, e: &mut Emit<'_>) {
+        let Some(s) = self.m.strategy.as_ref().filter(|s| s.keyword != "CONTOUR_PARALLEL") else { return };
+        let of = format!("#{} {}", s.origin.id, s.keyword);
+        let why = "all strokes in such a slot follow its course";
+        e.say(gr_text::code::PLAN_NO_EFFECT, s.origin, &["the pattern", &of, why]);
     }
 
     /// How far past the end of the course the tool reaches on the arc of a Woodruff end, its tip at a depth. The arc

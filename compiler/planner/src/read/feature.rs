@@ -17,32 +17,42 @@ fn half_of_fit(fit: Node<'_>) -> Option<f64> {
     fit.real("grade").filter(|g| *g > 0.0 && *g < 1.0).map(|g| g / 2.0)
 }
 
+/// Attributes of turned features and of their tapers that are diameters (ISO 14649-12).
+const DIAMETERS: [&str; 4] = ["diameter_at_placement", "final_diameter", "major_diameter", "nominal_diameter"];
+
 /// The least of the plus-or-minus tolerances of the lengths that a feature is made of: its diameter, the sides of its
-/// profile, its radii; and a fit that can't be read. Its workpiece, its operations and other features are none of its lengths.
+/// profile, its radii; and one that can't be read. Its workpiece, its operations and other features are none of its lengths.
+/// A tool that is off by so much makes a turned diameter off by twice as much: of such a one half is left.
 fn tolerance(feature: Node<'_>) -> (Option<f64>, Option<Origin>) {
     let mut least: Option<f64> = None;
     let mut fit: Option<Origin> = None;
-    let mut seen = std::collections::BTreeSet::from([feature.index()]);
-    let mut open = vec![feature];
-    while let Some(node) = open.pop() {
+    let turned = feature.is_a("turning_feature");
+    let mut seen = std::collections::BTreeSet::from([(feature.index(), false)]);
+    let mut open = vec![(feature, false)];
+    while let Some((node, across)) = open.pop() {
+        let share = if across { 0.5 } else { 1.0 };
         if node.is_a("plus_minus_value") {
             let [upper, lower] = ["upper_limit", "lower_limit"].map(|n| node.real(n).map_or(0.0, f64::abs));
             // All on one side: the path is in the middle of the band, and half of it is left each way.
             let t = if upper.min(lower) > 0.0 { upper.min(lower) } else { upper.max(lower) / 2.0 };
             if t > 0.0 {
-                least = Some(least.map_or(t, |l| l.min(t)));
+                least = Some(least.map_or(t * share, |l| l.min(t * share)));
+            } else {
+                fit = Some(fit.filter(|f| f.id < node.id()).unwrap_or(origin(node)));
             }
         }
         if node.is_a("limits_and_fits") {
             match half_of_fit(node) {
-                Some(t) => least = Some(least.map_or(t, |l| l.min(t))),
+                Some(t) => least = Some(least.map_or(t * share, |l| l.min(t * share))),
                 None => fit = Some(fit.filter(|f| f.id < node.id()).unwrap_or(origin(node))),
             }
         }
         let foreign = |n: &Node<'_>| n.is_a("workpiece") || n.is_a("machining_operation") || n.is_a("manufacturing_feature");
+        let diameters: Vec<u32> = DIAMETERS.iter().filter(|_| turned).filter_map(|a| node.node(a)).map(|n| n.index()).collect();
         for next in node.references().filter(|n| !foreign(n)) {
-            if seen.len() < 10_000 && seen.insert(next.index()) {
-                open.push(next);
+            let across = across || diameters.contains(&next.index());
+            if seen.len() < 10_000 && seen.insert((next.index(), across)) {
+                open.push((next, across));
             }
         }
     }

@@ -452,7 +452,8 @@ impl<'m> Reader<'m> {
             let by_cut = |v: f64| if round > 0.0 { v * 1000.0 / round } else { 0.0 };
             let rps = if spindle.is_some() { n.abs() } else { by_cut(vc) };
             let rpm = if cut.is_some() { by_cut(vc) } else { n.abs() };
-            let iso = format!("{:.1} rpm, feed {:.1} mm/min", rps * 60.0, feed.unwrap_or(0.0) * 60_000.0);
+            let fed = feed.map(|f| f * 60_000.0).or(per_rev.map(|f| f * rps * 60.0)).unwrap_or(0.0);
+            let iso = format!("{:.1} rpm, feed {fed:.1} mm/min", rps * 60.0);
             let other = format!("{rpm:.1} rpm, feed {:.1} mm/min", feed.or(per_rev).unwrap_or(0.0) * rpm);
             self.units_are_open(node, if doubtful { "cutspeed" } else { "spindle" }, &iso, &other);
         }

@@ -5,6 +5,7 @@
 pub mod cases;
 pub mod cells;
 pub mod part;
+pub mod special;
 
 use std::collections::BTreeMap;
 

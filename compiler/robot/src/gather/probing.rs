@@ -25,7 +25,7 @@ impl Gather<'_> {
     pub(super) fn probe(&mut self, view: &View<'_, '_>, kind: u8) {
         // After one that can't be done nobody knows where the tool is.
         self.rapids = true;
-        if self.cells.own_words() {
+        if !self.options.probing {
             return self.cannot("a probe move in joint positions");
         }
         let Some(row) = self.cells.signal("G38") else {

@@ -103,7 +103,7 @@ impl Gather<'_> {
         if speed > 0.0
             && let Some(limit) = self.cells.spindle_limit(speed)
         {
-            self.findings.say(code::ROBOT_SPINDLE_SPEED, Some(self.source), &[format!("{speed}"), limit]);
+            self.findings.say(code::ROBOT_SPINDLE_SPEED, Some(self.source), &[gr_text::figures::number(speed, 3), limit]);
         }
         let turning = state.spindle(spindle).turn;
         let made = self.cells.speed(speed, turning);
