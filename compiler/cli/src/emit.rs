@@ -674,6 +674,7 @@ fn stepnc(motion: &Motion, unit: &Unit, options: &TargetOptions, name: &str) -> 
         lossy: options.lossy,
         tools,
         tolerance: options.arc_tolerance.unwrap_or_default(),
+        planned: motion.plan.is_some(),
     };
     let texts = texts(motion);
     let place = |s: Source| gr_backends::Sources::place(&texts, s);

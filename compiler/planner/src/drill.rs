@@ -194,6 +194,14 @@ fn checks(e: &mut Emit<'_>, step: &Workingstep, d: &Drilling, feature: &Feature,
         e.say(code::PLAN_NO_EFFECT, step.operation.origin, &["overcut_length", &of, "the depth of the cut is given, or is that of the feature"]);
     }
     beyond(e, step, feature, depth);
+    let [start, end] = stretches(d, depth);
+    if let (Some(first), Some(last)) = (d.first, d.last)
+        && start > end
+        && (first.feed, first.speed) != (last.feed, last.speed)
+    {
+        let rule = format!("its reduced stretches at start and end overlap in a cut of {depth} mm: from {end} to {start} mm the lower feed and speed of the two hold");
+        e.say(code::PLAN_TAKES_TURNS, Origin { span: last.span, ..step.operation.origin }, &[&format!("#{} {}", step.operation.origin.id, step.operation.keyword), &rule]);
+    }
     if let Shape::Hole { diameter, .. } = feature.shape {
         let whole = !matches!(step.operation.keyword.as_str(), "CENTER_DRILLING" | "COUNTER_SINKING");
         if whole && tool.diameter > diameter + 0.05 {
@@ -239,14 +247,54 @@ fn tip(tool: &Tool) -> f64 {
     if tip.is_finite() && tip > 0.0 { tip } else { 0.0 }
 }
 
-/// What the last of the operations on a hole leaves in it. Holes that are milled too tell that themselves.
+/// What the operations on a hole leave in it. Holes that are milled too tell that themselves.
 pub(crate) fn leftovers(e: &mut Emit<'_>, steps: &[(&Workingstep, &Feature)]) {
+    let drills = |s: &Workingstep| matches!(s.operation.kind, OperationKind::Drill(_)) && s.operation.toolpaths.is_empty();
+    if steps.iter().all(|(s, _)| drills(s)) {
+        short_of_bottom(e, steps);
+        left_on_walls(e, steps);
+    }
+}
+
+/// The operation that gets nearest to the bottom of a hole, where none of those that make it as wide as it becomes gets there.
+fn short_of_bottom(e: &mut Emit<'_>, steps: &[(&Workingstep, &Feature)]) {
+    let made = |keywords: &[&str]| -> Vec<(&Workingstep, &Feature, &Drilling)> {
+        let drilling = |s: &'_ Workingstep| keywords.contains(&s.operation.keyword.as_str());
+        steps.iter().filter(|(s, _)| drilling(s)).filter_map(|(s, f)| if let OperationKind::Drill(d) = &s.operation.kind { Some((*s, *f, d)) } else { None }).collect()
+    };
+    // Reamers and boring tools may stop above the bottom of what was drilled.
+    let (drills, sizes) = (made(&["DRILLING", "MULTISTEP_DRILLING"]), made(&["DRILLING", "MULTISTEP_DRILLING", "BORING", "REAMING"]));
+    let all = if sizes.is_empty() { made(&["CENTER_DRILLING"]) } else { sizes };
+    let widest = if drills.is_empty() { &all } else { &drills }.iter().map(|(s, ..)| s.operation.tool.diameter).fold(0.0, f64::max);
+    let Some((_, feature, _)) = all.first() else { return };
+    let Shape::Hole { bottom, .. } = &feature.shape else { return };
+    let slack = feature.tolerance.unwrap_or(0.0).max(0.05);
+    // Depths of cut count to the tip; that of a hole that is through, or has a cone below it, to where it is as wide as the tool.
+    let whole = matches!(bottom, HoleBottom::Through | HoleBottom::Conical(..));
+    let point = |s: &Workingstep| if whole { tip(&s.operation.tool) } else { 0.0 };
+    // Without a depth of its own an operation goes as deep as the hole needs.
+    let reach = |s: &Workingstep, d: &Drilling| d.depth.map_or(f64::INFINITY, |v| v - point(s));
+    let wide = all.iter().filter(|(s, ..)| s.operation.tool.diameter >= widest - 2.0 * slack);
+    let Some((step, _, d)) = wide.max_by(|a, b| reach(a.0, a.2).total_cmp(&reach(b.0, b.2))) else { return };
+    let (Some(cut), point) = (d.depth, point(step)) else { return };
+    if feature.depth - (cut - point) > slack {
+        let o = &step.operation;
+        let (what, of) = (format!("#{} {}", o.origin.id, o.keyword), format!("#{} {}", feature.origin.id, feature.keyword));
+        let deep = match gr_step::short(cut - point) {
+            wide if cut > point && point > 0.0 => format!("{wide} mm deep at its full width"),
+            _ if point > 0.0 => format!("{} mm deep, no further than with its point", gr_step::short(cut)),
+            cut => format!("{cut} mm deep"),
+        };
+        let wanted = gr_step::short(((feature.depth + point) * 1e4).ceil() / 1e4);
+        e.say(code::PLAN_SHORT_OF_BOTTOM, Origin { span: d.depth_span, ..o.origin }, &[&what, &deep, &of, &gr_step::short(feature.depth), &wanted]);
+    }
+}
+
+/// What the last of the drilling operations leaves on the walls and the floor of a hole.
+fn left_on_walls(e: &mut Emit<'_>, steps: &[(&Workingstep, &Feature)]) {
     let sizes = |o: &Operation| matches!(o.keyword.as_str(), "DRILLING" | "MULTISTEP_DRILLING" | "BORING" | "REAMING");
     let Some((step, feature)) = steps.iter().rev().find(|(s, _)| sizes(&s.operation)) else { return };
     let Shape::Hole { diameter, final_diameter, bottom } = &feature.shape else { return };
-    if steps.iter().any(|(s, _)| !matches!(s.operation.kind, OperationKind::Drill(_)) || !s.operation.toolpaths.is_empty()) {
-        return;
-    }
     let slack = feature.tolerance.unwrap_or(0.0).max(0.05);
     let widest = steps.iter().filter(|(s, _)| sizes(&s.operation)).map(|(s, _)| s.operation.tool.diameter).fold(0.0, f64::max);
     let tool = &step.operation.tool;
@@ -309,27 +357,29 @@ fn once(e: &mut Emit<'_>, job: &Job<'_>) {
     }
 }
 
-/// Feed to the bottom, slower where the strategy says.
+/// Feed to the bottom, slower over the stretches that the strategy names. Where both hold, the lower feed and speed do.
 fn down(e: &mut Emit<'_>, job: &Job<'_>) {
-    let speed = job.step.operation.technology.speed;
-    let stage = |e: &mut Emit<'_>, feed: f64, cut: f64, z: f64| {
-        if let Some(s) = speed {
-            e.speed(s * cut);
+    let t = &job.step.operation.technology;
+    let [start, end] = stretches(job.d, job.depth);
+    let mut from = 0.0;
+    for to in [start.min(end), start.max(end), job.depth] {
+        if to <= from {
+            continue;
         }
-        e.feed(feed);
-        e.line(job.at(-z));
-    };
-    let first = job.d.first.filter(|f| f.1 < job.depth);
-    let last = job.d.last.filter(|l| l.1 < job.depth && job.depth - l.1 > first.map_or(0.0, |f| f.1));
-    if let Some((ratio, z)) = first {
-        stage(e, job.feed * ratio, job.d.cut[0].unwrap_or(1.0), z);
+        let here = [job.d.first.filter(|_| to <= start), job.d.last.filter(|_| from >= end)];
+        let least = |share: fn(Reduced) -> f64| here.into_iter().flatten().map(share).reduce(f64::min).unwrap_or(1.0);
+        if let Some(s) = t.speed {
+            e.speed(s * least(|r| r.speed));
+        }
+        e.feed(job.feed * least(|r| r.feed));
+        e.line(job.at(-to));
+        from = to;
     }
-    if let Some((ratio, z)) = last {
-        stage(e, job.feed, 1.0, job.depth - z);
-        stage(e, job.feed * ratio, job.d.cut[1].unwrap_or(1.0), job.depth);
-    } else {
-        stage(e, job.feed, 1.0, job.depth);
-    }
+}
+
+/// How deep the first reduced stretch ends, and how deep the last one begins.
+fn stretches(d: &Drilling, depth: f64) -> [f64; 2] {
+    [d.first.map_or(0.0, |r| r.length.min(depth)), d.last.map_or(depth, |r| (depth - r.length).max(0.0))]
 }
 
 fn multistep(e: &mut Emit<'_>, job: &Job<'_>) {

@@ -344,6 +344,17 @@ pub enum Shape {
     Other,
 }
 
+impl Shape {
+    /// It has no bottom.
+    pub fn is_through(&self) -> bool {
+        match self {
+            Shape::Hole { bottom, .. } => *bottom == HoleBottom::Through,
+            Shape::Pocket { bottom, .. } | Shape::OpenPocket { bottom, .. } => *bottom == PocketBottom::Through,
+            _ => false,
+        }
+    }
+}
+
 /// A closed profile.
 #[derive(Clone, PartialEq, Debug)]
 pub enum Closed {
@@ -616,12 +627,12 @@ pub struct Drilling {
     pub dwell: f64,
     /// Feed on the way out, as a ratio.
     pub feed_on_retract: Option<f64>,
-    /// Reduced feed over a first and a last stretch: ratio and length.
-    pub first: Option<(f64, f64)>,
-    /// See `first`.
-    pub last: Option<(f64, f64)>,
-    /// Reduced speed there, as ratios.
-    pub cut: [Option<f64>; 2],
+    /// Where the depth of cut is written.
+    pub depth_span: Span,
+    /// Reduced feed and speed over the first stretch.
+    pub first: Option<Reduced>,
+    /// The same over the last stretch.
+    pub last: Option<Reduced>,
     /// Pecking: first depth, step, retract distance, dwell.
     pub peck: Option<[f64; 4]>,
     /// The spindle stops at the bottom.
@@ -632,6 +643,19 @@ pub struct Drilling {
     pub helical: bool,
     /// The chuck compensates (tapping).
     pub floating_chuck: bool,
+}
+
+/// A stretch of a hole that is made with less feed or speed.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Reduced {
+    /// Where its length is written.
+    pub span: Span,
+    /// How long it is, mm; it may be longer than the hole.
+    pub length: f64,
+    /// Share of the feed.
+    pub feed: f64,
+    /// Share of the spindle speed.
+    pub speed: f64,
 }
 
 /// 2½D milling.
@@ -669,7 +693,7 @@ pub struct Strategy {
     /// Overlap as written.
     pub overlap: Option<f64>,
     /// Where it is written.
-    pub overlap_span: gr_text::Span,
+    pub overlap_span: Span,
     /// Multiple passes allowed.
     pub multiple: Option<bool>,
     /// Feed direction in the feature frame.

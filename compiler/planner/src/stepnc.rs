@@ -12,7 +12,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 
 use gr_ir::geometry::ArcShape;
-use gr_ir::{Axes, FeedMode, Marker, Note, Op, Program, Source, State, Stop, Turn, View};
+use gr_ir::{Axes, FeedMode, Marker, Note, Op, PathMode, Program, Source, State, Stop, Turn, View};
 use gr_text::{Diagnostic, FileId, Span, code};
 
 /// What can be chosen.
@@ -26,6 +26,8 @@ pub struct Options {
     pub tools: Vec<Described>,
     /// Helices, which the standard does not have, become chords no further from them than this, mm; 0 = 1e-6.
     pub tolerance: f64,
+    /// The program was planned from a STEP-NC file: its path mode is the planner's own, and nothing that is lost.
+    pub planned: bool,
 }
 
 /// A tool of the program.
@@ -155,6 +157,8 @@ struct Writer<'a> {
     spindle: Option<i32>,
     /// Where a technology was first needed.
     begun: Option<Source>,
+    /// That path modes are lost was told.
+    path_mode_told: bool,
     /// The first helix, how many there are, and their chords.
     helices: Option<(Source, usize, usize)>,
 }
@@ -198,6 +202,7 @@ impl<'a> Writer<'a> {
             loaded: None,
             spindle: None,
             begun: None,
+            path_mode_told: false,
             helices: None,
         };
         // Instance 1 is the project; it is written last.
@@ -269,6 +274,7 @@ impl<'a> Writer<'a> {
             Op::ToolEntry { .. } => self.cannot("writing the tool table (G10 L1)", v),
             Op::WorkOffset(n, _) if n > 1 => self.cannot("more than one work offset", v),
             Op::Override(gr_ir::Override::Adaptive, true) => self.cannot("adaptive feed (M52)", v),
+            Op::PathMode(mode) if !self.options.planned => self.path_mode(mode, v),
             Op::ToolChange(_) => self.changed(v.state.prepared, v.source),
             Op::ToolNumber(number) => self.changed(number, v.source),
             Op::ToolOffset(offset) => self.offset(&offset, v),
@@ -291,6 +297,21 @@ impl<'a> Writer<'a> {
             }
             _ => {}
         }
+    }
+
+    /// Told once: the first is the program's own, those of cycles come and go.
+    fn path_mode(&mut self, mode: PathMode, v: &View<'_, '_>) {
+        if std::mem::replace(&mut self.path_mode_told, true) {
+            return;
+        }
+        let what = match mode {
+            PathMode::ExactStop => "stopping at every corner (G61.1)".to_string(),
+            PathMode::ExactPath => "exact corners (G61)".to_string(),
+            PathMode::Blend(t) if t > 0.0 => format!("rounding corners by up to {t} mm (G64 P)"),
+            PathMode::Blend(_) => "rounding corners (G64)".to_string(),
+        };
+        let (file, span) = (self.place)(v.source);
+        self.out.push(Diagnostic::new(code::STEPNC_NO_PATH_MODE, file, span, &[what]));
     }
 
     /// A function of the plan, after all that was before it.

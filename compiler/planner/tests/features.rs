@@ -58,6 +58,64 @@ fn t_slots_are_cut_from_their_open_end() {
     assert!(floors.contains(&4000) && floors.contains(&2000), "{floors:?}");
 }
 
+/// A hole 12 mm deep by a strategy: feed, mm/s, and spindle speed, rpm, with the height where each stretch ends; what is told.
+fn drilled_by(strategy: &str) -> (Vec<[f64; 3]>, Vec<String>) {
+    let mut p = Part::new(BLOCK);
+    let tool = p.tool("ENDMILL", 8.0, 0.0, None);
+    let s = p.add(format!("DRILLING_TYPE_STRATEGY({strategy})"));
+    let (t, f) = (p.technology(), p.functions());
+    let op = p.add(format!("DRILLING($,$,'op',5.,$,#{tool},#{t},#{f},$,8.,$,$,$,#{s})"));
+    let (size, bottom) = (p.length(8.0), p.add("FLAT_HOLE_BOTTOM()".into()));
+    p.machine("ROUND_HOLE", &[op], [30.0, 20.0, TOP], Some(8.0), &format!(",#{size},$,#{bottom}"));
+    let (planned, out) = plan(p.text().as_bytes(), FileId(0), &Options::default());
+    let told = out.iter().filter(|d| !["E0440", "E0488"].contains(&d.code.def().code)).map(|d| format!("{} {}", d.code.def().code, d.message));
+    let mut stretches = Vec::new();
+    if let Some(planned) = planned {
+        let mut c = planned.program.cursor();
+        while let Some(v) = c.next() {
+            if v.op == Op::Linear {
+                stretches.push([v.state.feed, v.state.spindles[0].speed, TOP - v.end.axes[2]]);
+            }
+        }
+    }
+    (stretches, told.collect())
+}
+
+/// Full feed is 10 mm/s, full speed 1200 rpm.
+#[test]
+fn reduced_stretches_of_holes() {
+    let none: Vec<String> = Vec::new();
+    let of = |strategy: &str| drilled_by(strategy);
+    // reduced cut, reduced feed and depth at the start, then at the end.
+    assert_eq!(of("$,$,$,$,$,$"), (vec![[10.0, 1200.0, 8.0]], none.clone()));
+    assert_eq!(of("0.75,0.5,2.,0.5,0.25,3."), (vec![[5.0, 900.0, 2.0], [10.0, 1200.0, 5.0], [2.5, 600.0, 8.0]], none.clone()));
+    // Each alone.
+    assert_eq!(of("0.75,$,2.,$,$,$"), (vec![[10.0, 900.0, 2.0], [10.0, 1200.0, 8.0]], none.clone()));
+    assert_eq!(of("$,0.5,2.,$,$,$"), (vec![[5.0, 1200.0, 2.0], [10.0, 1200.0, 8.0]], none.clone()));
+    assert_eq!(of("$,$,$,0.5,$,3."), (vec![[10.0, 1200.0, 5.0], [10.0, 600.0, 8.0]], none.clone()));
+    // As long as the hole, and longer.
+    for length in ["8.", "20."] {
+        assert_eq!(of(&format!("0.75,0.5,{length},$,$,$")), (vec![[5.0, 900.0, 8.0]], none.clone()));
+        assert_eq!(of(&format!("$,$,$,0.75,0.5,{length}")), (vec![[5.0, 900.0, 8.0]], none.clone()));
+    }
+    // They meet, or overlap: the lower of the two, and that is told.
+    assert_eq!(of("0.75,0.5,5.,0.5,0.25,3."), (vec![[5.0, 900.0, 5.0], [2.5, 600.0, 8.0]], none.clone()));
+    assert_eq!(of("0.75,0.5,5.,0.75,0.5,5."), (vec![[5.0, 900.0, 3.0], [5.0, 900.0, 5.0], [5.0, 900.0, 8.0]], none));
+    let (stretches, told) = of("0.5,0.5,5.,0.75,0.25,6.");
+    assert_eq!(stretches, [[5.0, 600.0, 2.0], [2.5, 600.0, 5.0], [2.5, 900.0, 8.0]]);
+    assert!(told.len() == 1 && told[0].contains("from 2 to 5 mm the lower feed and speed of the two hold"), "{told:?}");
+    // What reduces nothing, and what would stand still.
+    for (strategy, wanted) in [("$,$,2.,$,$,$", "neither feed nor speed"), ("0.5,$,0.,$,$,$", "a stretch of 0 mm")] {
+        let (stretches, told) = of(strategy);
+        assert_eq!(stretches, [[10.0, 1200.0, 8.0]]);
+        assert!(told.len() == 1 && told[0].starts_with("E0489") && told[0].contains(wanted), "{told:?}");
+    }
+    for strategy in ["$,0.,2.,$,$,$", "0.,$,2.,$,$,$", "$,$,$,$,0.,2.", "$,$,$,-0.5,$,2.", "$,0.5,-2.,$,$,$"] {
+        let (stretches, told) = of(strategy);
+        assert!(stretches.is_empty() && told.len() == 1 && told[0].starts_with("E0443"), "{strategy}: {told:?}");
+    }
+}
+
 #[test]
 fn threads_are_milled_in_a_helix() {
     let (p, _) = planned(&thread(true, "right hand", "CLIMB", 2.0));

@@ -107,6 +107,40 @@ fn patterns_repeat_their_feature() {
     assert_eq!(bottoms, 4);
 }
 
+/// What a pattern says about elements that it does not have, or twice.
+#[test]
+fn patterns_that_contradict_themselves_are_told() {
+    let base = with("#73", "#73=MACHINING_WORKINGSTEP('many',#15,#90,#48,$);\n#91=CARTESIAN_POINT('',(0.,0.,0.));\n#92=AXIS2_PLACEMENT_3D('',#91,$,$);\n#93=DIRECTION('',(0.,1.,0.));\n#94=TOLERANCED_LENGTH_MEASURE(20.,#45);\n#95=TOLERANCED_LENGTH_MEASURE(30.,#45);\n")
+        .replace("'',(100.0,75.0,30.0)", "'',(10.0,0.0,30.0)");
+    let told = |rows: &str| -> Vec<String> {
+        let (_, _, out) = process(base.replace("#91=", &format!("{rows}#91=")).as_bytes(), FileId(0), Some(Units::StepModeler));
+        let wanted = [code::PLAN_BAD_SIZE, code::PLAN_TAKES_TURNS, code::PLAN_ELEMENTS_OVERLAP];
+        out.iter().filter(|d| wanted.contains(&d.code)).map(|d| format!("{} {}", d.code.def().code, d.message)).collect()
+    };
+    let rectangle = |moved: &str, gone: &str, more: &str| told(&format!("#90=RECTANGULAR_PATTERN('p',#2,(#48),#92,#34,#94,#93,2,3,#95,$,({moved}),({gone}));\n{more}"));
+    let circle = |angle: &str, moved: &str, gone: &str, more: &str| told(&format!("#90=CIRCULAR_PATTERN('c',#2,(#48),#92,#34,{angle},4,({moved}),({gone}),$,0.);\n{more}"));
+    let quarter = "1.5707963267948966";
+    insta::assert_snapshot!(
+        [
+            rectangle("", "#96", "#96=RECTANGULAR_OMIT(2,3);\n"),
+            rectangle("", "#96", "#96=RECTANGULAR_OMIT(9,1);\n"),
+            rectangle("", "#96", "#96=RECTANGULAR_OMIT(2,0);\n"),
+            rectangle("#96", "", "#96=RECTANGULAR_OFFSET(#93,2.,3,1);\n"),
+            rectangle("#96", "#97", "#96=RECTANGULAR_OFFSET(#93,2.,2,1);\n#97=RECTANGULAR_OMIT(2,1);\n"),
+            rectangle("#96,#97", "", "#96=RECTANGULAR_OFFSET(#93,2.,2,1);\n#97=RECTANGULAR_OFFSET(#93,4.,2,1);\n"),
+            circle(quarter, "", "#96", "#96=CIRCULAR_OMIT(4);\n"),
+            circle(quarter, "", "#96", "#96=CIRCULAR_OMIT(0);\n"),
+            circle(quarter, "#96", "", "#96=CIRCULAR_OFFSET(0.1,5);\n"),
+            circle(quarter, "#96", "#97", "#96=CIRCULAR_OFFSET(0.1,3);\n#97=CIRCULAR_OMIT(3);\n"),
+            // A third of a turn, four times: the last on the first. A tenth of a radian: 1 mm from one to the next.
+            circle("2.0943951023931953", "", "", ""),
+            circle("0.1", "", "", ""),
+        ]
+        .map(|all| format!("{all:#?}"))
+        .join("\n")
+    );
+}
+
 #[test]
 fn patterns_inside_patterns() {
     let base = with("#73", "#73=MACHINING_WORKINGSTEP('many',#15,#80,#48,$);\n#91=CARTESIAN_POINT('',(0.,0.,0.));\n#92=AXIS2_PLACEMENT_3D('',#91,$,$);\n#93=DIRECTION('',(0.,1.,0.));\n")

@@ -1,6 +1,6 @@
 //! Motion → STEP-NC → motion.
 
-use gr_ir::{Arc, ArcPlane, Builder, Marker, Op, Plane, Pose, Program, Source, Stop, Turn};
+use gr_ir::{Arc, ArcPlane, Builder, Marker, Op, PathMode, Plane, Pose, Program, Source, Stop, Turn};
 use gr_planner::stepnc::{Described, Options, write};
 use gr_planner::{Options as PlanOptions, plan};
 use gr_text::{FileId, Severity, code};
@@ -238,6 +238,33 @@ proptest! {
 }
 
 /// A tool without a diameter is told once, at its first move.
+/// How a control rounds corners is no part of a process plan: told once, at the program's own word.
+#[test]
+fn path_modes_are_told() {
+    let told = |modes: &[PathMode], planned: bool| -> Vec<String> {
+        let mut b = Build::new();
+        b.tool(1);
+        b.feed(5.0);
+        for mode in modes {
+            b.push(Op::PathMode(*mode));
+        }
+        b.to(Op::Rapid, 1.0, 1.0, 5.0);
+        b.to(Op::Linear, 10.0, 1.0, 5.0);
+        b.push(Op::End);
+        let options = Options { tools: vec![Described::mill(1, 10.0, 0.0)], planned, ..Options::default() };
+        let (_, notes) = write(&b.0.finish(), &options).expect("written");
+        assert!(notes.iter().all(|d| d.code == code::STEPNC_NO_PATH_MODE));
+        notes.iter().map(|d| format!("{:?} {}", d.severity, d.message)).collect()
+    };
+    let no = "is not in the STEP-NC file: ISO 14649 has no path modes";
+    assert_eq!(told(&[], false), Vec::<String>::new());
+    assert_eq!(told(&[PathMode::Blend(0.05), PathMode::ExactPath], false), [format!("Warning rounding corners by up to 0.05 mm (G64 P) {no}")]);
+    assert_eq!(told(&[PathMode::ExactPath], false), [format!("Warning exact corners (G61) {no}")]);
+    assert_eq!(told(&[PathMode::ExactStop], false), [format!("Warning stopping at every corner (G61.1) {no}")]);
+    assert_eq!(told(&[PathMode::Blend(0.0)], false), [format!("Warning rounding corners (G64) {no}")]);
+    assert_eq!(told(&[PathMode::Blend(0.01)], true), Vec::<String>::new());
+}
+
 #[test]
 fn an_unknown_tool_is_told() {
     let mut b = Build::new();

@@ -369,6 +369,83 @@ fn what_drills_leave_is_told() {
     silent(&hole("DRILLING", drill(8.0, 59.0), None, (12.0, through)), code::PLAN_UNREACHABLE_CORNER);
 }
 
+/// A hole of 8 mm by operations: keyword, diameter of the tool, depth of cut.
+fn made(ops: &[(&str, f64, Option<f64>)], depth: f64, bottom: &str) -> Part {
+    let mut p = Part::new(BLOCK);
+    let ops: Vec<usize> = ops
+        .iter()
+        .map(|(keyword, wide, cut)| {
+            let (kind, half) = if *keyword == "REAMING" { ("REAMER", None) } else { ("TWIST_DRILL", Some(59.0)) };
+            let tool = p.tool(kind, *wide, 0.0, half);
+            p.drill(keyword, tool, *cut, if *keyword == "REAMING" { ",$,.F.,$,$,$" } else { "" })
+        })
+        .collect();
+    let (size, bottom) = (p.length(8.0), p.add(bottom.into()));
+    p.machine("ROUND_HOLE", &ops, [30.0, 20.0, 12.0], Some(depth), &format!(",#{size},$,#{bottom}"));
+    p
+}
+
+#[test]
+fn drills_that_stop_short_are_told() {
+    let (flat, through, cone) = ("FLAT_HOLE_BOTTOM()", "THROUGH_BOTTOM_CONDITION()", "CONICAL_HOLE_BOTTOM(59.,$)");
+    let short = code::PLAN_SHORT_OF_BOTTOM;
+    // The point of a drill of 8 mm with a half angle of 59 degrees is 2.4034 mm high.
+    says(&made(&[("DRILLING", 8.0, Some(13.0))], 12.0, through), short, "goes 10.5966 mm deep at its full width, but");
+    silent(&made(&[("DRILLING", 8.0, Some(14.4035))], 12.0, through), short);
+    silent(&made(&[("DRILLING", 8.0, None)], 12.0, through), short);
+    says(&made(&[("DRILLING", 8.0, Some(6.0))], 10.0, flat), short, "goes 6 mm deep, but");
+    silent(&made(&[("DRILLING", 8.0, Some(10.0))], 10.0, flat), short);
+    says(&made(&[("DRILLING", 8.0, Some(9.0))], 9.0, cone), short, "6.5966 mm deep at its full width");
+    silent(&made(&[("DRILLING", 8.0, Some(11.41))], 9.0, cone), short);
+    // Another operation gets there; a reamer behind the drill need not.
+    silent(&made(&[("DRILLING", 8.0, Some(6.0)), ("DRILLING", 8.0, Some(10.0))], 10.0, flat), short);
+    silent(&made(&[("DRILLING", 8.0, Some(10.0)), ("DRILLING", 8.0, Some(6.0))], 10.0, flat), short);
+    silent(&made(&[("DRILLING", 7.8, Some(10.0)), ("REAMING", 8.0, Some(8.0))], 10.0, flat), short);
+    silent(&made(&[("DRILLING", 7.0, Some(8.0)), ("REAMING", 8.0, Some(10.0))], 10.0, flat), short);
+    // A narrower one that gets there does not make the hole.
+    says(&made(&[("DRILLING", 4.0, Some(10.0)), ("DRILLING", 8.0, Some(6.0))], 10.0, flat), short, "goes 6 mm deep, but");
+    says(&made(&[("CENTER_DRILLING", 8.0, Some(2.0))], 10.0, flat), short, "goes 2 mm deep, but");
+    // It is told at the depth, with the one that is wanted, once.
+    let p = made(&[("CENTER_DRILLING", 8.0, Some(2.0)), ("DRILLING", 8.0, Some(6.5))], 10.0, flat);
+    let (_, out) = planned(&p);
+    let all: Vec<&Diagnostic> = out.iter().filter(|d| d.code == short).collect();
+    assert_eq!(all.len(), 1, "{all:?}");
+    assert_eq!(&p.text()[all[0].labels[0].span.range()], "6.5");
+    assert!(all[0].help.as_deref().is_some_and(|h| h.contains("at least 10 mm")), "{all:?}");
+}
+
+/// What has no bottom comes out at the other side of the block, where the file has one.
+#[test]
+fn through_features_that_end_inside_the_part_are_told() {
+    let hole = |depth: f64| made(&[("DRILLING", 8.0, None)], depth, "THROUGH_BOTTOM_CONDITION()");
+    says(&hole(9.0), code::PLAN_NOT_THROUGH, "ends 3 mm above the underside of the raw part (Z0)");
+    silent(&hole(12.0), code::PLAN_NOT_THROUGH);
+    silent(&made(&[("DRILLING", 8.0, None)], 9.0, "FLAT_HOLE_BOTTOM()"), code::PLAN_NOT_THROUGH);
+    let pocket = |depth: f64| {
+        let mut p = Part::new(BLOCK);
+        let tool = p.tool("ENDMILL", 6.0, 0.0, None);
+        let op = p.mill(&Mill::new("BOTTOM_AND_SIDE_ROUGH_MILLING", tool, 2.0, 3.0));
+        let (w, l) = (p.length(30.0), p.length(20.0));
+        let profile = p.add(format!("RECTANGULAR_CLOSED_PROFILE($,#{w},#{l})"));
+        let bottom = p.add("THROUGH_POCKET_BOTTOM_CONDITION()".into());
+        p.machine("CLOSED_POCKET", &[op], [30.0, 20.0, 12.0], Some(depth), &format!(",(),$,#{bottom},$,$,#{profile}"));
+        p
+    };
+    says(&pocket(11.5), code::PLAN_NOT_THROUGH, "ends 0.5 mm above");
+    silent(&pocket(12.0), code::PLAN_NOT_THROUGH);
+    // Without a block nobody knows; with two setups the rest may be cut from the other side.
+    let plain = hole(9.0).text();
+    let out = |text: &str| plan(text.as_bytes(), FileId(0), &Options::default()).1;
+    let told = |text: &str| out(text).iter().any(|d| d.code == code::PLAN_NOT_THROUGH);
+    assert!(told(&plain));
+    let line = plain.lines().find(|l| l.contains("=WORKPIECE(")).expect("a workpiece");
+    assert!(!told(&plain.replace(line, &line.replace(",$,$,#4,", ",$,$,$,"))), "{line}");
+    let place = plain.lines().find(|l| l.contains("=AXIS2_PLACEMENT_3D(")).and_then(|l| l.split('=').next()).expect("a place");
+    let two = |n: usize| (0..n).map(|i| format!("#{}=SETUP('s{i}',{place},$,());\n", 9000 + i)).collect::<String>();
+    assert!(told(&plain.replace("ENDSEC;\nEND-ISO", &format!("{}ENDSEC;\nEND-ISO", two(1)))));
+    assert!(!told(&plain.replace("ENDSEC;\nEND-ISO", &format!("{}ENDSEC;\nEND-ISO", two(2)))));
+}
+
 #[test]
 fn a_retract_plane_in_the_material_is_told() {
     for r in ["0.", "-3."] {

@@ -100,7 +100,8 @@ impl Graph {
 /// A number without needless digits.
 pub fn short(v: f64) -> String {
     let s = format!("{v:.4}");
-    s.trim_end_matches('0').trim_end_matches('.').to_string()
+    let s = s.trim_end_matches('0').trim_end_matches('.');
+    if s == "-0" { "0".into() } else { s.to_string() }
 }
 
 /// Origin and axes of a placement.

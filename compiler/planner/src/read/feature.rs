@@ -99,9 +99,51 @@ impl<'m> Reader<'m> {
             return None;
         }
         let shape = self.shape(node, operation, &placement, setup)?;
+        if let Some(pattern) = patterns.first() {
+            self.apart(*pattern, &copies, &shape);
+        }
+        if shape.is_through() {
+            self.goes_through(node, setup, &copies, depth);
+        }
         let (keyword, name) = (node.keyword().to_string(), node.string("its_id").into_owned());
         let (tolerance, fit) = tolerance(node);
         Some(Feature { origin: origin(node), keyword, name, frame, placement, depth, shape, copies, tolerance, fit })
+    }
+
+    /// Elements of a pattern that lie on one spot, or round ones that overlap: the first two are told.
+    fn apart(&mut self, pattern: Node<'m>, copies: &[Frame], shape: &Shape) {
+        let width = match shape {
+            Shape::Hole { diameter, .. } | Shape::Pocket { boundary: Closed::Circle { diameter, .. }, .. } => *diameter,
+            _ => 0.0,
+        };
+        let least = (width - 1e-6).max(1e-6);
+        let mut places: Vec<[f64; 3]> = copies.iter().map(|c| c.origin).collect();
+        places.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
+        let close = places.iter().enumerate().find_map(|(i, a)| {
+            let near = places[i + 1..].iter().take_while(|b| b[0] - a[0] < least);
+            near.map(|b| (a, b, norm(sub(*a, *b)))).find(|(.., d)| *d < least)
+        });
+        let Some((a, b, distance)) = close else { return };
+        let at = |p: &[f64; 3]| format!("X{} Y{}", gr_step::short(p[0]), gr_step::short(p[1]));
+        let how = if distance < 1e-6 {
+            format!("both lie at {}", at(a))
+        } else {
+            let (d, w) = (gr_step::short(distance), gr_step::short(width));
+            format!("those at {} and {} lie {d} mm apart, each is {w} mm wide", at(a), at(b))
+        };
+        self.say(code::PLAN_ELEMENTS_OVERLAP, pattern, &[&title(pattern), &how]);
+    }
+
+    /// A feature without a bottom that ends above the underside of the raw part. Where the part is clamped more than once
+    /// the rest may be cut from another side.
+    fn goes_through(&mut self, node: Node<'m>, setup: Option<&Setup>, copies: &[Frame], depth: f64) {
+        let Some([low, _]) = self.stock(setup).filter(|_| self.model.all("setup").count() <= 1) else { return };
+        let ends = copies.iter().filter(|c| c.upright()).map(|c| c.point([0.0, 0.0, -depth])[2]);
+        let highest = ends.fold(f64::NEG_INFINITY, f64::max);
+        if highest > low[2] + 0.01 {
+            let [left, z] = [highest - low[2], low[2]].map(gr_step::short);
+            self.say_at(code::PLAN_NOT_THROUGH, node, "depth", &[&title(node), &left, &z]);
+        }
     }
 
     /// Frames that the feature's own placement is relative to: the workpiece's, or those of the compound
@@ -149,12 +191,8 @@ impl<'m> Reader<'m> {
                 let turn = self.angle(node.real("base_feature_rotation").unwrap_or(0.0));
                 let count = self.count(node, "number_of_feature", 1)?;
                 let radius = node.length("base_feature_diameter").unwrap_or(0.0) / 2.0;
-                let gone: Vec<i64> = indices(node, "missing_base_feature", "index");
-                let moved = node.nodes("relocated_base_feature");
-                let moved: Vec<(i64, f64)> = moved
-                    .iter()
-                    .filter_map(|m| Some((m.attr("index")?.integer()?, self.angle(m.real("angular_offset")?))))
-                    .collect();
+                let (gone, moved) = self.changes(node, &[("index", count)]);
+                let moved: Vec<(i64, f64)> = moved.iter().map(|(i, m)| (i[0], self.angle(m.real("angular_offset").unwrap_or(0.0)))).collect();
                 let at = |i: i64| {
                     let extra = moved.iter().find(|m| m.0 == i).map_or(0.0, |m| m.1);
                     let turned = own.turned(step * (i - 1) as f64 + extra);
@@ -162,7 +200,7 @@ impl<'m> Reader<'m> {
                     // The features keep their own orientation unless the pattern turns them.
                     if turn == 0.0 { place } else { place.turned(turn * (i - 1) as f64) }
                 };
-                Some((1..=count).filter(|i| !gone.contains(i)).map(at).collect())
+                Some((1..=count).filter(|i| !gone.contains(&vec![*i])).map(at).collect())
             }
             "RECTANGULAR_PATTERN" => {
                 let spacing = node.length("spacing").unwrap_or(0.0);
@@ -172,19 +210,16 @@ impl<'m> Reader<'m> {
                 let row_spacing = node.length("row_spacing").unwrap_or(spacing);
                 let across = node.node("row_layout_direction").and_then(|d| self.direction(d));
                 let across = across.unwrap_or([-direction[1], direction[0], 0.0]);
-                let gone = node.nodes("missing_base_feature");
-                let key = |n: &Node<'m>| Some((n.attr("row_index")?.integer()?, n.attr("column_index")?.integer()?));
-                let gone: Vec<(i64, i64)> = gone.iter().filter_map(key).collect();
-                let moved = node.nodes("relocated_base_feature");
+                let (gone, moved) = self.changes(node, &[("row_index", rows), ("column_index", columns)]);
                 let mut out = Vec::new();
                 for row in 1..=rows {
                     for column in 1..=columns {
-                        if gone.contains(&(row, column)) {
+                        if gone.contains(&vec![row, column]) {
                             continue;
                         }
                         let (a, b) = (spacing * (column - 1) as f64, row_spacing * (row - 1) as f64);
                         let mut p: [f64; 3] = std::array::from_fn(|i| direction[i] * a + across[i] * b);
-                        if let Some(m) = moved.iter().find(|m| key(m) == Some((row, column))) {
+                        if let Some((_, m)) = moved.iter().find(|m| m.0 == [row, column]) {
                             let d = m.node("offset_direction").and_then(|d| self.direction(d)).unwrap_or([0.0; 3]);
                             let by = m.real("offset_distance").unwrap_or(0.0);
                             p = std::array::from_fn(|i| p[i] + d[i] * by);
@@ -204,6 +239,42 @@ impl<'m> Reader<'m> {
                 None
             }
         }
+    }
+
+    /// Elements of a pattern that are left out, and that are moved, by their numbers from 1, which these attributes give and which
+    /// go up to these counts. What the pattern does not have and what contradicts itself is told.
+    #[allow(clippy::type_complexity)]
+    fn changes(&mut self, pattern: Node<'m>, counts: &[(&str, i64)]) -> (Vec<Vec<i64>>, Vec<(Vec<i64>, Node<'m>)>) {
+        let mut read = |list: &str| -> Vec<(Vec<i64>, Node<'m>)> {
+            let mut out = Vec::new();
+            for change in pattern.nodes(list) {
+                let numbers = counts.iter().map(|(attribute, count)| {
+                    let v = change.attr(attribute)?.integer()?;
+                    if !(1..=*count).contains(&v) {
+                        let wanted = format!("1 to {count}, as many as {} has", title(pattern));
+                        self.say_at(code::PLAN_BAD_SIZE, change, attribute, &[&title(change), attribute, &v.to_string(), &wanted]);
+                        return None;
+                    }
+                    Some(v)
+                });
+                if let Some(numbers) = numbers.collect() {
+                    out.push((numbers, change));
+                }
+            }
+            out
+        };
+        let (gone, moved) = (read("missing_base_feature"), read("relocated_base_feature"));
+        for (i, (element, change)) in moved.iter().enumerate() {
+            let rule = if let Some((_, omit)) = gone.iter().find(|g| g.0 == *element) {
+                format!("{} leaves out the element that it moves: the element is left out", title(*omit))
+            } else if let Some((_, first)) = moved[..i].iter().find(|m| m.0 == *element) {
+                format!("{} moves the same element: that counts", title(*first))
+            } else {
+                continue;
+            };
+            self.say(code::PLAN_TAKES_TURNS, *change, &[&title(*change), &rule]);
+        }
+        (gone.into_iter().map(|g| g.0).collect(), moved)
     }
 
     fn count(&mut self, node: Node<'m>, attribute: &str, low: i64) -> Option<i64> {
@@ -709,8 +780,4 @@ impl<'m> Reader<'m> {
             }
         }
     }
-}
-
-fn indices(node: Node<'_>, list: &str, attribute: &str) -> Vec<i64> {
-    node.nodes(list).iter().filter_map(|n| n.attr(attribute)?.integer()).collect()
 }

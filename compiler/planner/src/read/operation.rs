@@ -115,23 +115,12 @@ impl<'m> Reader<'m> {
 
     fn drilling(&mut self, node: Node<'m>) -> Drilling {
         let strategy = node.node("its_machining_strategy");
-        let ratio = |a: &str| strategy.and_then(|s| s.real(a));
-        let depth = |a: &str| strategy.and_then(|s| s.real(a)).filter(|d| *d > 0.0);
-        let stretch = |depth: Option<f64>, feed: Option<f64>| Some((as_ratio(feed?), depth?));
         if let Some(v) = node.real("feed_on_retract") {
             self.in_range(node, "feed_on_retract", v, f64::MIN_POSITIVE, "above zero");
         }
-        if let Some(v) = node.real("feed_on_retract").filter(|v| *v > MOST_FEED_ON_RETRACT) {
-            self.no_effect(node, "feed_on_retract", &format!("{v} is read as {v} percent"));
-        }
-        if let Some(s) = strategy {
-            for a in ["reduced_cut_at_start", "reduced_feed_at_start", "reduced_cut_at_end", "reduced_feed_at_end"] {
-                if s.real(a).is_some_and(|v| v > 1.0) {
-                    let v = s.real(a).unwrap_or(0.0);
-                    self.no_effect(s, a, &format!("{v} is read as {v} percent"));
-                }
-            }
-        }
+        let mut reduced = |depth: &str, feed: &str, cut: &str| strategy.and_then(|s| self.reduced(s, depth, feed, cut));
+        let first = reduced("depth_of_start", "reduced_feed_at_start", "reduced_cut_at_start");
+        let last = reduced("depth_of_end", "reduced_feed_at_end", "reduced_cut_at_end");
         let peck = (node.keyword() == "MULTISTEP_DRILLING").then(|| {
             let v = |a: &str| node.real(a).unwrap_or(0.0);
             [v("first_depth"), v("depth_of_step"), v("retract_distance"), v("dwell_time_step")]
@@ -140,18 +129,36 @@ impl<'m> Reader<'m> {
         let waiting = node.node("waiting_position").and_then(|p| self.point(p));
         Drilling {
             depth: node.real("cutting_depth"),
+            depth_span: node.written("cutting_depth").map_or(node.keyword_span(), |v| v.span()),
             previous: node.real("previous_diameter").filter(|d| *d > 0.0 && d.is_finite()),
             dwell: node.real("dwell_time_bottom").filter(|d| *d > 0.0 && d.is_finite()).unwrap_or(0.0),
             feed_on_retract: node.real("feed_on_retract").map(|v| if v > MOST_FEED_ON_RETRACT { v / 100.0 } else { v }),
-            first: stretch(depth("depth_of_start"), ratio("reduced_feed_at_start")),
-            last: stretch(depth("depth_of_end"), ratio("reduced_feed_at_end")),
-            cut: [ratio("reduced_cut_at_start").map(as_ratio), ratio("reduced_cut_at_end").map(as_ratio)],
+            first,
+            last,
             peck,
             stop_at_bottom: node.attr("spindle_stop_at_bottom").and_then(|v| v.boolean()).unwrap_or(false),
             test_cut: test.map(|d| (d, waiting)),
             helical: node.attr("helical_movement_on_forward").and_then(|v| v.boolean()).unwrap_or(false),
             floating_chuck: node.attr("compensation_chuck").and_then(|v| v.boolean()).unwrap_or(false),
         }
+    }
+
+    /// A stretch with less feed or speed, as a strategy's attributes of these names say. Ratios without a length break a
+    /// rule of the standard, which is told where the schema is checked.
+    fn reduced(&mut self, strategy: Node<'m>, depth: &str, feed: &str, cut: &str) -> Option<Reduced> {
+        let mut ratio = |a: &str| self.in_range(strategy, a, strategy.real(a)?, f64::MIN_POSITIVE, "above zero").map(as_ratio);
+        let (share, speed) = (ratio(feed), ratio(cut));
+        let length = self.in_range(strategy, depth, strategy.real(depth)?, 0.0, "at or above zero")?;
+        if strategy.attr(feed).is_none() && strategy.attr(cut).is_none() {
+            self.no_effect(strategy, depth, "neither feed nor speed is reduced there");
+            return None;
+        }
+        if length == 0.0 {
+            self.no_effect(strategy, depth, "a stretch of 0 mm reduces nothing");
+            return None;
+        }
+        let span = strategy.written(depth).map_or(strategy.keyword_span(), |v| v.span());
+        Some(Reduced { span, length, feed: share.unwrap_or(1.0), speed: speed.unwrap_or(1.0) })
     }
 
     /// What says nothing about holes of this kind.

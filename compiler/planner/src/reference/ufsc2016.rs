@@ -160,8 +160,8 @@ impl Writer<'_> {
 /// Down and up; with stretches at start and end, pecks at their limits.
 fn drill(w: &mut Writer<'_>, depth: f64, d: &Drilling, h: f64) {
     let mut pecks = Vec::new();
-    pecks.extend(d.first.map(|f| f.1));
-    pecks.extend(d.last.map(|l| depth - l.1));
+    pecks.extend(d.first.map(|f| f.length));
+    pecks.extend(d.last.map(|l| depth - l.length));
     pecks.push(depth);
     w.add([0.0; 2], h, Kind::Air);
     w.add([0.0; 2], 0.0, Kind::Cut);
