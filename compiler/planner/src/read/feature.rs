@@ -59,6 +59,9 @@ fn tolerance(feature: Node<'_>) -> (Option<f64>, Option<Origin>) {
     (least, fit)
 }
 
+/// The numbers of a pattern's element, and what leaves it out or moves it.
+type Change<'m> = (Vec<i64>, Node<'m>);
+
 impl<'m> Reader<'m> {
     /// A feature in the frame of its setup. `operation` chooses among the elements of a compound feature.
     pub fn feature(&mut self, node: Node<'m>, setup: Option<&Setup>, operation: u64) -> Option<Feature> {
@@ -243,9 +246,8 @@ impl<'m> Reader<'m> {
 
     /// Elements of a pattern that are left out, and that are moved, by their numbers from 1, which these attributes give and which
     /// go up to these counts. What the pattern does not have and what contradicts itself is told.
-    #[allow(clippy::type_complexity)]
-    fn changes(&mut self, pattern: Node<'m>, counts: &[(&str, i64)]) -> (Vec<Vec<i64>>, Vec<(Vec<i64>, Node<'m>)>) {
-        let mut read = |list: &str| -> Vec<(Vec<i64>, Node<'m>)> {
+    fn changes(&mut self, pattern: Node<'m>, counts: &[(&str, i64)]) -> (Vec<Vec<i64>>, Vec<Change<'m>>) {
+        let mut read = |list: &str| -> Vec<Change<'m>> {
             let mut out = Vec::new();
             for change in pattern.nodes(list) {
                 let numbers = counts.iter().map(|(attribute, count)| {
