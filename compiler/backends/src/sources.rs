@@ -112,6 +112,17 @@ pub fn is_hidden(program: &Program, index: usize) -> bool {
     before.take_while(|s| !s.op.moves()).any(|s| matches!(s.op, Op::Note(Note::Comment, "AXIS,hide")))
 }
 
+/// Whether the program, or a file it calls, stores a reference point of its own (G28.1, G30.1).
+pub fn stores_reference(program: &Program, sources: &dyn Sources) -> bool {
+    let files: std::collections::BTreeSet<_> = program.steps().map(|s| s.source.file).collect();
+    files.into_iter().any(|file| {
+        (0u32..).map_while(|l| sources.line(file, l)).any(|text| {
+            let near = text.contains("28") || text.contains("30");
+            near && (Words::of(text).g(281) || Words::of(text).g(301))
+        })
+    })
+}
+
 fn bit(letter: u8) -> u32 {
     1 << (letter - b'a')
 }

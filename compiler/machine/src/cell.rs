@@ -84,18 +84,19 @@ pub struct External {
     pub point: [f64; 3],
     /// Where it stands while a program runs, mm or rad.
     pub position: f64,
+    /// Whether the control moves the machine's base with it, so that poses are in a frame that stays; none = not said.
+    pub coupled: Option<bool>,
 }
 
 impl External {
-    /// What it does to the things in the cell, seen from the machine's base.
+    /// What it does to what it carries.
     fn motion(&self) -> Frame {
-        let moved = if self.joint.kind == JointKind::Revolute {
+        if self.joint.kind == JointKind::Revolute {
             let turn = about(self.axis, self.position);
             Frame { turn, position: sub(self.point, rotate(&turn, self.point)) }
         } else {
             Frame::shift(scale(self.axis, self.position))
-        };
-        if self.carries_machine { moved.inverse() } else { moved }
+        }
     }
 }
 
@@ -160,6 +161,9 @@ pub struct Zones {
     pub max: Option<f64>,
 }
 
+/// Name of the frame of a robot's machine coordinates.
+pub(crate) const MACHINE_ZERO: &str = "G53";
+
 /// The number in a signal's name: `5`, `DO[5]`, `OT#(5)`, `$OUT[5]`, `out_5`.
 pub fn signal_number(name: &str) -> Option<u32> {
     let mut groups = name.split(|c: char| !c.is_ascii_digit()).filter(|g| !g.is_empty());
@@ -183,7 +187,26 @@ impl Cell {
     /// A frame of the cell as the base sees it while rails and positioners stand where the file says. The file gives
     /// frames for all of them at 0.
     pub fn carried(&self, frame: Frame) -> Frame {
-        self.external.iter().rev().fold(frame, |f, e| e.motion().then(&f))
+        let part = self.external.iter().rev().filter(|e| !e.carries_machine).fold(frame, |f, e| e.motion().then(&f));
+        self.on_rails(|_| true).inverse().then(&part)
+    }
+    /// The base on some of the rails, where it would be with these at 0.
+    fn on_rails(&self, which: impl Fn(&External) -> bool) -> Frame {
+        let rails = self.external.iter().filter(|e| e.carries_machine && which(e));
+        rails.fold(Frame::IDENTITY, |base, e| base.then(&e.motion()))
+    }
+    /// A frame in the base as the robot's control counts it: where rails are coupled, seen from the base with these at 0.
+    pub fn in_control(&self, frame: &Frame) -> Frame {
+        if self.external.iter().any(|e| e.coupled == Some(true)) {
+            self.on_rails(|e| e.coupled == Some(true)).then(frame)
+        } else {
+            *frame
+        }
+    }
+    /// The zero point of the coordinates that G53, G28 and G30 mean on a robot, in the base, mm: `[[frame]]` `G53`. Rails move the base
+    /// away from it, positioners turn the part alone. The directions of these coordinates are the part's.
+    pub fn machine_zero(&self) -> Option<[f64; 3]> {
+        Some(self.on_rails(|_| true).inverse().apply(self.frames.get(MACHINE_ZERO)?.position))
     }
     /// Tool point on the flange: spindle, then tool. An unknown tool is the spindle's nose.
     pub fn tool_frame(&self, number: u32) -> Frame {
@@ -216,7 +239,12 @@ impl Cell {
         }
         for e in &self.external {
             let limit = |v: Option<f64>| v.map_or("no limit".into(), |v| e.joint.show(v));
-            let what = if e.carries_machine { "carries the machine" } else { "carries the part" };
+            let what = match (e.carries_machine, e.coupled) {
+                (false, _) => "carries the part",
+                (true, None) => "carries the machine",
+                (true, Some(true)) => "carries the machine, coupled",
+                (true, Some(false)) => "carries the machine, not coupled",
+            };
             let here = e.joint.show(e.position);
             out += &format!("external axis {}: from {} to {}, {what}, stands at {here}\n", e.joint.name, limit(e.joint.min), limit(e.joint.max));
         }

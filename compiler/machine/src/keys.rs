@@ -128,7 +128,11 @@ pub(crate) static ROOT: &[Key] = &[
     key("external", Tables(EXTERNAL), "Rails and positioners."),
     key("coupling", Table(COUPLING), "Two joints that the controller counts together."),
     key("frames", Table(FRAMES), "Base, table and part."),
-    key("frame", Tables(FRAME), "More frames in the base, by name: `G54`, `fixture` …"),
+    key(
+        "frame",
+        Tables(FRAME),
+        "More frames in the base, by name: `G54` …, and `G53`: what G53, G28 and G30 mean on a robot.",
+    ),
     key("spindle", Table(SPINDLE), "Spindle on the flange."),
     key("cutting", Table(CUTTING), "What the machine stands."),
     key("tool", Tables(TOOL), "Tools and their points."),
@@ -201,6 +205,11 @@ static EXTERNAL: &[Key] = &[
     must("name", Text, "Name on the controller: `E1`."),
     must("type", Choice(&["revolute", "prismatic"]), "Turns or slides."),
     must("carries", Choice(&["machine", "part"]), "Rail or positioner."),
+    key(
+        "coupled",
+        Flag,
+        "Rail: whether the control counts it in poses (ABB: the base frame is moved by it; KUKA: ROBROOT kinematics; FANUC: integrated rail).",
+    ),
     key("axis", Numbers(3), "Vector; else Z."),
     key("point", Numbers(3), "A point on it, mm."),
     key("min", ANY, "Lower limit, mm or degrees."),
@@ -355,13 +364,19 @@ static SETUP: &[Key] = &[
     key("rotation", Numbers(3), "Turns of the part about the table's fixed X, Y, Z, degrees. Left out: as [frames.part] of the machine file has it."),
 ];
 
+/// M words that may have a row; M48 and M49 are M50 and M51 together. M62 to M68 may have rows for single numbers too.
+const IO_WORDS: [std::ops::RangeInclusive<u16>; 5] = [3..=9, 19..=19, 50..=53, 60..=60, 62..=68];
+const USER_WORDS: std::ops::RangeInclusive<u16> = 100..=199;
+
 /// Words that may stand in `[io]`: `S`, `M3`, `M62P3` for one output alone, and `G38` for the probe.
 fn io_word(word: &str) -> bool {
-    let digits = |n: &str| !n.is_empty() && n.len() <= 3 && n.bytes().all(|b| b.is_ascii_digit());
     let Some(rest) = word.strip_prefix('M') else { return matches!(word, "S" | "G38") };
-    match rest.split_once('P') {
-        Some((code, index)) => digits(code) && digits(index),
-        None => digits(rest),
+    let (code, index) = rest.split_once('P').map_or((rest, None), |(c, i)| (c, Some(i)));
+    let number = |n: &str| n.parse::<u16>().ok().filter(|v| v.to_string() == n && *v <= 999);
+    match (number(code), index) {
+        (Some(62..=68), Some(index)) => number(index).is_some(),
+        (Some(code), None) => USER_WORDS.contains(&code) || IO_WORDS.iter().any(|words| words.contains(&code)),
+        _ => false,
     }
 }
 
@@ -424,7 +439,7 @@ fn value(node: &Node, key: &Key, place: &str, out: &mut Vec<(Range<usize>, Strin
         (Map(keys), Value::Table(entries)) => {
             for e in entries {
                 if !io_word(&e.key) {
-                    out.push((e.key_span.clone(), format!("`{}` is no word of `[{name}]`; words are S, M0 … M999, such as M62P3, and G38", e.key)));
+                    out.push((e.key_span.clone(), format!("`{}` is no word of `[{name}]`: no program of a robot has it. Words are S, M3 to M9, M19, M50 to M53, M60, M62 to M68 (one output: M62P3), M100 to M199 and G38", e.key)));
                 }
                 table(&e.node, keys, &format!("`[{name}.{}]`", e.key), false, out);
             }
@@ -613,7 +628,10 @@ fn property(out: &mut String, k: &Key, depth: usize) {
         Tables(keys) | Map(keys) => {
             let map = matches!(k.kind, Map(_));
             let _ = if map {
-                writeln!(out, "{pad}\"type\": \"object\",\n{pad}\"additionalProperties\": false,\n{pad}\"patternProperties\": {{\n{pad}\"^(S|G38|M[0-9]{{1,3}}(P[0-9]{{1,3}})?)$\": {{")
+                writeln!(
+                    out,
+                    "{pad}\"type\": \"object\",\n{pad}\"additionalProperties\": false,\n{pad}\"patternProperties\": {{\n{pad}\"^(S|G38|M([3-9]|19|5[0-3]|60|6[2-8](P(0|[1-9][0-9]{{0,2}}))?|1[0-9]{{2}}))$\": {{"
+                )
             } else {
                 writeln!(out, "{pad}\"type\": \"array\",\n{pad}\"items\": {{")
             };

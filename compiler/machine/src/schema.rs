@@ -1,6 +1,6 @@
 //! The machine file: what it may hold, and what is wrong with it when it doesn't.
 
-use crate::cell::{Cell, Controller, Coupling, External, Rapid, Signal, Spindle, ToolData, Zones};
+use crate::cell::{Cell, Controller, Coupling, External, MACHINE_ZERO, Rapid, Signal, Spindle, ToolData, Zones};
 use crate::five_axis::{Carrier, FiveAxis, Rotary};
 use crate::keys::{self, ROOT, suggestion};
 use crate::math::{Frame, norm, scale};
@@ -236,7 +236,29 @@ impl Check {
             default_start(&mut machine);
         }
         self.quality(raw, &mut machine);
+        self.cell_fits(raw, &machine);
         machine
+    }
+
+    /// What the cell says has a meaning for the kind of machine and its coupled joints.
+    fn cell_fits(&mut self, raw: &Node, machine: &Machine) {
+        let home = raw.get("home").and_then(|h| h.get("joints"));
+        if let (Some(given), Some(home), Some(coupling)) = (home, &machine.cell.home, &machine.cell.coupling)
+            && let Some((i, value)) = machine
+                .outside(home)
+                .into_iter()
+                .find(|(i, _)| *i == coupling.joint && machine.joints[*i].allows(home[*i]))
+        {
+            let joint = &machine.joints[i];
+            self.value(&given.span, format!("at home the controller's `{}` is at {}, outside of its limits: it is counted together with another joint", joint.name, joint.show(value)));
+        }
+        let named = |n: &&Node| n.string("name").as_deref() == Some(MACHINE_ZERO);
+        let Some(frame) = raw.get("frame").and_then(|l| l.list().iter().find(named)) else { return };
+        if machine.kind != Kind::Robot {
+            self.value(&frame.span, format!("the frame `{MACHINE_ZERO}` is for robots: on this machine G53, G28 and G30 mean places of its own axes"));
+        } else if let Some(rotation) = frame.get("rotation") {
+            self.value(&rotation.span, format!("the frame `{MACHINE_ZERO}` has no `rotation`: X, Y and Z of the machine are those of the part, as on the mill the program is for"));
+        }
     }
 
     /// The two ways to give the start must mean the same.
@@ -565,8 +587,16 @@ impl Check {
             points: whole(c, "points"),
             bytes: whole(c, "bytes"),
         });
-        if let Some(row) = raw.get("io").and_then(|io| io.get("G38")) {
-            self.probe(row);
+        for row in raw.get("io").map_or(&[][..], Node::entries) {
+            if row.key == "G38" {
+                self.probe(&row.node);
+            } else if let (Some(_), Some(signal)) = (row.node.get("routine"), row.node.get("signal")) {
+                let what = format!(
+                    "`[io.{}]` has `routine` and `signal`; a row does one of them. Set the output in the routine",
+                    row.key
+                );
+                self.value(&signal.span, what);
+            }
         }
         let number = |table: &str, key: &str| raw.get(table).and_then(|t| t.value_of(key));
         Cell {
@@ -664,10 +694,15 @@ impl Check {
                 self.value(&node.span, format!("position {given} is outside of the limits"));
             }
         }
+        let carries_machine = e.string("carries").as_deref() == Some("machine");
+        if let Some(node) = e.get("coupled").filter(|_| !carries_machine) {
+            self.value(&node.span, "`coupled` is for axes that carry the machine: frames of the part are where a positioner has it, in any control");
+        }
         Some(External {
             position,
+            coupled: e.get("coupled").and_then(Node::flag),
             joint,
-            carries_machine: e.string("carries").as_deref() == Some("machine"),
+            carries_machine,
             axis: scale(axis, 1.0 / norm(axis)),
             point: e.array::<3>("point").unwrap_or_default(),
         })
@@ -810,8 +845,31 @@ mod tests {
         assert!(all(&format!("{cell}[kinematics]\nkind = \"opv\"\n")).contains("did you mean \"opw\"?"));
         assert!(all(&format!("{cell}[[joint]]\nname = \"J9\"\n")).contains("`type` is missing"));
         assert!(all(&format!("{cell}[coupling]\njoint = \"J33\"\n")).contains("did you mean `J3`?"));
-        assert!(all(&format!("{cell}[io.M3x]\nsignal = \"a\"\n")).contains("M3x"));
-        assert!(all(&format!("{cell}[kinematics]\nlengths = [0.1, -0.135, 0, 0.615, 0.705, 0.755, 0.085]\n")).contains("metres"));
+        for word in ["M3x", "M77", "M0", "M48", "M66P", "M62P07", "M101P1", "M200", "G38.2"] {
+            assert!(
+                all(&format!("{cell}[io.\"{word}\"]\nsignal = \"a\"\n")).contains(&format!("`{word}` is no word")),
+                "{word}"
+            );
+        }
+        for word in ["S", "M3", "M19", "M53", "M60", "M62", "M62P0", "M66P12", "M68P3", "M100", "M199"] {
+            assert!(parse(FileId(0), &format!("{cell}[io.{word}]\nsignal = \"a\"\n")).is_ok(), "{word}");
+        }
+        assert!(
+            all(&format!(
+                "{cell}[[external]]\nname = \"E1\"\ntype = \"revolute\"\ncarries = \"part\"\ncoupled = true\n"
+            ))
+            .contains("`coupled` is for axes that carry the machine")
+        );
+        let mill = "format = 1\nid = \"shop/cell\"\nextends = \"generic/mill3\"\n[[frame]]\nname = \"G53\"\n";
+        assert!(all(mill).contains("the frame `G53` is for robots"));
+        // The controller's J3 is J3 less J2 here: at home it is beyond its limit, though J3 itself is not.
+        let home = "[home]\njoints = [0, 60, -60, 0, 60, 0]\n";
+        let coupling = "[coupling]\njoint = \"J3\"\nwith = \"J2\"\nfactor = -1\nmin = -100\nmax = 100\n";
+        assert!(all(&format!("{cell}{home}{coupling}")).contains("at home the controller's `J3` is at -120°"));
+        assert!(
+            all(&format!("{cell}[kinematics]\nlengths = [0.1, -0.135, 0, 0.615, 0.705, 0.755, 0.085]\n"))
+                .contains("metres")
+        );
         assert!(all(&format!("{cell}[kinematics]\nlengths = [0, 0, 0, 0, 0, 0, 0]\n")).contains("above zero"));
         assert!(all(&format!("{cell}[frames.table]\nposition = [nan, 0, 0]\n")).contains("finite"));
         // What is extended doesn't say it for the file.
@@ -854,6 +912,8 @@ mod tests {
             ("[io.G38]\nwait = \"di\"\n", "seconds = ", &["1"]),
             ("[io.G38]\nwait = \"di\"\n", "signal = ", &["\"do\""]),
             ("[io.G38]\n", "value = ", &["1"]),
+            ("[io.M8]\nroutine = \"Cool\"\n", "signal = ", &["\"do\""]),
+            ("[[frame]]\nname = \"G53\"\nposition = [0, 0, 900]\n", "rotation = ", &["[0, 0, 90]"]),
             (tool, "mass = ", &["-1", "0"]),
             (tool, "diameter = ", &["-10", "0"]),
             (tool, "position = ", &["[0, 0, 1e300]", "[0, -inf, 0]"]),

@@ -8,7 +8,7 @@ mod setups;
 mod signals;
 
 use gr_ir::geometry::ArcShape;
-use gr_ir::{FeedMode, Note, Op, PathMode, Pose, Program, Source, Sources, State, Stop, Turn, View};
+use gr_ir::{FeedMode, Marker, Note, Op, PathMode, Pose, Program, Source, Sources, State, Stop, Turn, View};
 use gr_machine::math::{Frame, M3, add, dot, norm, product, rot_z, rotation_vector, scale, sub, transpose};
 use gr_machine::{Chain, Control, Kind, Machine, Rapid};
 use gr_text::{Code, Diagnostic, Severity, code};
@@ -16,6 +16,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::PI;
 
 use crate::cell::Cells;
+use crate::settle::main_line;
 use crate::turns::Turns;
 use crate::{Action, Curves, Options, Step, Tool, WorkFrame, Zone};
 
@@ -182,6 +183,8 @@ pub(crate) struct Gather<'a> {
     offset: bool,
     /// That was told.
     offset_told: bool,
+    /// Whether lines go by increments.
+    increments: places::Increments,
     /// What the frame in force is placed by.
     placed: Option<Frame>,
     path_said: bool,
@@ -198,9 +201,15 @@ pub(crate) struct Gather<'a> {
     anew: bool,
     /// What is gathered now is a cut.
     cutting: bool,
+    /// The canned cycle that is running, G-code times ten.
+    cycle: Option<i32>,
+    /// The first of what the end of the program does by itself: all it does where nothing moves any more.
+    closes: usize,
     workingstep: Option<String>,
     /// The pallet was exchanged just now: the stop that follows is that of M60.
     pallet: bool,
+    /// Whether the program stores a reference point of its own, once that was asked.
+    stores: Option<bool>,
     /// Switches of the panel that the program has set.
     switches: BTreeMap<&'static str, bool>,
     /// Frames and tools by what they are.
@@ -245,6 +254,7 @@ impl<'a> Gather<'a> {
             probed: None,
             offset: false,
             offset_told: false,
+            increments: places::Increments::default(),
             placed: None,
             path_said: false,
             ended: false,
@@ -256,8 +266,11 @@ impl<'a> Gather<'a> {
             begun: BTreeSet::new(),
             anew: false,
             cutting: false,
+            cycle: None,
+            closes: usize::MAX,
             workingstep: None,
             pallet: false,
+            stores: None,
             switches: BTreeMap::new(),
             frame_numbers: BTreeMap::new(),
             named: BTreeMap::new(),
@@ -267,6 +280,7 @@ impl<'a> Gather<'a> {
 
     pub fn run(&mut self, program: &Program) {
         let mut unnamed = places::Unnamed::new(program, self.machine);
+        self.closes = closing(program);
         let mut cursor = program.cursor();
         while let Some(view) = cursor.next() {
             if self.ended || self.findings.list.full() {
@@ -283,6 +297,9 @@ impl<'a> Gather<'a> {
             }
             if self.leads_to_machine(program, &view) {
                 continue;
+            }
+            if view.index == self.closes {
+                self.retract();
             }
             self.rests_on_unnamed(program, &view, &mut unnamed);
             self.op(&view);
@@ -315,6 +332,8 @@ impl<'a> Gather<'a> {
             Op::RunTime(what) => self.findings.say(code::ROBOT_RUN_TIME, Some(view.source), &[what.to_string()]),
             Op::ToolOffset(_) => self.tool_offset(view),
             Op::PathMode(_) => self.path_said = true,
+            Op::Begin { marker: Marker::Cycle, code, .. } => self.cycle = Some(code),
+            Op::Close(Marker::Cycle) => self.cycle = None,
             Op::End => {
                 self.end(view.start, view.state);
                 self.ended = true;
@@ -379,9 +398,9 @@ impl<'a> Gather<'a> {
             Op::Note(Note::Message, text) => self.act(Action::Message(text.to_string())),
             Op::Note(_, text) if text.starts_with("interpreter:") => {}
             Op::Note(_, text) => self.act(Action::Comment(text.to_string())),
-            Op::Begin { marker: gr_ir::Marker::Contour, .. } => {}
+            Op::Begin { marker: Marker::Contour, .. } => {}
             Op::Begin { marker, text, .. } if !text.is_empty() => {
-                if marker == gr_ir::Marker::Workingstep {
+                if marker == Marker::Workingstep {
                     self.workingstep = Some(text.to_string());
                 }
                 self.act(Action::Comment(text.to_string()));
@@ -643,10 +662,12 @@ impl<'a> Gather<'a> {
             self.nowhere(add(start.xyz(), lag), start.xyz());
             return None;
         }
+        // An increment goes on from where the tool stands.
+        let increments = self.increments.at(self.findings.sources, self.source);
         let (mut from, mut to) = (*start, *end);
         for i in 0..3 {
             from.axes[i] += lag[i];
-            to.axes[i] += if named[i] { 0.0 } else { lag[i] };
+            to.axes[i] += if named[i] && !increments { 0.0 } else { lag[i] };
         }
         Some((op, from, to))
     }
@@ -997,8 +1018,10 @@ impl<'a> Gather<'a> {
         if self.waiting && !self.out.items.iter().any(|i| matches!(i, Item::Move(_))) {
             // Rapids alone that left a coordinate where it was.
             self.go_to(pose, pose, state);
+            self.retract();
+        } else if self.closes == usize::MAX {
+            self.retract();
         }
-        self.retract();
         let made = self.cells.off();
         self.made(made);
     }
@@ -1041,6 +1064,15 @@ fn same_turn(a: &M3, b: &M3) -> bool {
     a.iter().flatten().zip(b.iter().flatten()).all(|(x, y)| (x - y).abs() < 1e-9)
 }
 
+/// The first operation of the block that ends the program behind which it moves nothing: M2 and M30 stop the spindle by themselves,
+/// which must not happen in the part.
+fn closing(program: &Program) -> usize {
+    let end = program.steps().position(|s| s.op == Op::End).and_then(|i| program.get(i));
+    let Some(end) = end else { return usize::MAX };
+    let before = (0..end.index).rev().map_while(|i| program.get(i).filter(|s| s.source == end.source && !s.op.moves()));
+    before.last().map_or(end.index, |s| s.index)
+}
+
 /// The part was clamped anew.
 struct Clamped {
     /// Items before it.
@@ -1049,12 +1081,6 @@ struct Clamped {
     source: Source,
     /// The program cuts at once.
     cutting: bool,
-}
-
-/// The line of the main program that asked for an operation, itself or through calls.
-fn main_line(program: &Program, source: Source) -> u32 {
-    let outermost = program.call_stack(source).filter(|f| f.pass == 0).last();
-    outermost.map_or(source.line, |f| f.line)
 }
 
 /// A frame to be looked up by; both zeros are one.

@@ -9,7 +9,7 @@ use crate::choose::{Chain, Chooser, Fault, Node, Why, chains};
 use crate::emit::Emit;
 use crate::gather::{Findings, Gather, Gathered, Item, Move, Way};
 use crate::path::Mount;
-use crate::settle::{control_tool, settled};
+use crate::settle::{control_tool, settled, settled_arm};
 use crate::solver::{Branches, Joints, Limits, Solver};
 use crate::{MAX_JOINTS, Options, Planned, Zone};
 
@@ -22,7 +22,8 @@ pub fn plan(program: &Program, machine: &Machine, sources: &dyn Sources, options
         return Err(gather.findings.take());
     }
     // Setups have places of their own for the part.
-    let settled = options.setups.is_empty().then(|| settled(program, machine, sources, control_tool)).flatten();
+    let mill = options.setups.is_empty().then(|| settled(program, machine, sources, control_tool)).flatten();
+    let settled = mill.or_else(|| settled_arm(program, machine, sources, &options.setups));
     gather.run(settled.as_ref().unwrap_or(program));
     let Gather { out: gathered, findings, .. } = gather;
     let mut solver = Solver::new(machine);

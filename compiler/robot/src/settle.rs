@@ -1,14 +1,16 @@
 //! Where a machine tool stands when its program has not said it, or has said it as a place of the machine: coordinates that no word
 //! has named yet are where the machine stood, and G53, G28, G30 and what a tool change does by itself lead to places that stay where
 //! they are, wherever the part is. A program's motion has numbers for both in its own frame; here they become those of the frame that
-//! the machine file gives the part. Arms have no such places: there both are told.
+//! the machine file gives the part. Arms stand nowhere by themselves, and have places of the machine only where their file says where
+//! the zero point of G53 is: what they don't have is told.
 
 use gr_backends::sources::{Words as Letters, is_hidden};
-use gr_ir::{ArcPlane, Axes, Builder, Marker, Op, Pose, Program, Sources, State, View, plane_axes};
+use gr_ir::{ArcPlane, Axes, Builder, Marker, Op, Pose, Program, Source, Sources, State, View, plane_axes};
 use gr_machine::math::{Frame, V3, solve};
 use gr_machine::{Kind, Kinematics, Machine};
 
-use crate::words::{Asked, Slides, Words, tool};
+use crate::Setup;
+use crate::words::{Asked, Slides, Words, placed, tool, work_shift};
 
 /// What a coordinate is known by.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Default)]
@@ -192,49 +194,116 @@ pub fn settled(program: &Program, machine: &Machine, sources: &dyn Sources, tool
     let home = crate::plan::home_joints(machine)?;
     let start = program.start_state().machine(&program.start().axes);
     let stood = [0, 1, 2].map(|i| home.get(slides.sliding[i]).map_or(0.0, |v| v - start[i]));
-    let settle = Settle { machine, kinematics: machine.kinematics(), slides, stood, tool };
+    let settle = Settle { machine, of: Of::Slides { kinematics: machine.kinematics(), slides, stood, tool } };
     let mut coordinates = Coordinates::new(program);
-    let axes = settle.axes(&program.start().axes, coordinates.by(), program.start_state());
+    let axes = settle.axes(&program.start().axes, coordinates.by(), program.start_state(), None);
     let mut out = Builder::from_state(Pose { axes, ..*program.start() }, *program.start_state());
     out.names_of(program);
     let mut cursor = program.cursor();
     while let Some(view) = cursor.next() {
         let by = coordinates.step(program, &view, sources);
-        let axes = if view.op.moves() { settle.axes(&view.end.axes, by, view.state) } else { view.end.axes };
+        let axes = if view.op.moves() { settle.axes(&view.end.axes, by, view.state, None) } else { view.end.axes };
         out.push_to(view.op, &Pose { axes, ..*view.end }, view.source);
     }
     Some(out.finish())
 }
 
+/// The same of an arm whose file has a place for G53, with the part where the setups of a job put it.
+pub(crate) fn settled_arm(
+    program: &Program,
+    machine: &Machine,
+    sources: &dyn Sources,
+    setups: &[Setup],
+) -> Option<Program> {
+    if machine.kind != Kind::Robot {
+        return None;
+    }
+    let settle = Settle { machine, of: Of::Place(machine.cell.machine_zero()?) };
+    let mut coordinates = Coordinates::new(program);
+    let mut out = Builder::from_state(*program.start(), *program.start_state());
+    out.names_of(program);
+    let (mut workingstep, mut any) = (None, false);
+    let mut cursor = program.cursor();
+    while let Some(view) = cursor.next() {
+        if let Op::Begin { marker: Marker::Workingstep, text, .. } = view.op {
+            workingstep = Some(text);
+        }
+        let by = coordinates.step(program, &view, sources);
+        any |= by.contains(&By::Machine);
+        // Also where nothing moves: the tool stays at a place of the machine when the program's coordinates change.
+        let part = setup_at(setups, workingstep, || main_line(program, view.source)).map(|i| setups[i].part);
+        out.push_to(
+            view.op,
+            &Pose { axes: settle.axes(&view.end.axes, by, view.state, part), ..*view.end },
+            view.source,
+        );
+    }
+    any.then(|| out.finish())
+}
+
+/// Which setup of a job holds for a workingstep, or else at a line of the main program.
+pub(crate) fn setup_at(setups: &[Setup], workingstep: Option<&str>, line: impl FnOnce() -> u32) -> Option<usize> {
+    if setups.is_empty() {
+        return None;
+    }
+    let named = workingstep.and_then(|w| setups.iter().position(|s| s.workingsteps.iter().any(|n| n == w)));
+    named.or_else(|| {
+        let line = line();
+        setups.iter().rposition(|s| s.from_line.is_some_and(|l| l <= line))
+    })
+}
+
+/// The line of the main program that asked for an operation, itself or through calls.
+pub(crate) fn main_line(program: &Program, source: Source) -> u32 {
+    let outermost = program.call_stack(source).filter(|f| f.pass == 0).last();
+    outermost.map_or(source.line, |f| f.line)
+}
+
 struct Settle<'a> {
     machine: &'a Machine,
-    kinematics: Box<dyn Kinematics>,
-    slides: Slides,
-    /// How far the machine stood at the start from where the program believes it, along its slides, mm.
-    stood: V3,
-    tool: fn(&Machine, &State) -> Frame,
+    of: Of,
+}
+
+/// What the coordinates of the machine belong to.
+enum Of {
+    /// Its slides.
+    Slides {
+        kinematics: Box<dyn Kinematics>,
+        slides: Slides,
+        /// How far the machine stood at the start from where the program believes it, along its slides, mm.
+        stood: V3,
+        tool: fn(&Machine, &State) -> Frame,
+    },
+    /// The tool point, seen from this place of the base in the directions of the part, mm.
+    Place(V3),
 }
 
 impl Settle<'_> {
     /// Coordinates in the work frame that put the slides of those that are not by a word of it where they belong; as they are where
     /// the slides don't go with them.
-    fn axes(&self, axes: &Axes, by: [By; 3], state: &State) -> Axes {
+    fn axes(&self, axes: &Axes, by: [By; 3], state: &State, part: Option<Frame>) -> Axes {
         const TIMES: usize = 2;
         const FAR: f64 = 100.0;
-        let fixed: Vec<usize> = (0..3).filter(|i| by[*i] != By::Work).collect();
+        // An arm doesn't stand anywhere by itself.
+        let stood = match &self.of {
+            Of::Slides { stood, .. } => Some(*stood),
+            Of::Place(_) => None,
+        };
+        let fixed: Vec<usize> =
+            (0..3).filter(|i| by[*i] == By::Machine || by[*i] == By::Nothing && stood.is_some()).collect();
         let mut out = *axes;
         if fixed.is_empty() {
             return out;
         }
         let machine = state.machine(axes);
-        let goal = |i: usize| machine[i] + if by[i] == By::Nothing { self.stood[i] } else { 0.0 };
+        let goal = |i: usize| machine[i] + stood.filter(|_| by[i] == By::Nothing).map_or(0.0, |s| s[i]);
         for _ in 0..TIMES {
-            let Some(here) = self.slid(&out, state) else { return *axes };
+            let Some(here) = self.slid(&out, state, part) else { return *axes };
             let mut slope = vec![vec![0.0; fixed.len()]; fixed.len()];
             for (k, axis) in fixed.iter().enumerate() {
                 let mut moved = out;
                 moved[*axis] += FAR;
-                let Some(there) = self.slid(&moved, state) else { return *axes };
+                let Some(there) = self.slid(&moved, state, part) else { return *axes };
                 for (row, slide) in slope.iter_mut().zip(&fixed) {
                     row[k] = (there[*slide] - here[*slide]) / FAR;
                 }
@@ -249,9 +318,19 @@ impl Settle<'_> {
         out
     }
 
-    fn slid(&self, axes: &Axes, state: &State) -> Option<V3> {
-        let asked = Asked::with(self.machine, axes, state, (self.tool)(self.machine, state));
-        let joints = self.slides.stand(self.machine, &*self.kinematics, &asked)?.joints;
-        Some(self.slides.sliding.map(|j| joints[j]))
+    /// Where the words of a program are in the coordinates of the machine.
+    fn slid(&self, axes: &Axes, state: &State, part: Option<Frame>) -> Option<V3> {
+        match &self.of {
+            Of::Slides { kinematics, slides, tool, .. } => {
+                let asked = Asked::with(self.machine, axes, state, tool(self.machine, state));
+                let joints = slides.stand(self.machine, &**kinematics, &asked)?.joints;
+                Some(slides.sliding.map(|j| joints[j]))
+            }
+            Of::Place(zero) => {
+                let part = part.unwrap_or_else(|| placed(self.machine, state));
+                let tip = part.then(&work_shift(state)).apply([axes[0], axes[1], axes[2]]);
+                Some(Frame { position: *zero, ..part }.inverse().apply(tip))
+            }
+        }
     }
 }

@@ -172,9 +172,14 @@ pub fn put_down(machine: &Machine, part: Frame) -> Machine {
 
 /// The work frame in the base.
 pub fn frame(machine: &Machine, state: &State) -> Frame {
+    placed(machine, state).then(&work_shift(state))
+}
+
+/// What the machine file places the work frame by, in the base.
+pub(crate) fn placed(machine: &Machine, state: &State) -> Frame {
     let cell = &machine.cell;
-    let placed = NAMES.get(usize::from(state.work)).and_then(|n| cell.frames.get(*n)).copied();
-    placed.unwrap_or_else(|| cell.part_in_base()).then(&work_shift(state))
+    let named = NAMES.get(usize::from(state.work)).and_then(|n| cell.frames.get(*n)).map(|f| cell.carried(*f));
+    named.unwrap_or_else(|| cell.part_in_base())
 }
 
 /// The tool point on the spindle's nose: the machine file's, else a tool as long as its offset.

@@ -499,7 +499,12 @@ fn places_that_a_robot_cannot_know() {
         ("G10 L20 P1 Z5", "Z", "Z0", "Z-85"),
     ] {
         let line = |head: &str| head.matches('\n').count() + 1 + usize::from(block.starts_with("G0 "));
-        let wanted = |head: &str, place: &str| format!("E0559 line {}: nothing before this says where the tool is in {axes}: it would be at {place}\n", line(head));
+        let wanted = |head: &str, place: &str| {
+            format!(
+                "E0559 line {}: no coordinate of the work frame before this says where the tool is in {axes}: it would be at {place}\n",
+                line(head)
+            )
+        };
         assert_eq!(told_of(bare, block), wanted(bare, zero), "{block}");
         let told = told_of(long, block);
         assert!(told.contains(&wanted(long, number)), "{block}: {told}");
@@ -509,6 +514,149 @@ fn places_that_a_robot_cannot_know() {
     for good in ["G0 X0 Y0 Z20\nG1 Z0 F100", "G0 Z20\nG0 X0 Y0\nG91 G1 Z-20 F100\nG90", "G10 L2 P1 X5", "G92.1", "G0 X10 Y10 Z20\nG92 X0"] {
         assert_eq!(told_of("G21 G90\nT1 M6\nG43 H1\n", good), "", "{good}");
     }
+}
+
+/// With a frame for them, places of the machine are the tool point's in it: what isn't named stays, also when the program's
+/// coordinates change under it, and increments go on from there.
+#[test]
+fn places_of_the_machine_in_the_frame_g53() {
+    let file = include_str!("../../../docs/examples/irb2400-cell.toml").to_string();
+    let file = file.replace("[frames.part]\nposition = [0, 0, 50]\n", "");
+    let with = |frame: &str| gr_machine::parse(FileId(0), &(file.clone() + frame)).expect("a good cell");
+    // The part is turned by a quarter turn; 200 above its zero point and 50 beside it.
+    let cell = with(
+        "\n[[frame]]\nname = \"G53\"\nposition = [850, -50, 650]\n[frames.part]\nposition = [0, 0, 50]\nrotation = [0, 0, 90]\n",
+    );
+    let last = |text: &str, line: u32| {
+        let p = planned(text, &cell).unwrap_or_else(|e| panic!("{}", messages(&e, text)));
+        assert_eq!(messages(&p.warnings, text), "", "{text}");
+        let to = p.program.steps.iter().rev().find_map(|s| match s.action {
+            Action::Linear { to, .. } | Action::Joint { to, .. } if s.source.is_some_and(|s| s.line + 1 == line) => {
+                Some(to)
+            }
+            _ => None,
+        });
+        p.program.targets[to.unwrap_or_else(|| panic!("{}", told(&p))) as usize]
+            .position
+            .map(|v| (v * 1e6).round() / 1e6 + 0.0)
+    };
+    let head = "G21 G90\nT1 M6\nG43 H1\nG0 X10 Y10 Z20\n";
+    for (block, line, place) in [
+        ("G91 G28 Z0\nG90", 5, [10.0, 10.0, 200.0]),
+        ("G53 G0 Z-30", 5, [10.0, 10.0, 170.0]),
+        ("G53 G1 X-40 F600", 5, [10.0, 10.0, 20.0]),
+        ("G53 G0 Y-20 Z0", 5, [10.0, 30.0, 200.0]),
+        ("G28", 5, [50.0, 50.0, 200.0]),
+        ("G91 G28 Z0\nG28 X0 Y0\nG90", 6, [50.0, 50.0, 200.0]),
+        ("G53 G0 Z0\nG91 G0 X5 Z-10\nG90", 6, [15.0, 10.0, 190.0]),
+        ("G53 G0 Z0\nG49\nG0 X20", 7, [20.0, 10.0, 200.0]),
+        ("G53 G0 Z0\nG10 L2 P1 Z5\nG0 X20", 7, [20.0, 10.0, 195.0]),
+        ("G53 G0 Z0\nG1 X20 F600", 6, [20.0, 10.0, 200.0]),
+        ("G53 G0 Z0\nG0 Z5", 6, [10.0, 10.0, 5.0]),
+    ] {
+        // There the tool is: no move.
+        let text = format!("{head}{block}\nG0 X10 Y10 Z40\nM30\n");
+        let line = if block.contains("X-40") { 4 } else { line };
+        assert_eq!(last(&text, line), place, "{block}");
+    }
+    // Before the first move the tool is at no X and Y: it comes to the first at the height of the machine's Z0.
+    let text = "G21 G90\nG91 G28 Z0\nG90\nT1 M6\nG0 X10 Y20\nG43 H1 Z30\nG1 Z0 F600\nG91 G28 Z0\nG28 X0 Y0\nM30\n";
+    assert_eq!(
+        (last(text, 5), last(text, 6), last(text, 8), last(text, 9)),
+        ([10.0, 20.0, 200.0], [10.0, 20.0, 30.0], [10.0, 20.0, 200.0], [50.0, 50.0, 200.0])
+    );
+    let faults = |block: &str| faults(&format!("{head}{block}\nG0 X10 Y10 Z40\nM30\n"), &cell);
+    assert_eq!(
+        faults("G28.1\nG28"),
+        "E0523 line 6: G28 to a place that the program stores itself (G28.1) can't be done by a robot program\n"
+    );
+    assert_eq!(
+        faults("G53 G0 Z0\nG92 Z0"),
+        "E0559 line 6: no coordinate of the work frame before this says where the tool is in Z: it would be at Z200\n"
+    );
+    assert_eq!(faults("G53 G0 Z5000").split(':').next(), Some("E0507 line 5"));
+    // A rail moves the base away from them.
+    let rail = "\n[[external]]\nname = \"E1\"\ntype = \"prismatic\"\ncarries = \"machine\"\naxis = [1, 0, 0]\nmin = 0\nmax = 3000\nposition = 100\n";
+    let moved = with(&format!("\n[[frame]]\nname = \"G53\"\nposition = [950, -50, 650]\n{rail}"));
+    assert_eq!(moved.cell.machine_zero(), Some([850.0, -50.0, 650.0]));
+}
+
+/// In a job the part is where the setup has it; places of the machine are not.
+#[test]
+fn places_of_the_machine_in_a_job() {
+    let file = include_str!("../../../docs/examples/irb2400-cell.toml").to_string();
+    let cell = gr_machine::parse(FileId(0), &(file + "\n[[frame]]\nname = \"G53\"\nposition = [950, -50, 650]\n"))
+        .expect("a good cell");
+    let text = "G21 G90\nT1 M6\nG43 H1\nG0 X10 Y10 Z20\nG1 Z0 F600\nG53 G0 Z0\nM30\n";
+    let part = gr_machine::math::Frame::shift([920.0, -100.0, 480.0]);
+    let setup = gr_robot::Setup {
+        name: "one".into(),
+        from_line: Some(0),
+        workingsteps: Vec::new(),
+        part,
+        place: gr_ir::Source::default(),
+    };
+    let texts = Texts::new([(FileId(0), text)]);
+    let p = plan(&motion(text), &cell, &texts, &Options { setups: vec![setup], ..Options::default() })
+        .unwrap_or_else(|e| panic!("{}", messages(&e, text)));
+    let up = p.program.steps.iter().find_map(|s| match s.action {
+        Action::Linear { to, .. } if s.source.is_some_and(|s| s.line == 5) => {
+            Some(p.program.targets[to as usize].position)
+        }
+        _ => None,
+    });
+    assert_eq!(up.map(|p| p.map(|v| (v * 1e6).round() / 1e6)), Some([10.0, 10.0, 170.0]), "{}", told(&p));
+}
+
+/// M2 in a cut: the tool is lifted before the spindle stops; what the program stops itself before, it stops there.
+#[test]
+fn the_spindle_turns_until_the_tool_is_out() {
+    let order = |tail: &str| {
+        let text = format!("G21 G90\nT1 M6\nG43 H1\nM3 S5000\nG0 X10 Y10 Z20\nG1 Z0 F600\n{tail}");
+        let p = planned(&text, &cell()).unwrap_or_else(|e| panic!("{}", messages(&e, &text)));
+        let steps = p.program.steps.iter().skip_while(|s| s.source.is_none_or(|s| s.line < 5)).filter_map(|s| match &s.action {
+            Action::Linear { .. } => Some(if s.source.is_some() { "cut" } else { "lift" }),
+            Action::Signal { word, .. } => Some(if word.code == "M5" { "stop" } else { "signal" }),
+            _ => None,
+        });
+        steps.collect::<Vec<_>>().join(" ")
+    };
+    for tail in ["M2\n", "M30\n", "M5 M30\n", ""] {
+        assert_eq!(order(tail), "cut lift stop", "{tail}");
+    }
+    assert_eq!(order("M5\nM30\n"), "cut stop lift");
+}
+
+/// A tapping cycle locks the overrides of itself: the warning names it, not words that nobody wrote.
+#[test]
+fn a_tapping_cycle_names_itself() {
+    let told = |block: &str| faults(&format!("G21 G90\nT1 M6\nG43 H1\nM3 S5000\nG0 X10 Y10 Z20\n{block}\nG0 Z20\nM30\n"), &cell());
+    let lock = "has no effect on a robot: its controller keeps the operator's speed override to itself\n";
+    assert_eq!(told("G84 Z-5 R2 F500\nG80"), format!("planned\nE0548 line 6: the lock of feed and speed override in G84 {lock}"));
+    assert_eq!(told("M50 P0"), format!("planned\nE0548 line 6: M50 P0 {lock}"));
+}
+
+/// An increment after a change of the offset goes on from where the tool stands.
+#[test]
+fn increments_after_a_change_of_the_offset() {
+    let text = "G21 G90\nT1 M6\nG43 H1\nG0 X10 Y10 Z50\nG43.1 Z80\nG91 G0 Z-10\nX5 Z-5\nG90\nG0 X1\nG0 Z30\nM30\n";
+    let mut cell = cell();
+    cell.cell.tools.get_mut(&1).expect("a tool").frame.position[2] = 85.0;
+    let p = planned(text, &cell).unwrap_or_else(|e| panic!("{}", messages(&e, text)));
+    let places: Vec<_> = p
+        .program
+        .steps
+        .iter()
+        .filter_map(|s| match s.action {
+            Action::Linear { to, .. } | Action::Joint { to, .. } => s
+                .source
+                .filter(|s| s.line > 3)
+                .map(|_| p.program.targets[to as usize].position.map(|v| (v * 1e6).round() / 1e6)),
+            _ => None,
+        })
+        .collect();
+    assert_eq!(places, [[10.0, 10.0, 40.0], [15.0, 10.0, 35.0], [1.0, 10.0, 35.0], [1.0, 10.0, 30.0]], "{}", told(&p));
+    assert!(messages(&p.warnings, text).contains("E0555 line 6"), "{}", messages(&p.warnings, text));
 }
 
 /// A program that ends with a probe goes back from there before it lifts, and never down to its height of approach.

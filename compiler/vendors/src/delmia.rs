@@ -74,8 +74,12 @@ impl Writer {
         }
         out += "      </AccuracyProfileList>\n      <ObjectFrameProfileList>\n";
         for f in &program.frames {
-            let pose = pose(&f.frame, [0.0; 3]).0;
-            let _ = write!(out, "        <ObjectFrameProfile><Name>{}</Name><ObjectFrame>{pose}</ObjectFrame></ObjectFrameProfile>\n", escape(&f.name));
+            let pose = pose(&program.machine.cell.in_control(&f.frame), [0.0; 3]).0;
+            let _ = write!(
+                out,
+                "        <ObjectFrameProfile><Name>{}</Name><ObjectFrame>{pose}</ObjectFrame></ObjectFrameProfile>\n",
+                escape(&f.name)
+            );
         }
         let _ = write!(
             out,

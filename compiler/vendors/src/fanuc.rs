@@ -297,7 +297,7 @@ impl Writer {
             self.set_frame(&format!("UTOOL[{}]", i + 1), REGISTER + 1, &tool.frame);
         }
         for (i, frame) in cx.program.frames.iter().enumerate().take(9) {
-            self.set_frame(&format!("UFRAME[{}]", i + 1), REGISTER, &frame.frame);
+            self.set_frame(&format!("UFRAME[{}]", i + 1), REGISTER, &cx.machine.cell.in_control(&frame.frame));
         }
         self.line("  UFRAME_NUM=1");
         self.line("  UTOOL_NUM=1");

@@ -216,7 +216,7 @@ impl Body for Writer {
             }
             Op::Frame(i) => {
                 self.room(12);
-                let frame = cx.program.frames[i].frame;
+                let frame = cx.machine.cell.in_control(&cx.program.frames[i].frame);
                 self.set_by_hand(cx, format!("UF {}", i + 1), &frame);
             }
             Op::Set { name, value, word } => {

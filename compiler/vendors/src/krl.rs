@@ -259,7 +259,7 @@ impl Body for Writer {
             Op::Frame(i) => {
                 let frame = &cx.program.frames[i];
                 let note = cx.ascii(&frame.name);
-                self.frame("$BASE", &frame.frame, &note);
+                self.frame("$BASE", &cx.machine.cell.in_control(&frame.frame), &note);
             }
             Op::Set { name, value, word } => {
                 let n = cx.number(name, word);

@@ -16,19 +16,17 @@ use gr_robot::{RobotProgram, Target};
 use gr_text::code;
 use std::collections::BTreeMap;
 use std::fmt::Write;
+use std::sync::LazyLock;
 
 pub(crate) struct Rapid;
 
 static TRAITS: Traits = Traits { title: "ABB RAPID", arms: Arms::Spherical, arcs: true, trailing: true, unverified: "" };
 
-/// Reserved words (*RAPID Kernel*, 3HAC050946) and data that every system has.
-const RESERVED: &[&str] = &[
-    "ALIAS", "AND", "BACKWARD", "CASE", "CONNECT", "CONST", "DEFAULT", "DIV", "DO", "ELSE", "ELSEIF", "ENDFOR", "ENDFUNC", "ENDIF",
-    "ENDMODULE", "ENDPROC", "ENDRECORD", "ENDTEST", "ENDTRAP", "ENDWHILE", "ERROR", "EXIT", "FALSE", "FOR", "FROM", "FUNC", "GOTO",
-    "IF", "INOUT", "LOCAL", "MOD", "MODULE", "NOSTEPIN", "NOT", "NOVIEW", "OR", "PERS", "PROC", "RAISE", "READONLY", "RECORD",
-    "RETRY", "RETURN", "STEP", "SYSMODULE", "TASK", "TEST", "THEN", "TO", "TRAP", "TRUE", "TRYNEXT", "UNDO", "VAR", "VIEWONLY",
-    "WHILE", "WITH", "XOR", "FINE", "VMAX", "TOOL0", "WOBJ0", "LOAD0", "MAIN", "BASE", "USER",
-];
+/// Names that RAPID has itself: reserved words, instructions, functions, data types and data.
+static RESERVED: LazyLock<Vec<&str>> = LazyLock::new(|| {
+    let lines = include_str!("../../../spec/targets/rapid-names.txt").lines().filter(|l| !l.starts_with('#'));
+    lines.flat_map(str::split_whitespace).collect()
+});
 
 /// Lines of a module: what ABB's reference post processors keep to.
 const LINES: u64 = 5000;
@@ -41,7 +39,7 @@ impl Language for Rapid {
     }
 
     fn emit(&self, program: &RobotProgram, sources: &dyn Sources, options: &Options) -> Output {
-        let mut names = Names::new(Rule { longest: 32, reserved: RESERVED, upper: false });
+        let mut names = Names::new(Rule { longest: 32, reserved: &RESERVED, upper: false });
         let module = names.give(&program.name, "P");
         let tools: Vec<String> = program.tools.iter().map(|t| names.give(&t.name, "t")).collect();
         let frames: Vec<String> = program.frames.iter().map(|f| names.give(&f.name, "w")).collect();
@@ -131,7 +129,11 @@ impl Writer {
             );
         }
         for (frame, name) in program.frames.iter().zip(&self.frames) {
-            let _ = write!(head, "  TASK PERS wobjdata {name}:=[FALSE,TRUE,\"\",{},[[0,0,0],[1,0,0,0]]];\r\n", pose(&frame.frame));
+            let _ = write!(
+                head,
+                "  TASK PERS wobjdata {name}:=[FALSE,TRUE,\"\",{},[[0,0,0],[1,0,0,0]]];\r\n",
+                pose(&program.machine.cell.in_control(&frame.frame))
+            );
         }
         for (value, name) in by_name(&self.speeds) {
             let _ = write!(head, "  CONST speeddata {name}:={value};\r\n");

@@ -190,6 +190,7 @@ impl<'p> Cx<'p> {
 
     fn run(&mut self, body: &mut dyn Body) {
         let program = self.program;
+        self.rails(body);
         body.op(self, Op::Home(&program.home));
         self.before = Some(program.home);
         self.before = self.moved_before();
@@ -214,6 +215,25 @@ impl<'p> Cx<'p> {
             if matches!(step.action, Action::End) || self.out.full() {
                 break;
             }
+        }
+    }
+
+    /// What the frames of a robot on a rail are relative to. Which is right only its control knows.
+    fn rails(&mut self, body: &mut dyn Body) {
+        for e in self.machine.cell.external.iter().filter(|e| e.carries_machine && e.position != 0.0) {
+            let (name, place) = (&e.joint.name, e.joint.show(e.position));
+            if e.coupled.is_none() {
+                self.say(code::VENDOR_RAIL, &[name.clone(), place.clone()]);
+            }
+            let text = match e.coupled {
+                Some(true) => format!(
+                    "{name} carries the robot and is at {place}. Work frames: from the base at 0; the control must count {name} in poses"
+                ),
+                _ => format!(
+                    "{name} carries the robot and is at {place}. Work frames: from the base there; the control must not count {name} in poses"
+                ),
+            };
+            body.op(self, Op::Comment(&text));
         }
     }
 

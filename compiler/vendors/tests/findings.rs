@@ -89,10 +89,75 @@ fn every_finding() {
     note("E0633 letters", one("rapid", Action::Message("Fräser wechseln".into())));
     note("E0634 optional stop", one("rapid", Action::Pause { optional: true }));
     note("E0637 corners", moved("inform", line(10.0, Some(0.5))));
+    note("E0640 a rail", run("rapid", &on_rail(None), true));
     insta::assert_snapshot!(all);
     for code in 620..=637 {
         assert!(all.contains(&format!(" E0{code} at")), "E0{code} is never raised");
     }
+}
+
+/// An arm at 700 on its rail.
+fn on_rail(coupled: Option<bool>) -> Builder {
+    let (id, home, _) = robot_of("rapid");
+    let mut b = Builder::new(machine(id), home);
+    let joint = gr_machine::Joint {
+        name: "E1".into(),
+        kind: gr_machine::JointKind::Prismatic,
+        ..b.program.machine.joints[0].clone()
+    };
+    let rail = gr_machine::External {
+        joint,
+        carries_machine: true,
+        axis: [1.0, 0.0, 0.0],
+        point: [0.0; 3],
+        position: 700.0,
+        coupled,
+    };
+    b.program.machine.cell.external.push(rail);
+    for t in b.program.targets.iter_mut().chain([&mut b.program.home]) {
+        t.joints[6] = 700.0;
+    }
+    b
+}
+
+/// The frames of a control that counts the rail are those of the base at 0, others those of the base as it stands; the program
+/// says which.
+#[test]
+fn frames_on_a_rail() {
+    let line = |coupled, wanted: &str| {
+        let out = run("rapid", &on_rail(coupled), true);
+        let text = out.files.iter().map(|f| String::from_utf8_lossy(&f.bytes).to_string()).collect::<String>();
+        text.lines().find(|l| l.contains(wanted)).unwrap_or_else(|| panic!("{text}")).trim().to_string()
+    };
+    let x = |coupled| {
+        let line = line(coupled, "wobjdata G54");
+        line.split("[[")
+            .nth(1)
+            .and_then(|t| t.split(',').next())
+            .and_then(|n| n.parse::<f64>().ok())
+            .unwrap_or_else(|| panic!("{line}"))
+    };
+    assert!((x(Some(true)) - x(Some(false)) - 700.0).abs() < 1e-9 && x(None) == x(Some(false)));
+    assert_eq!(
+        line(Some(true), "E1 carries"),
+        "! E1 carries the robot and is at 700 mm. Work frames: from the base at 0; the control must count E1 in poses"
+    );
+    assert!(line(None, "E1 carries").ends_with("must not count E1 in poses"));
+    assert!(run("rapid", &on_rail(Some(false)), true).findings.iter().all(|f| f.code.def().code != "E0640"));
+}
+
+/// Names of instructions, functions and data types of RAPID are renamed like reserved words.
+#[test]
+fn names_that_rapid_has_itself() {
+    let (id, home, _) = robot_of("rapid");
+    let mut b = Builder::new(machine(id), home);
+    b.program.name = "Load".into();
+    b.program.tools[0].name = "MoveL".into();
+    b.program.tools[1].name = "offs".into();
+    let found = run("rapid", &b, true).findings;
+    let told: Vec<_> = found.iter().filter(|f| f.code.def().code == "E0628").map(|f| f.message.as_str()).collect();
+    assert_eq!(told.len(), 3, "{told:?}");
+    assert!(told[0].contains("Load_2") && told[1].contains("MoveL_2") && told[2].contains("offs_2"), "{told:?}");
 }
 
 /// Errors have room of their own beside any number of warnings.

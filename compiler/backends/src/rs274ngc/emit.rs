@@ -2,7 +2,7 @@
 
 use super::write::Writer;
 use super::{Emitted, Language, Options};
-use crate::sources::Words;
+use crate::sources::{Words, stores_reference};
 use gr_ir::Sources;
 use gr_ir::{Axes, FeedMode, Marker, Note, Op, Override, Plane, Program, Source, State, Stop, Turn, Units, View};
 use gr_text::{Code, Diagnostic, FileId, Findings, code};
@@ -109,7 +109,7 @@ impl<'a> Emitter<'a> {
             offsets: options.stored_offsets,
             rotations: options.stored_rotations,
             tools: options.tools.clone(),
-            own_reference: own_reference(program, sources),
+            own_reference: stores_reference(program, sources),
             adrift: false,
             units: state.units,
             words_of: None,
@@ -484,15 +484,4 @@ fn done_by_end(op: &Op<'_>) -> bool {
             | Op::Note(Note::Comment, _)
             | Op::Finish
     )
-}
-
-/// Whether the program, or a file it calls, stores a reference point of its own.
-fn own_reference(program: &Program, sources: &dyn Sources) -> bool {
-    let files: std::collections::BTreeSet<_> = program.steps().map(|s| s.source.file).collect();
-    files.into_iter().any(|file| {
-        (0u32..).map_while(|l| sources.line(file, l)).any(|text| {
-            let near = text.contains("28") || text.contains("30");
-            near && (Words::of(text).g(281) || Words::of(text).g(301))
-        })
-    })
 }

@@ -1,8 +1,8 @@
-//! Places that an arm's program can't know: those of a machine tool, and coordinates that no word has named when something
-//! rests on them. A mill has both, see [`crate::settle`].
+//! Places that an arm's program can't know: those of a machine tool, which the machine file may place, and coordinates that no
+//! word has named when something rests on them. A mill has both, see [`crate::settle`].
 
-use gr_backends::sources::Words as Letters;
-use gr_ir::{Op, Program, View};
+use gr_backends::sources::{Words as Letters, stores_reference};
+use gr_ir::{FileId, Op, Program, Source, Sources, View};
 use gr_machine::{Kind, Machine};
 use gr_text::code;
 
@@ -18,6 +18,29 @@ impl Unnamed {
     }
 }
 
+/// Whether lines go by increments (G91), looked for from the line on that was asked for last.
+#[derive(Default)]
+pub(super) struct Increments(Option<(FileId, u32, bool)>);
+
+impl Increments {
+    pub fn at(&mut self, sources: &dyn Sources, source: Source) -> bool {
+        let (file, line) = (source.file, source.line);
+        let told = match self.0 {
+            Some((f, last, told)) if f == file && last <= line => {
+                // Between the two lines G90 or G91 may stand.
+                let said = (last + 1..=line).rev().find_map(|l| {
+                    let words = Letters::at(sources, file, l)?;
+                    (words.g(900) || words.g(910)).then(|| words.g(910))
+                });
+                said.unwrap_or(told)
+            }
+            _ => Letters::goes_by_increments(sources, file, line),
+        };
+        self.0 = Some((file, line, told));
+        told
+    }
+}
+
 impl Gather<'_> {
     /// Whether a move leads to a place of a machine tool; that is told, and where the tool is afterwards nobody knows.
     pub(super) fn leads_to_machine(&mut self, program: &Program, view: &View<'_, '_>) -> bool {
@@ -25,7 +48,17 @@ impl Gather<'_> {
             return false;
         }
         let Some(word) = place_of_machine(program, view, self.findings.sources) else { return false };
-        self.findings.say(code::ROBOT_MACHINE_PLACE, Some(self.source), &[word.to_string()]);
+        if self.machine.cell.machine_zero().is_some() {
+            if !word.starts_with("G28") && !word.starts_with("G30")
+                || !*self.stores.get_or_insert_with(|| stores_reference(program, self.findings.sources))
+            {
+                return false;
+            }
+            // What was stored is a place of the mill that the program was run on.
+            self.cannot(&format!("{word} to a place that the program stores itself ({word}.1)"));
+        } else {
+            self.findings.say(code::ROBOT_MACHINE_PLACE, Some(self.source), &[word.to_string()]);
+        }
         self.rapids = true;
         (self.at, self.probed) = (None, None);
         true
@@ -38,22 +71,25 @@ impl Gather<'_> {
         let after = coordinates.step(program, view, self.findings.sources);
         if view.op == Op::Rapid {
             // A place that the program names is a place, also where it has the number that nobody had named before.
-            (0..3).for_each(|i| self.seen[i] |= after[i] == By::Work);
+            (0..3).for_each(|i| self.seen[i] |= after[i] != By::Nothing);
         }
         let changes = |i: usize| view.start.axes[i] != view.end.axes[i];
+        let mut from_machine = [false; 3];
         let open = match view.op {
-            Op::Rapid if (0..3).all(|i| self.seen[i] || changes(i)) => [0, 1, 2].map(|i| after[i] != By::Work),
+            Op::Rapid if (0..3).all(|i| self.seen[i] || changes(i)) => [0, 1, 2].map(|i| after[i] == By::Nothing),
             Op::WorkOffset(..) | Op::LocalOffset(_) => {
                 let named = self.set_from_here(view);
+                from_machine = [0, 1, 2].map(|i| named[i] && before[i] == By::Machine);
                 [0, 1, 2].map(|i| named[i] && before[i] != By::Work)
             }
-            op if op.feeds() || matches!(op, Op::Probe(_)) => before.map(|b| b != By::Work),
+            op if op.feeds() || matches!(op, Op::Probe(_)) => before.map(|b| b == By::Nothing),
             _ => [false; 3],
         };
         if open != [false; 3] {
-            self.unnamed(view, open);
+            self.unnamed(view, open, from_machine != [false; 3]);
         }
-        if open != [false; 3] || after == [By::Work; 3] {
+        let settled = after == [By::Work; 3] && self.machine.cell.machine_zero().is_none();
+        if open != [false; 3] || settled {
             unnamed.0 = None;
         }
     }
@@ -68,13 +104,13 @@ impl Gather<'_> {
         [b'x', b'y', b'z'].map(|l| sets && letters.has(l))
     }
 
-    fn unnamed(&mut self, view: &View<'_, '_>, open: [bool; 3]) {
+    fn unnamed(&mut self, view: &View<'_, '_>, open: [bool; 3], from_machine: bool) {
         let axes = || (0..3).filter(|i| open[*i]);
         let names = axes().map(|i| ["X", "Y", "Z"][i]).collect::<Vec<_>>().join(" ");
         let place = |i: usize| format!("{}{}", ["X", "Y", "Z"][i], gr_text::figures::number(view.start.axes[i] + 0.0, 3));
         let args = [names, axes().map(place).collect::<Vec<_>>().join(" ")];
-        // A number that comes from a mill's offsets is no place of a robot.
-        match axes().all(|i| view.start.axes[i].abs() <= TINY) {
+        // A number that comes from a mill's offsets is no place of a robot, nor is one that a place of the machine makes of the part's.
+        match !from_machine && axes().all(|i| view.start.axes[i].abs() <= TINY) {
             true => self.findings.say(code::ROBOT_UNNAMED, Some(self.source), &args),
             false => self.findings.fail(code::ROBOT_UNNAMED, self.source, &args),
         }

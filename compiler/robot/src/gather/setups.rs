@@ -8,6 +8,7 @@ use gr_text::code;
 
 use super::{Clamped, Gather, Item, Move};
 use crate::Action;
+use crate::settle::setup_at;
 
 /// A height counts as another from here on, mm.
 const HIGHER: f64 = 1e-6;
@@ -15,9 +16,7 @@ const HIGHER: f64 = 1e-6;
 impl Gather<'_> {
     /// Which setup of the job holds here.
     pub(super) fn setup(&self) -> Option<usize> {
-        let setups = &self.options.setups;
-        let named = self.workingstep.as_ref().and_then(|w| setups.iter().position(|s| s.workingsteps.contains(w)));
-        named.or_else(|| setups.iter().rposition(|s| s.from_line.is_some_and(|l| l <= self.main_line)))
+        setup_at(&self.options.setups, self.workingstep.as_deref(), || self.main_line)
     }
 
     fn setup_name(&self, setup: Option<usize>) -> String {

@@ -82,7 +82,9 @@ impl Gather<'_> {
             return self.word(word, Some(f64::from(u8::from(free))));
         }
         if free != usual {
-            self.findings.once_each(code::ROBOT_OVERRIDE, Some(self.source), &[word.to_string()]);
+            // A tapping cycle does so by itself.
+            let what = self.cycle.map_or_else(|| word.to_string(), |c| format!("the lock of feed and speed override in {}", format_args!("G{}", c / 10)));
+            self.findings.once_each(code::ROBOT_OVERRIDE, Some(self.source), &[what]);
         }
     }
 
