@@ -14,7 +14,7 @@ pub struct Entry {
     pub id: u64,
     /// Byte of the `#`.
     pub start: u32,
-    /// One past the `;`.
+    /// One past the `;`; where that is missing, where the next statement begins.
     pub end: u32,
     /// Byte of the keyword, or of the `(` of a complex instance.
     pub keyword: u32,
@@ -31,18 +31,18 @@ pub fn index(text: &[u8]) -> Index {
             break;
         }
         if text[at] != b'#' {
-            at = statement_end(text, at);
+            at = end_of(text, at);
             continue;
         }
         let start = at;
         let (id, after) = number(text, at + 1);
         let mut p = skip_blank(text, after);
         if after == at + 1 || text.get(p) != Some(&b'=') {
-            at = statement_end(text, at + 1);
+            at = end_of(text, at + 1);
             continue;
         }
         p = skip_blank(text, p + 1);
-        let end = statement_end(text, p);
+        let end = end_of(text, p);
         entries.push(Entry { id, start: start as u32, end: end as u32, keyword: p as u32 });
         at = end;
     }
@@ -78,6 +78,52 @@ pub(crate) fn skip_blank(text: &[u8], mut at: usize) -> usize {
         }
     }
     at
+}
+
+/// Where the statement around `at` ends. One that lost its own end does not reach into the next instance.
+fn end_of(text: &[u8], at: usize) -> usize {
+    let end = statement_end(text, at);
+    // Behind the head of an instance `=` stands in strings and comments alone.
+    match memchr(b'=', &text[at..end]) {
+        None => end,
+        Some(_) => next_instance(text, at, end).unwrap_or(end),
+    }
+}
+
+/// Byte of the first instance that begins on a line of its own, outside of strings and comments.
+#[cold]
+#[inline(never)]
+fn next_instance(text: &[u8], mut at: usize, end: usize) -> Option<usize> {
+    while at < end {
+        at += memchr::memchr3(b'#', b'\'', b'/', &text[at..end])?;
+        match text[at] {
+            b'#' if first_on_line(text, at) && begins_instance(text, at) => return Some(at),
+            b'#' => at += 1,
+            b'\'' => at = string_end(text, at)?,
+            _ => match crate::lex::comment(text, at) {
+                Some(past) => at = past?,
+                None => at += 1,
+            },
+        }
+    }
+    None
+}
+
+/// Whether nothing but blanks stands before `at` on its line.
+pub(crate) fn first_on_line(text: &[u8], at: usize) -> bool {
+    let before = text[..at].iter().rev().find(|b| !matches!(b, b' ' | b'\t'));
+    matches!(before, None | Some(b'\n' | b'\r'))
+}
+
+/// Whether `#n=` and the beginning of an instance stand at `at`.
+pub(crate) fn begins_instance(text: &[u8], at: usize) -> bool {
+    let (_, after) = number(text, at + 1);
+    let p = skip_blank(text, after);
+    let q = skip_blank(text, p + 1);
+    text.get(at) == Some(&b'#')
+        && after > at + 1
+        && text.get(p) == Some(&b'=')
+        && text.get(q).is_none_or(|b| b.is_ascii_alphabetic() || matches!(b, b'(' | b'!'))
 }
 
 /// One past the `;` that ends the statement around `at`.
@@ -137,11 +183,7 @@ pub(crate) fn first_statement(inside: &[u8]) -> Option<usize> {
     loop {
         at += memchr(b'#', &inside[at..])?;
         let before = inside[..at].iter().rev().find(|b| **b != b' ');
-        let (_, after) = number(inside, at + 1);
-        let p = skip_blank(inside, after);
-        let q = skip_blank(inside, p + 1);
-        let head = matches!(before, Some(b';' | b'\n' | b'\r'));
-        if head && after > at + 1 && inside.get(p) == Some(&b'=') && inside.get(q).is_none_or(|b| b.is_ascii_alphabetic() || matches!(b, b'(' | b'!')) {
+        if matches!(before, Some(b';' | b'\n' | b'\r')) && begins_instance(inside, at) {
             return Some(at);
         }
         at += 1;
@@ -168,6 +210,17 @@ mod tests {
         let text = b"#1=A('a; #9=X(); b','it''s; #8=Y()','a '';\n#7=Z(); ''');\n#2=B();\n";
         let ids: Vec<u64> = index(text).entries.iter().map(|e| e.id).collect();
         assert_eq!(ids, [1, 2]);
+    }
+
+    #[test]
+    fn a_lost_end_costs_no_other_instance() {
+        let text = b"#1=A('a=b',(#4\n\t#2=B(#3 /* = #9=C( */,'x;\n y'\r\n#3=(A()B());#4=C('#8=D()'\n#5 =D()\n#6\n=E();\nENDSEC;";
+        let found: Vec<(u64, u32)> = index(text).entries.iter().map(|e| (e.id, e.end)).collect();
+        assert_eq!(found.iter().map(|e| e.0).collect::<Vec<_>>(), [1, 2, 3, 4, 5, 6]);
+        assert_eq!(&text[found[0].1 as usize..][..4], b"#2=B");
+        // The first on its line alone: `=` for `,` begins nothing.
+        let text = b"#1=A(#2, #3=B(1));\n#4=C();";
+        assert_eq!(index(text).entries.len(), 2);
     }
 
     #[test]

@@ -6,7 +6,7 @@ use gr_spec::{Code, code};
 use gr_text::Span;
 use rustc_hash::FxHashMap;
 
-use crate::index::{ends_value, first_statement, skip_blank};
+use crate::index::{begins_instance, ends_value, first_on_line, first_statement, skip_blank};
 use crate::lex::{self, DIGIT, LOWER, UPPER, is, peek, run};
 use crate::model::{Exchange, Fault, Ids, Instance, Kind, Value};
 
@@ -331,6 +331,9 @@ impl<'t, const KEEP: bool> Parser<'t, KEEP> {
     #[cold]
     #[inline(never)]
     fn recover(&mut self, from: usize) {
+        if self.at > from && self.next_begins(self.at) {
+            return;
+        }
         let mut at = self.at.max(from + 1).min(self.text.len());
         let end = loop {
             let Some(n) = memchr::memchr3(b';', b'\n', b'\r', &self.text[at..]) else { break self.text.len() };
@@ -359,6 +362,30 @@ impl<'t, const KEEP: bool> Parser<'t, KEEP> {
             b'@' | b'<' => after_semicolon,
             _ => false,
         }
+    }
+
+    /// Whether another statement begins at `at`, the first on its line.
+    fn next_begins(&self, at: usize) -> bool {
+        let begins = match self.text.get(at) {
+            None => false,
+            Some(b'#') => begins_instance(self.text, at),
+            Some(_) => self.starts_statement(at, false) || self.starts_header_entity(at),
+        };
+        begins && first_on_line(self.text, at)
+    }
+
+    /// A statement that lost its end: the next one begins at `next`, where reading goes on.
+    #[cold]
+    #[inline(never)]
+    fn cut_short(&mut self, next: usize) -> Lost {
+        let before = self.text[..next].trim_ascii_end();
+        let close = ")".repeat(self.open.len() + 1);
+        let why = format!("`{close}` is missing too, and the next statement begins");
+        // A comma promises a value that nobody knows.
+        let mend = if before.ends_with(b",") { String::new() } else { close + ";" };
+        self.fault(code::P21_MISSING_SEMICOLON, before.len(), before.len(), vec![why, mend]);
+        self.at = next;
+        Lost
     }
 
     fn keyword(&mut self, start: usize, end: usize) -> u32 {
@@ -588,8 +615,8 @@ impl<'t, const KEEP: bool> Parser<'t, KEEP> {
         end
     }
 
-    fn starts_header_entity(&self) -> bool {
-        self.section_name() == Some("HEADER") && is(self.byte(), UPPER) && self.text.get(skip_blank(self.text, run(self.text, self.at, UPPER))) == Some(&b'(')
+    fn starts_header_entity(&self, at: usize) -> bool {
+        self.section_name() == Some("HEADER") && is(self.text[at], UPPER) && self.text.get(skip_blank(self.text, run(self.text, at, UPPER))) == Some(&b'(')
     }
 
     fn semicolon(&mut self) -> Result<(), Lost> {
@@ -601,7 +628,7 @@ impl<'t, const KEEP: bool> Parser<'t, KEEP> {
                 Ok(())
             }
             b':' => {
-                self.fault(code::P21_MISSING_SEMICOLON, self.at, self.at + 1, vec!["`:` stands in its place".into()]);
+                self.fault(code::P21_MISSING_SEMICOLON, self.at, self.at + 1, vec!["`:` stands in its place".into(), ";".into()]);
                 self.at += 1;
                 self.blank();
                 if self.byte() == b';' {
@@ -609,8 +636,8 @@ impl<'t, const KEEP: bool> Parser<'t, KEEP> {
                 }
                 Ok(())
             }
-            _ if self.at < self.text.len() && (self.starts_statement(self.at, false) || self.starts_header_entity()) => {
-                self.fault(code::P21_MISSING_SEMICOLON, after, after, vec!["the next statement begins".into()]);
+            _ if self.at < self.text.len() && (self.starts_statement(self.at, false) || self.starts_header_entity(self.at)) => {
+                self.fault(code::P21_MISSING_SEMICOLON, after, after, vec!["the next statement begins".into(), ";".into()]);
                 Ok(())
             }
             _ => Err(self.unexpected("`;`")),
@@ -698,6 +725,9 @@ impl<'t, const KEEP: bool> Parser<'t, KEEP> {
                 b if is(b, UPPER | LOWER) || b == b'!' => {
                     let word = run(self.text, start + 1, UPPER | LOWER | DIGIT);
                     if self.text.get(skip_blank(self.text, word)) != Some(&b'(') {
+                        if self.next_begins(start) {
+                            return Err(self.cut_short(start));
+                        }
                         let written = String::from_utf8_lossy(&self.text[start..word]).into_owned();
                         let number = ["NAN", "INF", "INFINITY"].iter().any(|n| written.eq_ignore_ascii_case(n));
                         let code = if number { code::P21_BAD_NUMBER } else { code::P21_BARE_WORD };
@@ -748,6 +778,16 @@ impl<'t, const KEEP: bool> Parser<'t, KEEP> {
     #[cold]
     #[inline(never)]
     fn no_separator(&mut self, value: usize) -> Lost {
+        if self.next_begins(self.at) {
+            return self.cut_short(self.at);
+        }
+        if self.byte() == b'=' && self.next_begins(value) {
+            // What was read as a reference is the name of the next instance.
+            if KEEP {
+                self.out.values.pop();
+            }
+            return self.cut_short(value);
+        }
         let inside = self.text.get(value + 1..self.at).unwrap_or(&[]).trim_ascii_end();
         let took = inside.strip_suffix(b"'").is_some_and(|s| matches!(s.trim_ascii_end().last(), Some(b',' | b'(')));
         if took && self.text[value] == b'\'' && self.at < self.text.len() {

@@ -88,6 +88,45 @@ fn five_faults_five_messages_and_the_healthy_stay() {
     }
 }
 
+/// A statement that lost its end, in all the ways that an end is lost: one message where it stood, the next one is read.
+#[test]
+fn lost_ends() {
+    let ways = ["(#3\n", "((1,2)\n", "((1,#3\n", "(#3)\n", "(#3,\n", "(\n", "(1.5\r\n", "('x'\n\n  ", "(.T.\n", "($\n", "(*,\r", "(L(2.)\n", "(L(#3\n", "\n", "(#\n", "(\"0F\"\n\t", "(#3 /* c */\n"];
+    for way in ways {
+        for (head, next) in [("A", "#2=B(#1,#3);\n"), ("(A(1)B", "#2=(B(1)C(#3));\n")] {
+            if head != "A" && matches!(way, "(#3)\n" | "\n") {
+                continue;
+            }
+            let text = file(&format!("#1={head}{way}{next}#3=C(#2);\n"));
+            let parsed = parse(text.as_bytes());
+            assert_eq!(parsed.faults.len(), 1, "{head}{way}: {:?}", report(text.as_bytes(), &parsed));
+            assert_eq!(parsed.faults, gr_p21::check_syntax(text.as_bytes()), "{head}{way}");
+            assert_eq!(parsed.dangling(text.as_bytes()), [], "{head}{way}");
+            let ids: Vec<u64> = gr_p21::index(text.as_bytes()).entries.iter().map(|e| e.id).collect();
+            assert_eq!(ids, [1, 2, 3], "{head}{way}");
+            for id in [2, 3] {
+                let n = parsed.find(id).expect("kept");
+                assert!(!parsed.instances[n as usize].damaged, "{head}{way}: #{id}");
+            }
+            let [one, two] = [1, 2].map(|id| parsed.instances[parsed.find(id).expect("there") as usize]);
+            assert!(one.end <= two.start, "{head}{way}");
+        }
+    }
+    let parsed = check("#1=A('x',(1,2\n#2=B();\n", &["8:14 p21/missing-semicolon"]);
+    assert_eq!(parsed.faults[0].args, ["`))` is missing too, and the next statement begins", "));"]);
+    check("#1=A('x',\n#2=B();\n", &["8:10 p21/missing-semicolon"]);
+    // The last of its section, and one of the header.
+    check("#1=A('x'\n", &["8:9 p21/missing-semicolon"]);
+    check("#1=A('x',\n", &["8:10 p21/missing-semicolon"]);
+    let text = file("#1=A();\n").replace("'','');\nFILE_SCHEMA", "'',''\nFILE_SCHEMA");
+    let parsed = parse(text.as_bytes());
+    assert_eq!(report(text.as_bytes(), &parsed), ["4:35 p21/missing-semicolon"]);
+    assert!((0..parsed.instances.len() as u32).any(|n| parsed.keyword(n) == "FILE_SCHEMA"));
+    // An instance begins with its keyword, and on a line of its own.
+    check("#1=A(#2\n#3=4);\n#2=B();\n", &["9:1 p21/unexpected"]);
+    check("#1=A(#2, #3=B(1));\n#2=B();\n", &["8:12 p21/unexpected"]);
+}
+
 /// Everything that a file says, without places.
 fn meaning(text: &[u8]) -> String {
     let parsed = parse(text);

@@ -130,6 +130,34 @@ proptest! {
         prop_assert_eq!(format(&once), once);
     }
 
+    /// Any statement may lose its end: one message, and every other instance stays as it was, for the index as well.
+    #[test]
+    fn a_lost_end_costs_one_statement(text in file(), which in any::<proptest::sample::Index>(), how in 0usize..4) {
+        let lines: Vec<&str> = text.lines().collect();
+        let data: Vec<usize> = (0..lines.len()).filter(|n| lines[*n].starts_with('#')).collect();
+        let hurt = data[which.index(data.len())];
+        let cut = |line: &str| {
+            let (open, inside) = line.strip_suffix(");").map(|l| (l.to_string(), !l.ends_with('('))).expect("a whole statement");
+            match how {
+                0 => open,
+                1 => open + ")",
+                2 if inside => open + ",",
+                _ => open + "  ",
+            }
+        };
+        let broken: Vec<String> = lines.iter().enumerate().map(|(n, l)| if n == hurt { cut(l) } else { (*l).to_string() }).collect();
+        let broken = broken.join("\n");
+        let (was, is) = (parse(text.as_bytes()), parse(broken.as_bytes()));
+        prop_assert_eq!(is.faults.len(), 1, "{}\n{:?}", broken, is.faults);
+        prop_assert_eq!(&gr_p21::check_syntax(broken.as_bytes()), &is.faults);
+        let ids = |file: &gr_p21::Exchange| -> Vec<u64> { file.instances.iter().filter(|i| i.id > 0).map(|i| i.id).collect() };
+        prop_assert_eq!(ids(&is), ids(&was));
+        let by_index: Vec<u64> = gr_p21::index(broken.as_bytes()).entries.iter().map(|e| e.id).collect();
+        prop_assert_eq!(by_index, ids(&was));
+        let damaged = is.instances.iter().filter(|i| i.damaged).count();
+        prop_assert!(damaged <= 1, "{}", broken);
+    }
+
     #[test]
     fn index_and_parse_see_the_same_ids(text in file()) {
         let ids: Vec<u64> = gr_p21::index(text.as_bytes()).entries.iter().map(|e| e.id).collect();

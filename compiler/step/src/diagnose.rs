@@ -177,7 +177,8 @@ impl Out<'_> {
         let (title, new) = if c == code::P21_STRAY_QUOTE {
             ("write an empty string".to_string(), "''".to_string())
         } else if c == code::P21_MISSING_SEMICOLON {
-            ("end the statement with `;`".to_string(), ";".to_string())
+            let end = arg(1).filter(|end| !end.is_empty())?;
+            (format!("end the statement with `{end}`"), end)
         } else if c == code::P21_LOWER_CASE || c == code::P21_BLANK_IN_KEYWORD || c == code::STEP_OTHER_SPELLING {
             (format!("write {}", arg(1)?), arg(1)?)
         } else if c == code::STEP_UNKNOWN_ENTITY {

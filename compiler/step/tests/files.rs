@@ -78,6 +78,26 @@ fn repaired_listing_is_read_whole() {
     assert_eq!(orphans, 14);
 }
 
+/// Any instance that lost its `);` is one error more, and the edit that is offered makes the file what it was.
+#[test]
+fn a_lost_end_is_one_error() {
+    let text = data("base.p21");
+    let errors = |text: &str| -> Vec<Diagnostic> { diagnostics(text).into_iter().filter(|d| d.severity == Severity::Error).collect() };
+    let before = errors(&text);
+    let lines: Vec<&str> = text.lines().collect();
+    let ends = |l: &str| l.starts_with('#') && l.ends_with(");") && !l.contains("/*");
+    for (n, line) in lines.iter().enumerate().filter(|(_, l)| ends(l)) {
+        let damaged: String = lines.iter().enumerate().map(|(k, l)| if k == n { format!("{}\n", &line[..line.len() - 2]) } else { format!("{l}\n") }).collect();
+        let found = errors(&damaged);
+        assert_eq!(found.len(), before.len() + 1, "{line}\n{found:#?}");
+        let lost = found.iter().find(|d| d.code == code::P21_MISSING_SEMICOLON).unwrap_or_else(|| panic!("{line}\n{found:#?}"));
+        let (_, span, with) = &lost.fixes[0].edits[0];
+        let mut mended = damaged.clone();
+        mended.replace_range(span.range(), with);
+        assert_eq!(mended.trim_end(), text.trim_end(), "{line}");
+    }
+}
+
 #[test]
 fn every_prefix_of_a_plan_is_survived() {
     let text = data("slot-square-u.p21");
