@@ -113,7 +113,7 @@ struct Found {
 
 /// The first operation that the line asks for, itself or through a call; failing that the first of a later line.
 fn find(program: &Program, file: FileId, line: u32) -> Option<Found> {
-    let skip = program.steps().take(8).position(|s| s.op == Op::Reset).map_or(0, |i| i + 1);
+    let skip = crate::begins(program);
     let mut first: Option<usize> = None;
     let mut later: Option<(usize, u32)> = None;
     let mut again = false;
@@ -337,16 +337,26 @@ fn build(program: &Program, from: &From, state: &State, pose: &Pose, safe: f64, 
     let used = axes_used(program);
     let approached: [bool; 9] = std::array::from_fn(|i| i == 2 && from.wait || from.known[i] && (i < 3 || used[i]));
     let far: Axes = std::array::from_fn(|i| if approached[i] { pose.axes[i] + 777.25 } else { pose.axes[i] });
+    let named = names_system(program, index, from.line, sources);
+    let mut begins = State::default();
+    if !named {
+        // What the program leaves to the machine is in force there.
+        let mut pose = Pose::default();
+        [Op::WorkOffset(state.work, state.work_offset), Op::Rotation(state.rotation)]
+            .iter()
+            .for_each(|op| begins.apply(op, &mut pose));
+    }
     // It is said before the offsets are, which give it its number.
-    let far = Pose::at(state.machine(&far));
-    let mut out = Builder::from_state(far, State::default());
+    let far = Pose::at(begins.work_frame(&state.machine(&far)));
+    let mut out = Builder::from_state(far, begins);
     out.names_of(program);
     let source = Source { line: INSERTED, ..Source::default() };
     // The line that asked for the offset knows more than the offset: of a tool that was never measured it is 0.
-    let offset = program.steps().take(index).filter(|s| matches!(s.op, Op::ToolOffset(_))).last().map_or(source, |s| s.source);
+    let own = program.steps().take(index).skip(crate::begins(program));
+    let offset = own.filter(|s| matches!(s.op, Op::ToolOffset(_))).last().map(|s| s.source);
     let mut restore = Restore { out, source };
     restore.push(Op::Note(Note::Comment, &format!("restart at line {}", from.line)));
-    restore.frame(state);
+    restore.frame(state, named);
     restore.tool(state, offset);
     if units_under_offset(program, index) {
         // The same change again, which shows in no motion: G28 depends on it.
@@ -383,6 +393,16 @@ fn build(program: &Program, from: &From, state: &State, pose: &Pose, safe: f64, 
     out.finish()
 }
 
+/// Whether the program says before a line which work offset is in force: by an operation, or by a line that selects what
+/// was in force already.
+fn names_system(program: &Program, index: usize, line: u32, sources: &dyn Sources) -> bool {
+    let begun = crate::begins(program);
+    let selected = |s: &gr_ir::Step<'_>| s.index >= begun && matches!(s.op, Op::WorkOffset(..));
+    let codes = [540, 550, 560, 570, 580, 590, 591, 592, 593];
+    program.steps().take(index).any(|s| selected(&s))
+        || (0..line).map_while(|l| Words::at(sources, FileId(0), l)).any(|w| codes.iter().any(|g| w.g(*g)))
+}
+
 /// Whether the length unit changed while a tool offset was active.
 fn units_under_offset(program: &Program, index: usize) -> bool {
     let mut cursor = program.cursor();
@@ -408,22 +428,28 @@ impl Restore {
         self.out.push(op, self.source);
     }
 
-    fn frame(&mut self, s: &State) {
+    /// `named`: the program says which work offset is in force. What it leaves to the machine stays with the machine.
+    fn frame(&mut self, s: &State, named: bool) {
         self.push(Op::Units(s.units));
         self.push(Op::Plane(s.plane));
-        self.push(Op::WorkOffset(s.work, s.work_offset));
-        self.push(Op::Rotation(s.rotation));
+        if named {
+            self.push(Op::WorkOffset(s.work, s.work_offset));
+            self.push(Op::Rotation(s.rotation));
+        }
         if s.local_offset != [0.0; 9] {
             self.push(Op::LocalOffset(s.local_offset));
         }
     }
 
-    fn tool(&mut self, s: &State, offset: Source) {
+    /// `offset`: the line that asked for the tool's length; none: the program has not spoken of it.
+    fn tool(&mut self, s: &State, offset: Option<Source>) {
         if s.tool > 0 {
             self.push(Op::ToolPrepare(s.tool));
             self.push(Op::ToolChange(0));
         }
-        self.out.push(Op::ToolOffset(s.tool_offset), offset);
+        if let Some(line) = offset {
+            self.out.push(Op::ToolOffset(s.tool_offset), line);
+        }
         if s.prepared > 0 && s.prepared != s.tool {
             self.push(Op::ToolPrepare(s.prepared));
         }

@@ -1,7 +1,7 @@
 //! What words a source line holds. Motion is known from the IR alone; the text tells which words stood there,
 //! which matters where a number is only a simulation's: G53, G28, a word that happens to change nothing.
 
-use gr_ir::{Note, Op, Program, Sources};
+use gr_ir::{Note, Op, Program, Source, Sources};
 use gr_text::FileId;
 
 /// What stands in a line, as far as a look at its letters tells: expressions are skipped, not evaluated.
@@ -112,14 +112,16 @@ pub fn is_hidden(program: &Program, index: usize) -> bool {
     before.take_while(|s| !s.op.moves()).any(|s| matches!(s.op, Op::Note(Note::Comment, "AXIS,hide")))
 }
 
-/// Whether the program, or a file it calls, stores a reference point of its own (G28.1, G30.1).
-pub fn stores_reference(program: &Program, sources: &dyn Sources) -> bool {
+/// Where the program, or a file it calls, first stores a reference point of its own, and by which code.
+pub fn stores_reference(program: &Program, sources: &dyn Sources) -> Option<(Source, &'static str)> {
     let files: std::collections::BTreeSet<_> = program.steps().map(|s| s.source.file).collect();
-    files.into_iter().any(|file| {
-        (0u32..).map_while(|l| sources.line(file, l)).any(|text| {
-            let near = text.contains("28") || text.contains("30");
-            near && (Words::of(text).g(281) || Words::of(text).g(301))
-        })
+    let code = |text: &str| {
+        let words = (text.contains("28") || text.contains("30")).then(|| Words::of(text))?;
+        [(281, "G28.1"), (301, "G30.1")].into_iter().find(|(g, _)| words.g(*g)).map(|(_, code)| code)
+    };
+    files.into_iter().find_map(|file| {
+        let mut lines = (0u32..).map_while(|line| Some((line, sources.line(file, line)?)));
+        lines.find_map(|(line, text)| Some((Source { file, line, ..Source::default() }, code(text)?)))
     })
 }
 

@@ -1,11 +1,11 @@
-//! What a written program does on a machine that has other values in store than the simulation took for them: work
-//! offsets, the one in force, reference points, lengths and diameters of tools. Without files that say them
-//! nobody knows them; source and translation are run with values that none of them can mistake for zero, and must go the
-//! same way. It is a look from outside: it shares nothing with the writer but the interpreter.
+//! What a written program does on a machine that is otherwise than the simulation took it: it stands elsewhere when the
+//! program begins, has other work offsets in store, another one in force, other reference points, other lengths and
+//! diameters of tools, another return of canned cycles. What no file says, nobody knows; source and translation are run on
+//! such a machine, and must go the same way. It is a look from outside: it shares nothing with the writer but the interpreter.
 
-use gr_ir::Source;
-use gr_ir::diff::{Aspect, Diff, Tolerance, diff};
 use gr_interp::{ASSUMED, Setup};
+use gr_ir::diff::{Aspect, Diff, Difference, Tolerance, diff};
+use gr_ir::{Marker, Op, Program, Source};
 use gr_spec::{Dialect, Family};
 use gr_text::{Diagnostic, code};
 
@@ -13,71 +13,162 @@ use crate::pipeline::{Motion, Unit, motion_of};
 
 /// Where the translation goes another way.
 pub fn differs(unit: &Unit, source: &Motion, written: &str, to: &'static Dialect, length: f64) -> Option<Diagnostic> {
-    let setup = other(&unit.setup)?;
-    let there = gr_driver::lower(&unit.name(), unit.text.clone(), &setup, None);
-    let again = motion_of("<translation>", written.to_string(), &Setup { dialect: to, startup_code: true, ..setup });
     // Feeds and times follow from the ways; the numbers of tools are told elsewhere.
     let tolerance = Tolerance { length, rate: 1.0, limit: 50, ..Tolerance::default() };
-    let found = diff(&there.program, &again.program, &tolerance);
-    let first = found.differences.into_iter().find(|d| d.aspect == Aspect::Path)?;
+    let mut there = Setup { dialect: to, ..unit.setup.clone() };
+    if to.family != unit.setup.dialect.family {
+        // Another control does not run that startup code.
+        there.ini = gr_interp::Ini::default();
+    }
+    let (first, why) = first(unit, source, &tolerance, |change| {
+        motion_of("<translation>", written.to_string(), &change(&there)).program
+    })?;
     let place = first.a.map_or(Source::default(), |(_, s)| s);
     let (file, span) = gr_backends::Sources::place(&crate::emit::texts(source), place);
-    Some(Diagnostic::new(code::EMIT_ELSEWHERE, file, span, &[missing(&unit.setup).to_string()]))
+    Some(Diagnostic::new(code::EMIT_ELSEWHERE, file, span, &[why.machine().into(), why.remedy().into()]))
 }
 
-/// Two programs that go the same way in the simulation, compared as a machine with other values in store runs them.
-pub fn compared(same: Diff, units: [&Unit; 2], tolerance: &Tolerance) -> Diff {
-    let [Some(a), Some(b)] = units.map(|u| other(&u.setup)) else { return same };
-    if units.iter().any(|u| u.setup.dialect.family == Family::Ufmg2008) {
+/// Two programs that go the same way in the simulation, compared on such a machine.
+pub fn compared(same: Diff, a: (&Unit, &Motion), b: &Unit, tolerance: &Tolerance) -> Diff {
+    if [a.0, b].iter().any(|u| u.setup.dialect.family == Family::Ufmg2008) {
         return same;
     }
-    let run = |unit: &Unit, setup: &Setup| gr_driver::lower(&unit.name(), unit.text.clone(), setup, None);
-    let found = diff(&run(units[0], &a).program, &run(units[1], &b).program, tolerance);
-    let Some(mut first) = found.differences.into_iter().find(|d| d.aspect == Aspect::Path) else { return same };
-    let what = if a.params.is_empty() { "lengths of tools" } else { "work offsets, reference points or lengths of tools" };
-    first.message = format!("the ways part here where {what} are not zero; {} would say them", missing(&units[0].setup).replace('`', ""));
+    let found = first(a.0, a.1, tolerance, |change| lowered(b, &change(&b.setup)));
+    let Some((mut first, why)) = found else { return same };
+    first.message = format!("the ways part here on a machine {}: {}", why.machine(), why.remedy().replace('`', ""));
     let mut out = same;
     out.differences.push(first);
     out.count += 1;
     out
 }
 
+fn lowered(unit: &Unit, setup: &Setup) -> Program {
+    gr_driver::lower(&unit.name(), unit.text.clone(), setup, None).program
+}
+
+/// Makes of a machine another one.
+type Change<'a> = &'a dyn Fn(&Setup) -> Setup;
+
+/// The first difference in the ways, and what makes it. `other`: what the other program does there.
+fn first(
+    unit: &Unit,
+    motion: &Motion,
+    tolerance: &Tolerance,
+    other: impl Fn(Change<'_>) -> Program,
+) -> Option<(Difference, Unknown)> {
+    let unknown: Vec<Unknown> = Unknown::ALL.into_iter().filter(|u| u.is(&unit.setup, motion)).collect();
+    let look = |which: &[Unknown], machine: &Numbers| {
+        let change = |setup: &Setup| {
+            let mut setup = setup.clone();
+            which.iter().for_each(|u| u.change(&mut setup, machine));
+            setup
+        };
+        diff(&lowered(unit, &change(&unit.setup)), &other(&change), tolerance)
+            .differences
+            .into_iter()
+            .find(|d| d.aspect == Aspect::Path)
+    };
+    for machine in machines(motion) {
+        let Some(all) = look(&unknown, machine) else { continue };
+        let alone = unknown.iter().find_map(|u| look(&[*u], machine).map(|d| (d, *u)));
+        return Some(alone.unwrap_or((all, unknown[0])));
+    }
+    None
+}
+
 /// What no file says.
-fn missing(setup: &Setup) -> &'static str {
-    match (setup.params.is_empty(), assumes(setup)) {
-        (true, true) => "`--vars` and `--tools`",
-        (true, false) => "`--vars`",
-        _ => "`--tools`",
-    }
+#[derive(Clone, Copy, PartialEq)]
+enum Unknown {
+    /// Work offsets, the one in force, G92, reference points.
+    Stored,
+    /// Lengths and diameters.
+    Tools,
+    /// Where the machine stands.
+    Start,
+    /// G98 or G99.
+    Return,
 }
 
-fn assumes(setup: &Setup) -> bool {
-    setup.tools.rows.iter().skip(1).any(|t| &*t.comment == ASSUMED)
-}
+impl Unknown {
+    const ALL: [Unknown; 4] = [Unknown::Stored, Unknown::Tools, Unknown::Start, Unknown::Return];
 
-/// The same machine with other values in store; none where files say them all.
-fn other(setup: &Setup) -> Option<Setup> {
-    let (params, tools) = (setup.params.is_empty(), assumes(setup));
-    if !params && !tools {
-        return None;
-    }
-    let mut setup = setup.clone();
-    if params {
-        // G55 is in force, and no origin is where another is.
-        setup.params.insert(5220, 2.0);
-        for (k, base) in [5161u32, 5181, 5211].into_iter().chain((1..=9).map(|n| 5201 + 20 * n)).enumerate() {
-            for axis in 0..9u32 {
-                setup.params.insert(base + axis, 1.5 + 2.25 * k as f64 + 0.75 * f64::from(axis));
+    fn is(self, setup: &Setup, motion: &Motion) -> bool {
+        match self {
+            Unknown::Stored => setup.params.is_empty(),
+            Unknown::Tools => setup.tools.rows.iter().skip(1).any(|t| &*t.comment == ASSUMED),
+            Unknown::Start => true,
+            Unknown::Return => {
+                let cycle = |op| matches!(op, Op::Begin { marker: Marker::Cycle, .. });
+                setup.ini.values.is_empty()
+                    && setup.dialect.family == Family::Linuxcnc
+                    && motion.program.steps().any(|s| cycle(s.op))
             }
         }
-        setup.params.insert(5210, 1.0);
     }
-    if tools {
-        for tool in setup.tools.rows.iter_mut().skip(1).filter(|t| &*t.comment == ASSUMED) {
-            let n = f64::from(tool.number % 100);
-            tool.offset[2] = 3.5 + 0.25 * n;
-            tool.diameter = 0.02 + 0.001 * n;
+
+    /// Such a machine.
+    fn machine(self) -> &'static str {
+        match self {
+            Unknown::Stored => "with other values in store",
+            Unknown::Tools => "with tools of other lengths and diameters",
+            Unknown::Start => "that stands elsewhere when the program begins",
+            Unknown::Return => "whose startup code selects the other return of canned cycles",
         }
     }
-    Some(setup)
+
+    /// What makes it known.
+    fn remedy(self) -> &'static str {
+        match self {
+            Unknown::Stored => "name its parameter file with `--vars`, or its INI file with `--ini`",
+            Unknown::Tools => "name its tool table with `--tools`, or its INI file with `--ini`",
+            Unknown::Start => "name the axes by G90 coordinates before anything depends on where they stand",
+            Unknown::Return => "write G98 or G99 before the cycle, or name the INI file of the machine with `--ini`",
+        }
+    }
+
+    fn change(self, setup: &mut Setup, n: &Numbers) {
+        match self {
+            Unknown::Stored => {
+                // G55 is in force, and no origin is where another is.
+                setup.params.insert(5220, 2.0);
+                for (k, base) in [5161u32, 5181, 5211].into_iter().chain((1..=9).map(|n| 5201 + 20 * n)).enumerate() {
+                    for axis in 0..9u32 {
+                        setup.params.insert(base + axis, n.origin + n.step * k as f64 + 0.75 * f64::from(axis));
+                    }
+                }
+                setup.params.insert(5210, 1.0);
+            }
+            Unknown::Tools => {
+                for tool in setup.tools.rows.iter_mut().skip(1).filter(|t| &*t.comment == ASSUMED) {
+                    let number = f64::from(tool.number % 100);
+                    tool.offset[2] = n.length + 0.25 * number;
+                    tool.diameter = 0.02 + 0.001 * number;
+                }
+            }
+            Unknown::Start => setup.start = std::array::from_fn(|i| n.start * (1.0 + 0.125 * i as f64)),
+            Unknown::Return => {
+                setup.ini.values.insert(("rs274ngc".into(), "rs274ngc_startup_code".into()), vec!["G98".into()]);
+            }
+        }
+    }
+}
+
+/// Numbers of a machine, none of which can be mistaken for zero or for another.
+struct Numbers {
+    origin: f64,
+    step: f64,
+    length: f64,
+    start: f64,
+}
+
+const NEAR: Numbers = Numbers { origin: 1.5, step: 2.25, length: 3.5, start: 0.625 };
+const BELOW: Numbers = Numbers { origin: -411.5, step: 12.25, length: 93.5, start: -41.375 };
+const ABOVE: Numbers = Numbers { origin: 211.5, step: 31.25, length: 193.5, start: 141.375 };
+
+/// One machine tells whether ways depend on it; where the program asks what its values are, it may take another branch
+/// on others.
+fn machines(motion: &Motion) -> &'static [Numbers] {
+    let asks = |text: &str| text.lines().any(|l| l.contains('#') && l.contains(['5', '<']));
+    let branches = motion.sources.iter().any(|(_, f)| asks(&f.text));
+    if branches { &[NEAR, BELOW, ABOVE] } else { &[NEAR] }
 }

@@ -698,6 +698,13 @@ fn stored(o: &mut rs274ngc::Options, unit: &Unit) {
     let scale = if unit.setup.machine_units == Units::Inch { 25.4 } else { 1.0 };
     let axis = |i: usize, v: f64| if (3..6).contains(&i) { v.to_radians() } else { v * scale };
     let param = |n: usize| unit.setup.params.get(&(n as u32)).copied().unwrap_or(0.0);
+    o.stored_known = !unit.setup.params.is_empty();
+    let startup = unit
+        .setup
+        .ini
+        .get("RS274NGC", "RS274NGC_STARTUP_CODE")
+        .filter(|_| unit.setup.dialect.family == gr_spec::Family::Linuxcnc);
+    o.diameters = startup.is_some_and(|code| gr_backends::Words::of(code).g(70));
     for n in 1..=9 {
         let base = 5201 + 20 * n;
         for i in 0..9 {

@@ -442,7 +442,11 @@ impl Reader<'_> {
     fn vars(&mut self, path: &Path, setup: &mut Setup) {
         let Some((file, text)) = self.text(path) else { return };
         match gr_interp::read_parameters(&text, file) {
-            Ok(params) => setup.params = params,
+            Ok(mut params) => {
+                // A file without a line still says that everything is at its start.
+                params.entry(5220).or_insert(1.0);
+                setup.params = params;
+            }
             Err(d) => self.show(&[*d]),
         }
     }

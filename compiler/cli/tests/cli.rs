@@ -441,6 +441,10 @@ fn format_and_renumber() {
     assert_eq!(std::fs::read_to_string(at.join("a.ngc")).unwrap(), "G21 G90 (\u{fc}ber)\nN5 G0 X1\nM2\n");
     let o = in_folder(at, &["renumber", "a.ngc", "--all"]);
     assert_eq!(text(&o.stdout), "N10 G21 G90 (\u{fc}ber)\nN20 G0 X1\nN30 M2\n");
+    std::fs::write(at.join("b.nc"), "O1\nN5 X1\nGOTO #1\nM30\n").unwrap();
+    let o = in_folder(at, &["renumber", "b.nc", "--dialect", "fanuc-mill"]);
+    assert_eq!(code(&o), 1);
+    assert!(text(&o.stderr).contains("E0192") && o.stdout.is_empty(), "{}", text(&o.stderr));
 }
 
 #[test]

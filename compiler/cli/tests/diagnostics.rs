@@ -181,6 +181,7 @@ fn what_a_written_program_cannot_carry() {
     told("E0603", std::slice::from_ref(&arc), "build a.ngc --target rs274ngc --decimals 1 -o a.nc");
     told("E0604", &[arc], "build a.ngc --target rs274ngc --to grbl --arcs ijk-absolute -o a.nc");
     told("E0605", &[file("a.ngc", "G21 G90\nG10 L2 P2 X10\nG55 G0 X1\nM2\n")], "build a.ngc --target rs274ngc -o a.nc");
+    told("E0608", &[file("a.ngc", "G21 G90\nG0 X1 Y1 Z1\nG28.1\nM2\n")], "build a.ngc --target rs274ngc -o a.nc");
     told("E0606", &[file("a.p21", &plan(&[]))], "build a.p21 --cutter-compensation control -o a.nc");
     told("E0614", &[file("a.ngc", PART)], "build a.ngc --target rs274ngc --from-line 4 -o a.nc");
     let deep = "G21 G90 F100\nG0 X0 Y0 Z5\nX9\nG1 Z-3\nX5\nG0 Z5\nX20\nG1 Z-3\nX30\nM2\n";
@@ -225,6 +226,11 @@ fn a_translation_holds_on_every_machine_or_says_so() {
         "G21 G90\nG10 L2 P2 X[#5221+5]\nG55 G0 X1\nM2\n",
         "G21 G90\nG0 Z4\nG28.1\nG0 Z1\nG28\nM2\n",
         "G21 G90 F100\nT1 M6\nG0 X0 Y0 Z5\nG41 D1 G1 X10\nY10\nX20\nG40 X30\nM2\n",
+        // A branch that another machine takes; the return of a cycle that its startup code selects.
+        "G21 G90\no1 if [#5422 lt -100]\nG0 Z10\no1 endif\nG0 X1\nM2\n",
+        "G21 G90\nT1 M6\no1 if [#5403 gt 100]\nG0 Z10\no1 endif\nG0 X1\nM2\n",
+        "G21 G90 F100\nG0 X1 Y1 Z10\nG81 Z-1 R2\nX5\nG80\nM2\n",
+        "G21 G91\nG0 X1 Y1\nG1 Z-1 F100\nM2\n",
     ] {
         for command in ["build a.ngc -o o.ngc", "verify a.ngc"] {
             let (found, status) = codes(&program(text), command);
@@ -248,5 +254,24 @@ fn a_translation_holds_on_every_machine_or_says_so() {
     ] {
         let (found, status) = codes(&program(text), "verify a.ngc");
         assert!(!found.iter().any(|c| c == "E0607") && status == Some(0), "{found:?}, {status:?}\n{text}");
+    }
+}
+
+/// Files say what is in store, but not where the machine stands.
+#[test]
+fn where_a_machine_stands_no_file_says() {
+    let told = |text: &str, startup: &str| {
+        let ini = format!(
+            "[RS274NGC]\nPARAMETER_FILE = m.var\nRS274NGC_STARTUP_CODE = {startup}\n[EMCIO]\nTOOL_TABLE = m.tbl\n[TRAJ]\nLINEAR_UNITS = mm\n"
+        );
+        let files = [file("a.ngc", text), file("m.ini", &ini), file("m.var", ""), file("m.tbl", "T1 P1 Z5 D3\n")];
+        codes(&files, "verify a.ngc --ini m.ini").0
+    };
+    assert_eq!(told("G21 G91\nG0 X1 Y1\nG1 Z-1 F100\nM2\n", "G21"), ["E0607"]);
+    // A startup code is run by the machine itself, and the written program stands it.
+    for startup in ["G21", "G7 G18 G21 G90", "G17 G21 G40 G49 G80 G90 G94", "G55 G64 P0.01", "G20 G91 G98"] {
+        let none: [&str; 0] = [];
+        assert_eq!(told("G21 G90\nG0 X1 Y1 Z5\nG1 Z-1 F100\nM2\n", startup), none, "{startup}");
+        assert_eq!(told("G21 G90 G17 F100\nG0 X1 Y1 Z5\nG81 Z-1 R2\nX4\nG80\nM2\n", startup), none, "{startup}");
     }
 }

@@ -1,8 +1,6 @@
 //! The formatter: blanks, case and indentation of a program, and nothing else. What the program says stays:
-//! reading the result gives the same words, values and comments (renumbering apart, which is asked for).
+//! reading the result gives the same words, values and comments.
 //! Formatting twice is formatting once. Lines with faults are left as they are.
-
-use std::collections::HashMap;
 
 use gr_spec::{Dialect, Family};
 
@@ -33,17 +31,6 @@ pub enum LeadingZeros {
     Pad,
 }
 
-/// New N words.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Renumber {
-    /// First number.
-    pub start: u32,
-    /// Distance.
-    pub step: u32,
-    /// Number every block that has words, not only those that have an N already.
-    pub all: bool,
-}
-
 /// What [`format`] does.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FormatOptions {
@@ -57,8 +44,6 @@ pub struct FormatOptions {
     pub indent: usize,
     /// Zeros in front of numbers.
     pub leading_zeros: LeadingZeros,
-    /// New N words.
-    pub renumber: Option<Renumber>,
 }
 
 impl Default for FormatOptions {
@@ -69,58 +54,24 @@ impl Default for FormatOptions {
             spaces: true,
             indent: 2,
             leading_zeros: LeadingZeros::Keep,
-            renumber: None,
         }
     }
 }
 
 /// Formats a whole program that was scanned with `dialect`.
 pub fn format(text: &str, scan: &Scan, dialect: &'static Dialect, options: &FormatOptions) -> String {
-    let numbers = options.renumber.map(|r| new_numbers(scan, r));
     let mut formatter = Formatter {
         text,
         scan,
         options,
         rules: Rules::new(dialect),
         open: Vec::new(),
-        numbers: numbers.unwrap_or_default(),
         out: String::with_capacity(text.len() + text.len() / 8),
     };
     for line in 0..scan.lines.len() as u32 {
         formatter.line(line);
     }
     formatter.out
-}
-
-/// Line → its new number, and old number → new number.
-#[derive(Default)]
-struct Numbers {
-    lines: HashMap<u32, u32>,
-    targets: HashMap<u64, u32>,
-}
-
-fn new_numbers(scan: &Scan, renumber: Renumber) -> Numbers {
-    let mut numbers = Numbers::default();
-    let mut next = renumber.start;
-    for line in 0..scan.lines.len() as u32 {
-        let words = scan.words(line);
-        let old = words.iter().find(|w| w.letter == b'n' && w.form == Form::Literal);
-        let block = words.iter().any(|w| w.form != Form::Comment);
-        let program = words.iter().any(|w| is_program(scan, w));
-        if scan.lines[line as usize].faulty || !(old.is_some() || (renumber.all && block && !program)) {
-            continue;
-        }
-        numbers.lines.insert(line, next);
-        if let Some(old) = old {
-            numbers.targets.entry(old.value.to_bits()).or_insert(next);
-        }
-        next = next.saturating_add(renumber.step.max(1));
-    }
-    numbers
-}
-
-fn is_program(scan: &Scan, word: &Word) -> bool {
-    word.form == Form::Control && scan.controls[word.index()].keyword == Keyword::Program
 }
 
 struct Formatter<'a> {
@@ -130,7 +81,6 @@ struct Formatter<'a> {
     rules: Rules,
     /// Open blocks: a `do` waits for its `while`.
     open: Vec<(Keyword, String)>,
-    numbers: Numbers,
     out: String,
 }
 
@@ -209,18 +159,10 @@ impl Formatter<'_> {
             out.extend(prefix.chars().filter(|c| !c.is_whitespace() && *c != '\u{b}'));
             level = out.len() > 1;
         }
-        let number = self.numbers.lines.get(&line);
-        if let Some(number) = number {
-            if level {
-                out.push(' ');
-            }
-            out.push(if self.options.case == Case::Lower { 'n' } else { 'N' });
-            out.push_str(&number.to_string());
-        }
         let mut taken = 0;
         for word in words {
             // A comment inside a call is part of the call's text.
-            if word.start < taken || (word.letter == b'n' && number.is_some() && word.form == Form::Literal) {
+            if word.start < taken {
                 continue;
             }
             let span = self.scan.word_span(self.text, line, word);
@@ -231,32 +173,22 @@ impl Formatter<'_> {
             if (!first && self.options.spaces && !block_end) || must {
                 out.push(' ');
             }
-            self.word(line, word, &self.text[span.range()], &mut out);
+            self.word(word, &self.text[span.range()], &mut out);
         }
         out
     }
 
-    fn word(&self, line: u32, word: &Word, source: &str, out: &mut String) {
+    fn word(&self, word: &Word, source: &str, out: &mut String) {
         match word.form {
             Form::Comment | Form::Bad => out.push_str(source),
-            Form::Literal => self.literal(line, word, source, out),
-            Form::Expr | Form::Setting => self.tokens(source, word, out),
-            Form::Control => match self.retargeted(word, source) {
-                Some(changed) => self.tokens(&changed, word, out),
-                None => self.tokens(source, word, out),
-            },
+            Form::Literal => self.literal(word, source, out),
+            Form::Expr | Form::Setting | Form::Control => self.tokens(source, word, out),
         }
     }
 
-    fn literal(&self, line: u32, word: &Word, source: &str, out: &mut String) {
+    fn literal(&self, word: &Word, source: &str, out: &mut String) {
         let closed: Vec<u8> = source.bytes().filter(|b| !b.is_ascii_whitespace()).collect();
         out.push(cased(closed[0], self.options.case));
-        if let Some(target) = self.numbers.targets.get(&word.value.to_bits())
-            && self.names_a_line(line, word)
-        {
-            out.push_str(&target.to_string());
-            return;
-        }
         let number = &closed[1..];
         let signs = number.iter().take_while(|b| matches!(b, b'+' | b'-')).count();
         let digits = &number[signs..];
@@ -274,35 +206,6 @@ impl Formatter<'_> {
             out.push('0');
         }
         out.extend(digits.iter().map(|b| char::from(*b)));
-    }
-
-    /// Whether this P or Q refers to an N word: Fanuc's M99 P and the turning cycles G70–G73.
-    fn names_a_line(&self, line: u32, word: &Word) -> bool {
-        let refers = |w: &Word| {
-            w.form == Form::Literal
-                && match w.letter {
-                    b'm' => w.value == 99.0,
-                    b'g' => (70.0..=73.0).contains(&w.value),
-                    _ => false,
-                }
-        };
-        self.rules.family == Family::Fanuc
-            && matches!(word.letter, b'p' | b'q')
-            && self.scan.words(line).iter().any(refers)
-    }
-
-    /// The source of a GOTO with its new target.
-    fn retargeted(&self, word: &Word, source: &str) -> Option<String> {
-        let control = self.scan.controls[word.index()];
-        if !matches!(control.keyword, Keyword::MacroGoto | Keyword::MacroIfGoto) {
-            return None;
-        }
-        let last = self.scan.args[(control.first_arg + control.arg_count).checked_sub(1)? as usize];
-        let Node::Number(old) = self.scan.nodes[last.0 as usize] else { return None };
-        let new = self.numbers.targets.get(&old.to_bits())?;
-        let span = self.scan.node_spans[last.0 as usize];
-        let (from, to) = ((span.start - word.start) as usize, (span.end - word.start) as usize);
-        Some(format!("{}{new}{}", &source[..from], &source[to..]))
     }
 
     /// A word with structure: blanks out, then blanks in where they help.

@@ -15,13 +15,15 @@ mod lex;
 mod model;
 mod number;
 mod print;
+mod renumber;
 mod scan;
 mod symbols;
 #[cfg(test)]
 mod tests;
 
 pub use chunks::split_chunks;
-pub use format::{Case, FormatOptions, LeadingZeros, Renumber, format};
+pub use format::{Case, FormatOptions, LeadingZeros, format};
 pub use model::*;
+pub use renumber::{Renumber, edited, renumber};
 pub use symbols::{Label, Parameter, Statement, Symbol, Symbols, fanuc_call, symbols};
 pub use scan::{scan, scan_by_grammar};

@@ -325,7 +325,7 @@ fn options() -> impl Strategy<Value = FormatOptions> {
     let case = || prop_oneof![Just(Case::Keep), Just(Case::Upper), Just(Case::Lower)];
     let zeros = prop_oneof![Just(LeadingZeros::Keep), Just(LeadingZeros::Strip), Just(LeadingZeros::Pad)];
     (case(), case(), any::<bool>(), 0usize..5, zeros).prop_map(|(case, o_word_case, spaces, indent, leading_zeros)| {
-        FormatOptions { case, o_word_case, spaces, indent, leading_zeros, renumber: None }
+        FormatOptions { case, o_word_case, spaces, indent, leading_zeros }
     })
 }
 
@@ -388,14 +388,25 @@ fn formatted() {
 
 #[test]
 fn renumbered() {
-    let text = "O1000\nN1 G0 X1\nIF [#1 EQ 0] GOTO 7\nG71 P1 Q7 U1\n(note)\nN7 X2\nGOTO #3\nM99 P7\n/2 X1;\n";
-    let dialect = dialect("fanuc-turn");
-    let renumber = |all| {
-        let renumber = Some(Renumber { start: 10, step: 10, all });
-        format(text, &scan(text, dialect), dialect, &FormatOptions { renumber, ..Default::default() })
+    let new = |text: &str, start, all| {
+        let scan = scan(text, dialect("fanuc-turn"));
+        let found = renumber(text, &scan, dialect("fanuc-turn"), Renumber { start, step: 10, all });
+        found.map(|edits| edited(text, &edits)).map_err(|span| text[span.range()].to_string())
     };
-    insta::assert_snapshot!(renumber(false));
-    insta::assert_snapshot!(renumber(true));
+    let text = "%\nO1000\nN1 g0x1 (a)\n/ IF [#1 EQ 0] GOTO 7\nG71 P1 Q7 U1\n(note)\nN7 X2\nGOTO 3\nM99 P7\n/2 X1;\n%\n";
+    insta::assert_snapshot!(new(text, 10, false).unwrap());
+    insta::assert_snapshot!(new(text, 100, true).unwrap());
+    // Each program has numbers of its own; M99 P goes back into the one that called.
+    let two = "O1\nN1 G0 X1\nGOTO 1\nM98 P2\nN5 M30\nO2\nN1 G0 X2\nIF [#1 EQ 0] GOTO 1\nM99 P5\n";
+    insta::assert_snapshot!(new(two, 10, false).unwrap());
+    for (text, jump) in [
+        ("O1\nN1 X1\nGOTO #9\n", "#9"),
+        ("O1\nN1 X1\nIF [#1 EQ 0] GOTO [10+10]\n", "[10+10]"),
+        ("O1\nN1 X1\nG71 P#1 Q1\n", "P#1"),
+        ("O1\nN5 M98 P3\nM30\nO2\nN5 M98 P3\nM99\nO3\nM99 P5\n", "P5"),
+    ] {
+        assert_eq!(new(text, 10, false), Err(jump.to_string()), "{text}");
+    }
 }
 
 #[test]

@@ -59,9 +59,11 @@ impl<S: Sink> Interp<'_, S> {
         let plane = self.m.plane();
         self.check_cycle_modes()?;
         let again = self.m.motion == g;
+        // A Fanuc control keeps the levels from one cycle to another until G80.
+        let kept = again || self.is_fanuc() && crate::check::is_cycle(self.m.motion as i16);
         let r = match self.block.get(b'r') {
             Some(r) => r,
-            None if again => self.m.cycle_r,
+            None if kept => self.m.cycle_r,
             None => return Err(word_missing("R", rs274::CYCLE_NO_R)),
         };
         // Fanuc controls repeat K times.
@@ -80,7 +82,7 @@ impl<S: Sink> Interp<'_, S> {
             return Err(word_missing(&needed, rs274::CYCLE_NO_REPEATS).at(letter));
         }
         self.check_cycle_axes(plane)?;
-        self.cycle_in_plane(g, plane, again, r, repeats)?;
+        self.cycle_in_plane(g, plane, (again, kept), r, repeats)?;
         self.m.cycle_l = repeats;
         self.m.motion = g;
         Ok(())
@@ -90,7 +92,7 @@ impl<S: Sink> Interp<'_, S> {
     fn store_cycle(&mut self, g: i32, plane: Plane, r: f64) -> Res {
         let axes = plane_axes(plane);
         let again = self.m.motion == g;
-        if !again && !self.block.has(LETTERS[axes[2]]) {
+        if !again && !crate::check::is_cycle(self.m.motion as i16) && !self.block.has(LETTERS[axes[2]]) {
             return Err(normal_missing(plane));
         }
         if self.m.cycle_il_set == 0 {
@@ -135,10 +137,11 @@ impl<S: Sink> Interp<'_, S> {
         Err(CycleAxis { letter, plane }.fault(text))
     }
 
-    fn cycle_in_plane(&mut self, g: i32, plane: Plane, again: bool, r: f64, repeats: i32) -> Res {
+    /// `kept`: R and the depth may be those of before.
+    fn cycle_in_plane(&mut self, g: i32, plane: Plane, (again, kept): (bool, bool), r: f64, repeats: i32) -> Res {
         let axes = plane_axes(plane);
         let normal = LETTERS[axes[2]];
-        if !again && !self.block.has(normal) {
+        if !kept && !self.block.has(normal) {
             return Err(normal_missing(plane));
         }
         let given = self.block.get(normal).unwrap_or(self.m.cycle_cc);

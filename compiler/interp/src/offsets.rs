@@ -92,14 +92,15 @@ impl<S: Sink> Interp<'_, S> {
         self.set_tool_parameters();
     }
 
-    /// The machine stands at its zero when a run begins: with stored offsets that is another point of the work frame. The
+    /// Where the machine stands when a run begins: with stored offsets that is another point of the work frame. The
     /// real `rs274` leaves a stored rotation out of account there.
-    pub(crate) fn start_at_machine_zero(&mut self) {
+    pub(crate) fn start_where_it_stands(&mut self) {
         self.m.current = [0.0; 9];
         if self.is_rs274() {
             self.m.current[..6].copy_from_slice(&self.world.position);
             return;
         }
+        self.m.current = self.program_axes(&self.setup.start);
         self.arrive_at_origin();
         for i in 0..9 {
             self.m.current[i] -= self.m.g92[i];

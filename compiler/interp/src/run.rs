@@ -351,7 +351,7 @@ impl<'a, S: Sink> Interp<'a, S> {
         self.emit(Call::SetG92Offset(self.m.g92));
         self.emit(Call::SetXyRotation(self.m.rotation));
         self.emit(Call::SetFeedReferenceXyz);
-        self.start_at_machine_zero();
+        self.start_where_it_stands();
         self.fanuc_power_up();
         self.run_startup();
     }

@@ -17,6 +17,8 @@ pub struct Setup {
     pub tools: ToolTable,
     /// Stored numbered parameters (`.var` file): number → value.
     pub params: BTreeMap<u32, f64>,
+    /// Where the machine stands when a run begins, in its own coordinates and units. The real `rs274` stands at its zero.
+    pub start: Axes,
     /// INI file.
     pub ini: Ini,
     /// Folder in which files of subroutines are looked for first; none = the folder the command runs in.
@@ -51,6 +53,7 @@ impl Default for Setup {
             machine_units: Units::Mm,
             tools: ToolTable::default(),
             params: BTreeMap::new(),
+            start: [0.0; 9],
             ini: Ini::default(),
             base: None,
             confined: None,

@@ -147,6 +147,15 @@ fn fanuc_cycles_keep_their_levels() {
     assert!(outcome.ok(), "{:?}", outcome.findings);
     let drilled: Vec<_> = moves_of(&calls).into_iter().filter(|m| m.starts_with("feed")).collect();
     assert_eq!(drilled, ["feed 1 2 -5", "feed 6 2 -5", "feed 11 2 -5"]);
+    // From one cycle to another too, until G80.
+    let (calls, outcome) =
+        run_in("fanuc-mill", "G21 G90 S500 M3\nG0 Z5.\nG81 X1. Y2. Z-5. R1. F100.\nG82 X6. P500\nG80\nM30\n");
+    assert!(outcome.ok(), "{:?}", outcome.findings);
+    let drilled: Vec<_> = moves_of(&calls).into_iter().filter(|m| m.starts_with("feed")).collect();
+    assert_eq!(drilled, ["feed 1 2 -5", "feed 6 2 -5"]);
+    let (_, outcome) =
+        run_in("fanuc-mill", "G21 G90 S500 M3\nG0 Z5.\nG81 X1. Y2. Z-5. R1. F100.\nG80\nG82 X6. P500\nM30\n");
+    assert_eq!(outcome.findings[0].fault.code, code::CYCLE_WORD_MISSING);
 }
 
 /// The same: G86 has no P, and takes none over from another cycle.

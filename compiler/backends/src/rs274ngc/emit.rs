@@ -23,6 +23,10 @@ pub fn emit(program: &Program, options: &Options, sources: &dyn Sources) -> Resu
     let contours = options.control_compensates.then(|| super::beside::contours(program));
     let program = contours.as_ref().map_or(program, |c| &c.program);
     let mut emitter = Emitter::new(program, options, sources);
+    if let Some((source, code)) = stores_reference(program, sources) {
+        emitter.own_reference = true;
+        emitter.say(code::EMIT_REFERENCE_NOT_STORED, source, &[code.into()]);
+    }
     for (source, why) in contours.iter().flat_map(|c| &c.left) {
         emitter.say(code::EMIT_NOT_COMPENSATED, *source, std::slice::from_ref(why));
     }
@@ -109,7 +113,7 @@ impl<'a> Emitter<'a> {
             offsets: options.stored_offsets,
             rotations: options.stored_rotations,
             tools: options.tools.clone(),
-            own_reference: stores_reference(program, sources),
+            own_reference: false,
             adrift: false,
             units: state.units,
             words_of: None,
@@ -169,7 +173,7 @@ impl<'a> Emitter<'a> {
     }
 
     fn run(&mut self, program: &Program) {
-        let skip = prologue(program);
+        let skip = prologue(program, self.linuxcnc());
         let epilogue = epilogue(program);
         let ends = program.steps().any(|s| s.op == Op::End);
         self.header(ends);
@@ -291,7 +295,9 @@ impl<'a> Emitter<'a> {
         let plane = plane_word(self.plane);
         let rest = match self.options.language {
             Language::Linuxcnc if self.options.arcs == super::Arcs::IjkAbsolute => "G40 G80 G90 G90.1 G94",
-            Language::Linuxcnc if turns(self.program, self.sources) => "G8 G40 G80 G90 G91.1 G94",
+            Language::Linuxcnc if self.options.diameters || turns(self.program, self.sources) => {
+                "G8 G40 G80 G90 G91.1 G94"
+            }
             Language::Linuxcnc => "G40 G80 G90 G91.1 G94",
             Language::FanucMill => "G40 G80 G90 G94",
             Language::Grbl => "G40 G80 G90 G91.1 G94",
@@ -437,9 +443,12 @@ fn across(plane: Plane) -> usize {
     }
 }
 
-/// How many leading operations only tell how the interpreter starts.
-fn prologue(program: &Program) -> usize {
-    program.steps().take(8).position(|s| s.op == Op::Reset).map_or(0, |i| i + 1)
+/// How many leading operations only tell how the control starts. `same`: the program is for a control that runs the same
+/// startup code itself; another is told what that code does.
+fn prologue(program: &Program, same: bool) -> usize {
+    let begins = crate::begins(program);
+    let started = program.steps().take(begins).position(|s| s.op == Op::FeedReferenceXyz);
+    if same { begins } else { started.map_or(begins, |at| at + 1) }
 }
 
 /// The operations around the end that M2 or M30 does by itself; the end itself is not among them.

@@ -123,6 +123,10 @@ pub struct Options {
     pub stored_offsets: [Axes; 10],
     /// Rotations stored with them, rad.
     pub stored_rotations: [f64; 10],
+    /// The control's parameters are known: where nothing is stored, zero is.
+    pub stored_known: bool,
+    /// The control wakes up in diameter mode (G7).
+    pub diameters: bool,
     /// Tool numbers with their offsets, mm: an offset that is a tool's is written as G43 H.
     pub tools: Vec<(i32, Axes)>,
 }
@@ -147,6 +151,8 @@ impl Default for Options {
             name: String::new(),
             stored_offsets: [[0.0; 9]; 10],
             stored_rotations: [0.0; 10],
+            stored_known: false,
+            diameters: false,
             tools: Vec::new(),
         }
     }

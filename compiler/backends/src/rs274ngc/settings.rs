@@ -98,9 +98,15 @@ impl Emitter<'_> {
             self.w.block(OFFSETS[index]);
         }
         if !words.is_empty() {
-            let block = format!("G10 L2 P{index} {}", words.join(" "));
-            self.say(code::EMIT_OFFSET_NOT_CARRIED, view.source, &[OFFSETS[index].into(), block.clone()]);
             let fanuc = self.options.language == Language::FanucMill;
+            // P0 is the one in force, whichever that is; on a Fanuc control it is another one.
+            let here = selected
+                && !fanuc
+                && self.words(view.source).is_some_and(|w| w.g(100))
+                && self.number_of('p', view.source) == Some(0);
+            let number = if here { 0 } else { index };
+            let block = format!("G10 L2 P{number} {}", words.join(" "));
+            self.say(code::EMIT_OFFSET_NOT_CARRIED, view.source, &[OFFSETS[index].into(), block.clone()]);
             self.w.block(&if fanuc { block.replacen("G10", "G90 G10", 1) } else { block });
         }
         self.offsets[index] = *offset;
@@ -116,7 +122,15 @@ impl Emitter<'_> {
     /// what the offset becomes, only the machine knows. None: the block is something else.
     fn set_here(&mut self, n: u8, offset: &Axes, view: &View<'_, '_>) -> Option<String> {
         let words = self.words(view.source)?;
-        let here = words.g(100) && self.number_of('l', view.source) == Some(20) && self.options.language != Language::FanucMill;
+        let here = words.g(100) && self.number_of('l', view.source) == Some(20);
+        if here && self.options.language == Language::FanucMill {
+            let named = (0..9).filter(|i| words.has(AXES[*i].to_ascii_lowercase() as u8));
+            if !self.options.stored_known || !named.clone().all(|i| self.anchored[i] && !self.loose[i]) {
+                self.cannot("a work offset set from where the tool stands (G10 L20)", view.source);
+                return Some(String::new());
+            }
+            return None;
+        }
         let number = self.number_of('p', view.source).filter(|p| *p == 0 || *p == u32::from(n));
         if !here || number.is_none() || self.frame.work != n || self.frame.work_offset == *offset && !words.names_axes() {
             return None;
@@ -246,7 +260,13 @@ impl Emitter<'_> {
         // A lathe's T names the offset with its last two digits.
         let station = self.sources.increments().then(|| self.number_of('t', view.source)).flatten().map(|t| t % 100);
         let asked = if words.is_some_and(|w| w.g(430)) { self.number_of('h', view.source) } else { station };
-        let named = self.tool_with(offset, asked, view.state.tool);
+        let named = match words {
+            // The length is the program's own.
+            Some(w) if w.g(431) => None,
+            // No tool is in the spindle, and none is named.
+            Some(_) if zero && asked.is_none() && view.state.tool <= 0 => None,
+            _ => self.tool_with(offset, asked, view.state.tool),
+        };
         let off = match words {
             Some(_) if station.is_some() => station == Some(0),
             Some(w) => w.g(490) || zero && !w.g(430) && !w.g(432),
@@ -268,7 +288,7 @@ impl Emitter<'_> {
                 self.cannot("a tool length that no tool table names here (--tools)", view.source);
                 return self.move_frame(view.state);
             }
-            _ if off || (zero && named.is_none()) => "G49".to_string(),
+            _ if off || zero && named.is_none() && !words.is_some_and(|w| w.g(431)) => "G49".to_string(),
             (Some(n), Language::Linuxcnc | Language::FanucMill) => format!("G43 H{n}"),
             (_, Language::Linuxcnc) => format!("G43.1 {}", self.changed_all(offset)),
             (_, Language::Grbl) if (0..9).all(|i| i == 2 || offset[i] == 0.0) => {

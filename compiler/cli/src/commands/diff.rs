@@ -54,7 +54,7 @@ pub fn run(global: &Global, args: &DiffArgs) -> Exit {
         forget(&mut result, &[Aspect::Control]);
     }
     if !args.work_frame && !a.unit.exchange && !b.unit.exchange && !result.differs(Aspect::Path) {
-        result = crate::elsewhere::compared(result, [&a.unit, &b.unit], &tolerance);
+        result = crate::elsewhere::compared(result, (&a.unit, &a.motion), &b.unit, &tolerance);
     }
     drop(progress);
     tell(global, &result, &a.motion.sources, &b.motion.sources)

@@ -1,11 +1,10 @@
 //! `gcc-robot fmt` and `gcc-robot renumber`
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use gr_gcode::{Case, Form, FormatOptions, Keyword, LeadingZeros, LineKind, Node, Renumber, Scan, Word};
-use gr_spec::{Dialect, Family};
-use gr_text::{Decoded, Encoding, Severity, Span, code};
+use gr_gcode::{Case, FormatOptions, LeadingZeros, Renumber};
+use gr_spec::Dialect;
+use gr_text::{Decoded, Encoding, Severity, code};
 
 use crate::commands::check::{byte_order_mark, is_marked};
 use crate::exchange::{is_exchange, not_one};
@@ -56,82 +55,23 @@ pub fn renumber(global: &Global, args: &RenumberArgs) -> Exit {
             let dialect = station.dialect_of(&args.file, &decoded.text);
             let scan = gr_gcode::scan(&decoded.text, dialect);
             let numbers = Renumber { start: args.start, step: args.step, all: args.all };
-            let text = renumbered(&decoded.text, &scan, dialect, numbers);
-            work.write(args.output.as_deref().unwrap_or(Path::new("-")), &text, decoded.encoding)
+            match gr_gcode::renumber(&decoded.text, &scan, dialect, numbers) {
+                Ok(edits) => {
+                    let text = gr_gcode::edited(&decoded.text, &edits);
+                    work.write(args.output.as_deref().unwrap_or(Path::new("-")), &text, decoded.encoding)
+                }
+                Err(jump) => {
+                    let file = work.sources.add(args.file.display().to_string(), decoded.text.as_str());
+                    work.renderer
+                        .show(&work.sources, &gr_text::Diagnostic::new(code::RENUMBER_JUMP_UNKNOWN, file, jump, &[]));
+                    Exit::Findings
+                }
+            }
         }
         Err((code, list)) => work.complain(&args.file, code, &list),
     };
     work.renderer.finish(false);
     exit
-}
-
-/// New N words, and jumps that follow them; everything else stays as it is.
-fn renumbered(text: &str, scan: &Scan, dialect: &Dialect, numbers: Renumber) -> String {
-    let mut edits: Vec<(Span, String)> = Vec::new();
-    let mut new_of = BTreeMap::new();
-    let mut next = numbers.start;
-    for line in 0..scan.lines.len() as u32 {
-        let words = scan.words(line);
-        if scan.lines[line as usize].faulty || scan.lines[line as usize].kind == LineKind::Percent {
-            continue;
-        }
-        if let Some(old) = words.iter().find(|w| w.letter == b'n' && w.form == Form::Literal) {
-            new_of.entry(old.value.to_bits()).or_insert(next);
-            let span = scan.word_span(text, line, old);
-            edits.push((Span::new(span.start + 1, span.end), next.to_string()));
-        } else if numbers.all && words.iter().any(|w| w.form != Form::Comment && !is_program(scan, w)) {
-            let span = scan.line_span(text, line);
-            let body = &text[span.range()];
-            let lead = body.len() - body.trim_start_matches([' ', '\t', '/']).len();
-            let at = span.start + lead as u32;
-            edits.push((Span::new(at, at), format!("N{next} ")));
-        } else {
-            continue;
-        }
-        next = next.saturating_add(numbers.step.max(1));
-    }
-    if dialect.family == Family::Fanuc {
-        jumps(text, scan, &new_of, &mut edits);
-    }
-    edits.sort_by_key(|(span, _)| span.start);
-    let mut out = String::with_capacity(text.len() + 8 * edits.len());
-    let mut at = 0;
-    for (span, new) in edits {
-        out.push_str(&text[at..span.start as usize]);
-        out.push_str(&new);
-        at = span.end as usize;
-    }
-    out.push_str(&text[at..]);
-    out
-}
-
-/// `O100` at the start of a program has a number of its own.
-fn is_program(scan: &Scan, word: &Word) -> bool {
-    word.form == Form::Control && scan.controls[word.index()].keyword == Keyword::Program
-}
-
-/// Targets of GOTO and of M99 P.
-fn jumps(text: &str, scan: &Scan, new_of: &BTreeMap<u64, u32>, edits: &mut Vec<(Span, String)>) {
-    for control in scan.controls.iter().filter(|c| matches!(c.keyword, Keyword::MacroGoto | Keyword::MacroIfGoto)) {
-        let args = &scan.args[control.first_arg as usize..(control.first_arg + control.arg_count) as usize];
-        let Some(target) = args.last() else { continue };
-        if let Node::Number(value) = scan.nodes[target.0 as usize]
-            && let Some(new) = new_of.get(&value.to_bits())
-        {
-            edits.push((scan.node_spans[target.0 as usize], new.to_string()));
-        }
-    }
-    for line in 0..scan.lines.len() as u32 {
-        let words = scan.words(line);
-        let literal = |letter: u8| words.iter().find(|w| w.letter == letter && w.form == Form::Literal);
-        if let (Some(m), Some(p)) = (literal(b'm'), literal(b'p'))
-            && m.value == 99.0
-            && let Some(new) = new_of.get(&p.value.to_bits())
-        {
-            let span = scan.word_span(text, line, p);
-            edits.push((Span::new(span.start + 1, span.end), new.to_string()));
-        }
-    }
 }
 
 fn style(args: &StyleArgs) -> FormatOptions {
@@ -150,7 +90,6 @@ fn style(args: &StyleArgs) -> FormatOptions {
             ZerosArg::Strip => LeadingZeros::Strip,
             ZerosArg::Pad => LeadingZeros::Pad,
         },
-        renumber: None,
     }
 }
 
@@ -283,17 +222,6 @@ fn encoded(text: &str, encoding: Encoding) -> Vec<u8> {
 mod tests {
     use super::*;
     use gr_text::decode;
-
-    #[test]
-    fn numbers_and_jumps() {
-        let dialect = Dialect::find("fanuc-mill").unwrap();
-        let text = "%\nO0001\nn5 g1x1 y2(c)f100\n/ G0 X2\nIF [#1 GT 2] GOTO 5\nGOTO 7\nM99 P5\n%\n";
-        let scan = gr_gcode::scan(text, dialect);
-        let all = renumbered(text, &scan, dialect, Renumber { start: 100, step: 10, all: true });
-        insta::assert_snapshot!(all);
-        let some = renumbered(text, &scan, dialect, Renumber { start: 1, step: 1, all: false });
-        assert!(some.contains("\nn1 g1x1 y2(c)f100\n/ G0 X2\n") && some.contains("GOTO 1\n") && some.contains("M99 P1\n"));
-    }
 
     #[test]
     fn spellings_survive() {

@@ -1,7 +1,7 @@
 //! What can be done to a G-code file at a place.
 
 use gr_canon::Units;
-use gr_gcode::{FormatOptions, Form, Renumber};
+use gr_gcode::{Form, Renumber};
 use gr_interp::{Modal, Side};
 use gr_ir::geometry::ArcShape;
 use gr_ir::{Op, PathMode, Program};
@@ -533,13 +533,14 @@ fn is_numbered(doc: Doc<'_>) -> bool {
 /// Numbers all blocks anew; jumps follow.
 pub fn renumber(doc: Doc<'_>) -> Option<Action> {
     let title = renumber_title(doc)?;
-    let options = FormatOptions {
-        case: gr_gcode::Case::Keep,
-        o_word_case: gr_gcode::Case::Keep,
-        renumber: Some(Renumber { start: 10, step: 10, all: !is_numbered(doc) }),
-        ..FormatOptions::default()
-    };
-    let edits = super::format::edits(doc, &options, 0..doc.count());
+    let options = Renumber { start: 10, step: 10, all: !is_numbered(doc) };
+    let text = doc.text();
+    let changed = gr_gcode::renumber(&text, &gr_gcode::scan(&text, doc.dialect), doc.dialect, options).ok()?;
+    let edits: Vec<Edit> = changed
+        .into_iter()
+        .filter(|(span, new)| text[span.range()] != *new)
+        .map(|(span, text)| Edit { span, text })
+        .collect();
     (!edits.is_empty()).then(|| Action { title: title.into(), kind: ActionKind::Source, edits })
 }
 

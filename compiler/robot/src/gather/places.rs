@@ -50,7 +50,7 @@ impl Gather<'_> {
         let Some(word) = place_of_machine(program, view, self.findings.sources) else { return false };
         if self.machine.cell.machine_zero().is_some() {
             if !word.starts_with("G28") && !word.starts_with("G30")
-                || !*self.stores.get_or_insert_with(|| stores_reference(program, self.findings.sources))
+                || !*self.stores.get_or_insert_with(|| stores_reference(program, self.findings.sources).is_some())
             {
                 return false;
             }
