@@ -196,8 +196,8 @@ impl Check<'_> {
         }
         for p in parts {
             let Some(row) = p.rows.first() else { continue };
-            let supertypes = &self.schema.entities[*row as usize].supertypes;
-            if let Some(up) = supertypes.iter().find(|up| !parts.iter().any(|q| q.keyword.eq_ignore_ascii_case(up))) {
+            let mut supertypes = self.schema.entities[*row as usize].supertypes();
+            if let Some(up) = supertypes.find(|up| !parts.iter().any(|q| q.keyword.eq_ignore_ascii_case(up))) {
                 return Some((p.span, format!("{} is there without {}", p.keyword, up.to_ascii_uppercase())));
             }
         }
@@ -212,7 +212,7 @@ impl Check<'_> {
             self.own_count(p, &p.keyword, p.other.unwrap_or(&[]), count);
             return;
         };
-        let inherited: Vec<&str> = (entity.supertypes.iter())
+        let inherited: Vec<&str> = (entity.supertypes())
             .filter_map(|up| schema.find(&up.to_ascii_uppercase()).first())
             .flat_map(|up| schema.entity(*up).attributes().iter().map(|a| a.name))
             .collect();
@@ -391,7 +391,7 @@ impl Check<'_> {
             return;
         }
         let known = &self.known[t.keyword as usize];
-        let is = |rows: &[u16]| rows.is_empty() || rows.iter().any(|r| self.schema.entities[*r as usize].is_a.iter().any(|n| names.contains(n)));
+        let is = |rows: &[u16]| rows.is_empty() || rows.iter().any(|r| self.schema.entities[*r as usize].is_a().iter().any(|n| names.contains(n)));
         let fits = if t.complex {
             gr_p21::members(self.file.values_of(target)).any(|v| is(&self.part(v).rows))
         } else {

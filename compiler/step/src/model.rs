@@ -98,7 +98,7 @@ impl<'a> Model<'a> {
         Some(Node { model: self, n: n as u32 })
     }
     fn known_is_a(&self, known: &Known, kind: &str) -> bool {
-        self.schema.name(kind).is_some_and(|kind| known.rows.iter().any(|r| self.schema.entities[*r as usize].is_a.contains(&kind)))
+        self.schema.name(kind).is_some_and(|kind| known.rows.iter().any(|r| self.schema.entities[*r as usize].is_a().contains(&kind)))
     }
 }
 

@@ -26,18 +26,25 @@ pub struct Entity {
     pub edition: Edition,
     /// Has no instances of its own.
     pub is_abstract: bool,
-    /// Direct supertypes.
-    pub supertypes: Vec<&'static str>,
+    /// Direct supertypes as the table has them.
+    above: &'static str,
     /// Attributes as the table has them: most files need a few entities only, so that these are read when asked for.
     written: &'static str,
     read: OnceLock<Vec<Attribute>>,
     /// WHERE rules as the table has them.
     pub rules: &'static str,
-    /// Everything it is, itself included: keywords in lower case.
-    pub is_a: Vec<Name>,
+    kinds: OnceLock<Vec<Name>>,
 }
 
 impl Entity {
+    /// Direct supertypes, in lower case.
+    pub fn supertypes(&self) -> impl Iterator<Item = &'static str> + use<> {
+        list(self.above)
+    }
+    /// Everything it is, itself included.
+    pub fn is_a(&self) -> &[Name] {
+        self.kinds.get_or_init(|| schema().kinds(self))
+    }
     /// In Part 21 order, inherited ones first.
     pub fn attributes(&self) -> &[Attribute] {
         self.read.get_or_init(|| {
@@ -144,7 +151,7 @@ impl Schema {
     /// Whether some edition of `keyword` is a `supertype`.
     pub fn is_a(&self, keyword: &str, supertype: &str) -> bool {
         let Some(name) = self.name(&supertype.to_ascii_lowercase()) else { return false };
-        self.find(keyword).iter().any(|e| self.entity(*e).is_a.contains(&name))
+        self.find(keyword).iter().any(|e| self.entity(*e).is_a().contains(&name))
     }
     /// Keywords closest to a misspelt one.
     pub fn suggest(&self, keyword: &str) -> Option<&'static str> {
@@ -159,59 +166,43 @@ impl Schema {
     }
 
     fn load() -> Schema {
-        let rows: Vec<Vec<&'static str>> =
-            ENTITIES.lines().filter(|l| !l.starts_with('#') && !l.is_empty()).map(|l| l.split('\t').collect()).collect();
+        let rows = ENTITIES.lines().filter(|l| !l.starts_with('#') && !l.is_empty()).map(|l| {
+            let mut columns = l.splitn(7, '\t');
+            std::array::from_fn::<&'static str, 7, _>(|_| columns.next().unwrap_or(""))
+        });
+        let rows: Vec<[&'static str; 7]> = rows.collect();
         let types: FxHashMap<&'static str, &'static str> =
             TYPES.lines().filter(|l| !l.starts_with('#')).filter_map(|l| l.split_once('\t')).collect();
-        let lower: &'static [String] = Box::leak(rows.iter().map(|r| r[2].to_ascii_lowercase()).collect::<Vec<_>>().into_boxed_slice());
+        let keywords: Vec<&str> = rows.iter().map(|r| r[2]).collect();
+        let lower: &'static str = Box::leak(keywords.join("\n").to_ascii_lowercase().into_boxed_str());
         let mut names: FxHashMap<&'static str, Name> = FxHashMap::default();
-        for n in lower {
-            let next = Name(names.len() as u16);
-            names.entry(n.as_str()).or_insert(next);
-        }
-        let parents: FxHashMap<&str, Vec<Vec<&'static str>>> = {
-            let mut map: FxHashMap<&str, Vec<Vec<&'static str>>> = FxHashMap::default();
-            for (row, n) in rows.iter().zip(lower) {
-                map.entry(n.as_str()).or_default().push(list(row[4]));
-            }
-            map
-        };
-        let mut texts = vec![""; names.len()];
-        for (text, name) in &names {
-            texts[name.0 as usize] = text;
-        }
-        let mut schema = Schema { entities: Vec::with_capacity(rows.len()), by_keyword: FxHashMap::default(), names, texts, types };
-        for (i, row) in rows.iter().enumerate() {
-            let mut is_a = Vec::new();
-            let mut todo = vec![lower[i].as_str()];
-            let mut direct = Some(list(row[4]));
-            while let Some(n) = todo.pop() {
-                if let Some(name) = schema.names.get(n) {
-                    if is_a.contains(name) {
-                        continue;
-                    }
-                    is_a.push(*name);
-                }
-                let up = match direct.take() {
-                    Some(d) => d,
-                    None => parents.get(n).into_iter().flatten().flatten().copied().collect(),
-                };
-                todo.extend(up);
-            }
-            let id = EntityId(i as u16);
-            schema.by_keyword.entry(row[2]).or_default().push(id);
-            schema.entities.push(Entity {
-                keyword: row[2],
-                edition: Edition { part: row[0], text: row[1] },
-                is_abstract: row[3] == "A",
-                supertypes: list(row[4]),
-                written: row[5],
-                read: OnceLock::new(),
-                rules: row.get(6).copied().unwrap_or(""),
-                is_a,
+        let mut texts = Vec::new();
+        let mut by_keyword: FxHashMap<&'static str, Vec<EntityId>> = FxHashMap::default();
+        let mut entities = Vec::with_capacity(rows.len());
+        for ([part, text, keyword, kind, above, written, rules], name) in rows.into_iter().zip(lower.split('\n')) {
+            names.entry(name).or_insert_with(|| {
+                texts.push(name);
+                Name(texts.len() as u16 - 1)
             });
+            by_keyword.entry(keyword).or_default().push(EntityId(entities.len() as u16));
+            let edition = Edition { part, text };
+            let is_abstract = kind == "A";
+            entities.push(Entity { keyword, edition, is_abstract, above, written, read: OnceLock::new(), rules, kinds: OnceLock::new() });
         }
-        schema
+        Schema { entities, by_keyword, names, texts, types }
+    }
+
+    /// What an entity is: its own supertypes, and what any edition of those is.
+    fn kinds(&self, entity: &Entity) -> Vec<Name> {
+        let mut is_a: Vec<Name> = self.name(&entity.keyword.to_ascii_lowercase()).into_iter().collect();
+        let mut todo: Vec<&'static str> = entity.supertypes().collect();
+        while let Some(n) = todo.pop() {
+            if let Some(name) = self.name(n).filter(|name| !is_a.contains(name)) {
+                is_a.push(name);
+                todo.extend(self.find(&n.to_ascii_uppercase()).iter().flat_map(|up| self.entity(*up).supertypes()));
+            }
+        }
+        is_a
     }
 
     fn attribute(&self, text: &'static str) -> Attribute {
@@ -277,12 +268,12 @@ impl Schema {
     }
 }
 
-fn list(text: &'static str) -> Vec<&'static str> {
-    text.split(',').map(str::trim).filter(|s| !s.is_empty()).collect()
+fn list(text: &'static str) -> impl Iterator<Item = &'static str> {
+    text.split(',').map(str::trim).filter(|s| !s.is_empty())
 }
 
 fn inner(text: &'static str) -> Vec<&'static str> {
-    list(text.trim().trim_start_matches('(').trim_end_matches(')'))
+    list(text.trim().trim_start_matches('(').trim_end_matches(')')).collect()
 }
 
 /// Edit distance, given up at `limit`.

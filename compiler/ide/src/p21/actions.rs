@@ -64,7 +64,7 @@ fn wanted(ty: &Type) -> Option<String> {
         schema().find(k).iter().any(|e| !schema().entity(*e).is_abstract)
     });
     exact.or_else(|| {
-        let fits = |e: &&gr_step::Entity| !e.is_abstract && names.iter().any(|n| e.is_a.contains(n));
+        let fits = |e: &&gr_step::Entity| !e.is_abstract && names.iter().any(|n| e.is_a().contains(n));
         schema().entities.iter().find(fits).map(|e| e.keyword.to_string())
     })
 }

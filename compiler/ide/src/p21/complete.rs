@@ -116,7 +116,7 @@ fn entities(typed: &str, replace: Span) -> Vec<Completion> {
             label: e.keyword.into(),
             insert: format!("{}({});", e.keyword, places.join(",")),
             snippet: true,
-            detail: e.supertypes.iter().map(|s| words(s)).collect::<Vec<_>>().join(", "),
+            detail: e.supertypes().map(words).collect::<Vec<_>>().join(", "),
             documentation: meaning(e.keyword).into(),
             kind: CompletionKind::Entity,
             rank: if meaning(e.keyword).is_empty() { 2 } else { 1 },

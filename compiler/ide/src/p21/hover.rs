@@ -97,7 +97,7 @@ fn entity(doc: Doc<'_>, node: Node<'_>) -> String {
     }
     let users = super::names::users(doc, node.id(), 200);
     let many = if users.len() == 200 { "200 or more" } else { &users.len().to_string() };
-    let supers: Vec<String> = row.supertypes.iter().map(|s| words(s)).collect();
+    let supers: Vec<String> = row.supertypes().map(words).collect();
     let kind = if supers.is_empty() { String::new() } else { format!("a kind of {}; ", supers.join(", ")) };
     let part = if row.edition.part == "10303" { "ISO 10303 resources".into() } else { format!("ISO 14649-{}", row.edition.part) };
     text.push_str(&format!("\n{kind}used by {many}; *{part} ({})*", row.edition.text));

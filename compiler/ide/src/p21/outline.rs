@@ -56,7 +56,7 @@ fn in_order<'m>(model: &'m gr_step::Model<'m>) -> Vec<(Node<'m>, ItemKind)> {
     ];
     // Some keywords are a tool in one edition of the standard, and part of one in another.
     let schema = gr_step::schema();
-    let fits = |node: &Node<'m>, name: &str| node.entity().is_none_or(|e| e.is_a.iter().any(|n| schema.text_of(*n) == name));
+    let fits = |node: &Node<'m>, name: &str| node.entity().is_none_or(|e| e.is_a().iter().any(|n| schema.text_of(*n) == name));
     let of = |(name, kind): (&'static str, ItemKind)| model.all(name).filter(move |n| fits(n, name)).map(move |n| (n, kind));
     let mut found: Vec<(Node<'m>, ItemKind)> = kinds.into_iter().flat_map(of).collect();
     // A workingstep is an executable too: what it is first counts.

@@ -17,8 +17,8 @@ pub fn page(name: &str) -> Option<String> {
         text.push_str("\nAbstract: only entities of its kind have instances.\n");
     }
     for row in &rows {
-        if !row.supertypes.is_empty() {
-            let kinds: Vec<String> = row.supertypes.iter().map(|s| s.to_uppercase()).collect();
+        let kinds: Vec<String> = row.supertypes().map(str::to_uppercase).collect();
+        if !kinds.is_empty() {
             text.push_str(&format!("\nA kind of {}.\n", kinds.join(", ")));
         }
         let part = if row.edition.part == "10303" { "ISO 10303 resources".to_string() } else { format!("ISO 14649-{}", row.edition.part) };
@@ -30,7 +30,7 @@ pub fn page(name: &str) -> Option<String> {
             text.push_str("none\n");
         }
     }
-    let below: Vec<&str> = schema().entities.iter().filter(|e| e.supertypes.iter().any(|s| s.eq_ignore_ascii_case(&keyword))).map(|e| e.keyword).collect();
+    let below: Vec<&str> = schema().entities.iter().filter(|e| e.supertypes().any(|s| s.eq_ignore_ascii_case(&keyword))).map(|e| e.keyword).collect();
     if !below.is_empty() {
         text.push_str(&format!("\nKinds of it: {}.\n", below.join(", ")));
     }
