@@ -286,7 +286,8 @@ impl Analysis {
             self.unopened.push(known);
         } else {
             self.forget_unopened(|d| d.uri == *uri);
-            let text = gr_text::decode(std::fs::read(&path).ok().filter(|_| stamp.is_some())?).text;
+            stamp?;
+            let text = crate::workspace::stored(&path)?;
             let document = Document { open: false, ..self.document(uri.clone(), String::new(), 0, &text, publish) };
             if matches!(document.kind, Kind::Other) {
                 return None;

@@ -25,9 +25,9 @@ const MOST_BYTES: u64 = 2_000_000;
 /// What a file is recognized by.
 type Stamp = Option<(SystemTime, u64)>;
 
-/// When a file was changed, and its size.
+/// When a file was changed, and its size; none of what is no stored file: a pipe that nobody writes to would never end.
 pub fn stamp(path: &Path) -> Stamp {
-    let meta = std::fs::metadata(path).ok()?;
+    let meta = std::fs::metadata(path).ok().filter(std::fs::Metadata::is_file)?;
     Some((meta.modified().ok()?, meta.len()))
 }
 
@@ -107,7 +107,7 @@ fn of_file(
     workspace: Arc<Workspace>,
     station: Arc<Station>,
 ) -> Option<(String, Vec<lsp::Diagnostic>)> {
-    let text = Text::new(&gr_text::decode(std::fs::read(path).ok()?).text);
+    let text = Text::new(&crate::workspace::stored(path)?);
     let head = text.slice(gr_text::Span::new(0, HEAD));
     let station = Arc::new(Station { machine: None, ..(*station).clone() });
     let mut session = Session::new();

@@ -90,6 +90,12 @@ impl Workspace {
     }
 }
 
+/// Text of a stored file. Pipes and devices are none: where nobody writes to them, reading would never end.
+pub fn stored(path: &Path) -> Option<String> {
+    let is_file = std::fs::metadata(path).is_ok_and(|m| m.is_file());
+    is_file.then(|| std::fs::read(path).ok())?.map(|bytes| gr_text::decode(bytes).text)
+}
+
 /// Extensions of G-code programs, those that only other programs claim left out.
 pub fn is_program(path: &Path) -> bool {
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
@@ -119,7 +125,7 @@ fn walk(folder: &Path, depth: u32, wanted: fn(&Path) -> bool, found: &mut Vec<Pa
             if depth < MOST_DEPTH {
                 walk(&path, depth + 1, wanted, found);
             }
-        } else if wanted(&path) {
+        } else if wanted(&path) && path.is_file() {
             found.push(path);
         }
     }

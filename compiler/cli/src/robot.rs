@@ -77,7 +77,7 @@ pub fn take_job(motion: &mut Motion, goal: &Goal<'_>) -> Result<(), Vec<Diagnost
 
 fn take_job_of(motion: &mut Motion, path: &Path, machine: &Machine) -> Result<(), Vec<Diagnostic>> {
     let name = path.display().to_string();
-    let text = match crate::sources::read(path) {
+    let text = match crate::sources::read_setup(path) {
         Ok(decoded) => decoded.text,
         Err((code, args)) => {
             let file = motion.sources.add(name, "");

@@ -13,7 +13,7 @@ use crate::commands::complain;
 use crate::options::{LintArgs, SetupArgs, UnitArg};
 use crate::project::{Project, Step, lint, place};
 use crate::render::{Renderer, Tally};
-use crate::sources::{Sources, read};
+use crate::sources::{Sources, read_setup};
 
 /// Everything a run needs that does not depend on the program.
 pub struct Station {
@@ -374,7 +374,7 @@ impl Reader<'_> {
     /// Reads a file; what is wrong with that is shown.
     fn text(&mut self, path: &Path) -> Option<(gr_text::FileId, String)> {
         let name = path.display().to_string();
-        match read(path) {
+        match read_setup(path) {
             Ok(d) => {
                 self.files.push(path.to_path_buf());
                 Some((self.sources.add(name, d.text.clone()), d.text))
@@ -414,7 +414,7 @@ impl Reader<'_> {
         let folder = path.parent().unwrap_or(Path::new(""));
         let mut included = Vec::new();
         let mut load = |p: &Path| {
-            let text = read(p).ok()?.text;
+            let text = read_setup(p).ok()?.text;
             included.push(p.to_path_buf());
             Some(text)
         };

@@ -99,6 +99,18 @@ pub fn read(path: &Path) -> Result<Decoded, (gr_text::Code, Vec<String>)> {
     Ok(decode(bytes))
 }
 
+/// Reads a file that a program is set up with: a tool table, a machine file, settings. A pipe or a device is refused: where nobody
+/// writes to it, reading would never end, and standard input belongs to the program or to an editor.
+pub fn read_setup(path: &Path) -> Result<Decoded, (gr_text::Code, Vec<String>)> {
+    if std::fs::metadata(path).is_ok_and(|m| !m.is_file() && !m.is_dir()) {
+        return Err((code::FILE_UNREADABLE, vec![path.display().to_string(), NO_FILE.to_string()]));
+    }
+    read(path)
+}
+
+/// Why pipes and devices aren't read.
+pub const NO_FILE: &str = "it is a pipe or a device, and a stored file is needed here";
+
 /// Reads a program; what is plainly something else, a settings file for example, is refused by name.
 pub fn read_program(path: &Path) -> Result<Decoded, (gr_text::Code, Vec<String>)> {
     let decoded = read(path)?;

@@ -34,6 +34,35 @@ fn code(o: &Output) -> i32 {
     o.status.code().unwrap()
 }
 
+/// Tool tables, machine files and settings are stored files: a pipe that nobody writes to, or a terminal, is not waited for. A program
+/// may come from one.
+#[cfg(unix)]
+#[test]
+fn what_a_program_is_set_up_with_comes_from_no_pipe() {
+    let folder = tempfile::tempdir().unwrap();
+    let pipe = folder.path().join("pipe");
+    assert!(Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    let pipe = pipe.to_str().unwrap();
+    std::fs::write(folder.path().join("part.ngc"), "G21 G90\nG0 X1\nM2\n").unwrap();
+    std::fs::write(folder.path().join("mill.ini"), format!("[EMCIO]\nTOOL_TABLE = {pipe}\n")).unwrap();
+    for option in ["--tools", "--ini", "--vars", "--machine"] {
+        let mut child = command(&["check", "part.ngc", option, pipe]).current_dir(folder.path()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        let begun = std::time::Instant::now();
+        while child.try_wait().unwrap().is_none() {
+            assert!(begun.elapsed().as_secs() < 30 || child.kill().is_err(), "{option} waits for a pipe");
+            std::thread::sleep(std::time::Duration::from_millis(20));
+        }
+        let told = whole(&child.wait_with_output().unwrap());
+        assert!(told.contains("E0821") && told.contains("it is a pipe or a device"), "{option}: {told}");
+    }
+    // A table that the INI file names is left out where there is no such file.
+    assert_eq!(code(&in_folder(folder.path(), &["check", "part.ngc", "--ini", "mill.ini"])), 0);
+    // The program itself.
+    let mut child = command(&["check", "/dev/stdin"]).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    std::io::Write::write_all(&mut child.stdin.take().unwrap(), b"G21 G90\nG0 X1\nM2\n").unwrap();
+    assert_eq!(code(&child.wait_with_output().unwrap()), 0);
+}
+
 #[test]
 fn check_for_people() {
     insta::assert_snapshot!(whole(&run(&["check", "faulty.ngc"])));

@@ -407,11 +407,22 @@ impl Source {
                 let word = written(span).filter(|w| w.len() > 1)?;
                 (format!("remove {word}"), Span::new(span.start - blanks as u32, span.end), String::new())
             }
+            // `callsub` is `call` with something behind it.
+            code::OWORD_TRAILING_TEXT if self.runs_on(span) => {
+                let rest = written(span)?;
+                let more = rest.len() - rest.trim_start_matches(|c: char| c.is_ascii_alphabetic()).len();
+                (format!("remove `{}`", &rest[..more]), Span::new(span.start, span.start + more as u32), String::new())
+            }
             code::OWORD_TRAILING_TEXT if !written(span)?.contains(['\n', '\r']) => {
                 ("put the rest on its own line".into(), Span::new(span.start, span.start), self.line_end().into())
             }
             _ => return None,
         })
+    }
+    /// Whether letters are written at once behind a letter.
+    fn runs_on(&self, span: Span) -> bool {
+        let at = span.start.checked_sub(self.start + 1).map_or(0, |at| at as usize);
+        self.chunk.text.as_bytes().get(at..at + 2).is_some_and(|two| two.iter().all(u8::is_ascii_alphabetic))
     }
     /// Where the row of the registry names two ways out: both.
     fn readings(&self, found: &Found, span: Span) -> Vec<(String, Span, String)> {

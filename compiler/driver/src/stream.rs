@@ -47,6 +47,9 @@ impl Loaded {
         {
             return text.as_deref().map(str::to_string);
         }
+        if !path.is_file() {
+            return None;
+        }
         Some(crate::disk::read_as(std::fs::read(path).ok()?, self.setup.dialect))
     }
     /// Subroutine files that were pulled in, in the order of their names.

@@ -102,6 +102,23 @@ fn fixes_mend_what_they_are_offered_for() {
     insta::assert_snapshot!(mended.join("\n"));
 }
 
+/// What is written at once behind a keyword is taken away; anything else gets a line of its own.
+#[test]
+fn what_follows_a_keyword() {
+    let mended = |block: &str| {
+        let text = format!("G21 G90\no<x> sub\nG0 X1\no<x> endsub\n{block}\nM2\n");
+        let mut session = Session::new();
+        let file = session.open("part.ngc", &text, Options::new(Setup::default()));
+        let found = session.check(file).diagnostics;
+        let fix = &found.iter().find(|d| d.code == gr_text::code::OWORD_TRAILING_TEXT).unwrap_or_else(|| panic!("{found:?}")).fixes[0];
+        let (_, span, new) = &fix.edits[0];
+        format!("{}{new}{}", &text[..span.start as usize], &text[span.end as usize..]).lines().nth(4).map(|l| format!("{l}: {}", fix.title))
+    };
+    assert_eq!(mended("O<x> callsub").as_deref(), Some("O<x> call: remove `sub`"));
+    assert_eq!(mended("o<x> callsub [1]").as_deref(), Some("o<x> call [1]: remove `sub`"));
+    assert_eq!(mended("o<x> call G0 X2").as_deref(), Some("o<x> call : put the rest on its own line"));
+}
+
 /// A subroutine is missing at its call, wherever the search for it ends.
 #[test]
 fn a_missing_subroutine_is_told_at_its_call() {

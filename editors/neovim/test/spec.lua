@@ -296,6 +296,24 @@ test("build is told the settings of the server", function()
   require("gcc-robot.commands").build({ "canon" })
   contains(command, "--tools " .. scratch .. "/told.tbl --block-delete")
   contains(table.concat(vim.fn.readfile(scratch .. "/build/told.canon"), "\n"), "71.0000")
+  -- The preview is told the same, but for lints, which it doesn't know.
+  settings.gccRobot.lints = { allow = { "end/spindle-on" }, strict = true }
+  client.notify("workspace/didChangeConfiguration", { settings = settings })
+  wait("the lints", function()
+    local told = request(buffer, "gccRobot/buildOptions", { textDocument = { uri = vim.uri_from_bufnr(buffer) } })
+    return vim.tbl_contains(told.options, "--strict")
+  end)
+  local start, previewed = vim.fn.jobstart, nil
+  vim.fn.jobstart = function(words, options)
+    if words[2] == "preview" then
+      previewed = table.concat(words, " ", 5)
+    end
+    return start(words, options)
+  end
+  vim.cmd("GccRobotPreview --machine-units mm")
+  vim.fn.jobstart = start
+  equal(previewed, "--editor --tools " .. scratch .. "/told.tbl --block-delete --machine-units mm")
+  vim.cmd("GccRobotPreviewStop")
   -- What is named by hand is not named twice.
   require("gcc-robot.commands").build({ "canon", "-t", top .. "/docs/examples/tools.tbl" })
   require("gcc-robot.program").run = run

@@ -40,7 +40,16 @@ pub fn actions(mut view: View, range: lsp::Range, only: Option<&[lsp::CodeAction
         }
         more.push(ending);
     }
-    found.extend(more.into_iter().map(|a| action(&view, a)));
+    // What an exchange file lacks is the cure of what is said about the reference there.
+    let cured: Vec<lsp::Diagnostic> = match view.kind {
+        Kind::Exchange if !more.is_empty() => {
+            let there = |d: &&Diagnostic| d.code == code::P21_DANGLING_REFERENCE && d.primary().1.start <= at.start && at.start <= d.primary().1.end;
+            view.found.iter().filter(there).map(|d| protocol::diagnostic(d, &view.text, view.columns, &|_| None)).collect()
+        }
+        _ => Vec::new(),
+    };
+    let of_place = |a| lsp::CodeAction { diagnostics: (!cured.is_empty()).then(|| cured.clone()), ..action(&view, a) };
+    found.extend(more.into_iter().map(of_place));
     found.extend(units);
     found.extend(whole);
     found.retain(|a| a.kind.as_ref().is_none_or(|k| asked(k.as_str())));
@@ -178,7 +187,7 @@ fn allow(view: &View, d: &Diagnostic) -> Option<lsp::CodeAction> {
     let open = view.others.iter().find(|o| o.path == *path);
     let text = match open {
         Some(o) => o.text.to_string(),
-        None => std::fs::read_to_string(path).ok()?,
+        None => crate::workspace::stored(path)?,
     };
     let slug = d.code.def().slug;
     let (at, new) = allowed(&text, slug);

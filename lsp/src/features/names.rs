@@ -138,7 +138,7 @@ fn tool_row(view: &View, number: i64) -> Option<lsp::Location> {
     let path = view.station.files.iter().find(|p| p.extension().is_some_and(|e| e == "tbl"))?;
     let text = match view.others.iter().find(|o| o.path == *path) {
         Some(open) => open.text.to_string(),
-        None => gr_text::decode(std::fs::read(path).ok()?).text,
+        None => crate::workspace::stored(path)?,
     };
     let item = gr_ide::config::tools::outline(&text).into_iter().find(|i| i.name == format!("T{number}"))?;
     Some(lsp::Location { uri: lsp::Uri::from_file_path(path)?, range: Text::new(&text).range(item.span, view.columns) })

@@ -89,7 +89,7 @@ fn own(station: &Station) -> Option<&crate::setup::Station> {
 impl Host for Editor {
     fn station(&self, path: &Path, settings: &Settings) -> Station {
         let (station, sources, found) = own_station(path, settings);
-        let project = station.project.as_ref().and_then(|p| Some((p.path.clone(), crate::sources::read(&p.path).ok()?.text)));
+        let project = station.project.as_ref().and_then(|p| Some((p.path.clone(), crate::sources::read_setup(&p.path).ok()?.text)));
         let (mut placed_found, mut said) = (Vec::new(), Vec::new());
         for d in found {
             let own = sources.get(d.primary().0).filter(|f| Path::new(&f.name).is_file());
@@ -141,7 +141,7 @@ impl Host for Editor {
         let mut found = project.faults(FileId(0), text);
         // What its names lead to: machines and files that are not there. As it is on disk.
         let (on_disk, sources, more) = own_station(path, &Settings::default());
-        let told = on_disk.project.and_then(|p| Some(p.faults(FileId(0), &crate::sources::read(path).ok()?.text))).unwrap_or_default();
+        let told = on_disk.project.and_then(|p| Some(p.faults(FileId(0), &crate::sources::read_setup(path).ok()?.text))).unwrap_or_default();
         let own = |d: &Diagnostic| told.iter().any(|t| (t.code, &t.message) == (d.code, &d.message));
         let here = |d: &Diagnostic| sources.get(d.primary().0).is_none_or(|f| Path::new(&f.name) == path || f.text.is_empty());
         found.extend(more.into_iter().filter(|d| here(d) && !own(d)).map(|d| match named_in(text, &d) {

@@ -118,7 +118,7 @@ pub fn doubted(name: &str, sources: &mut Sources) -> Result<(gr_machine::Machine
         let file = sources.add("", "");
         return Err(vec![about_file(code::PROJECT_UNKNOWN_MACHINE, file, &[name.to_string(), instead_of(name)])]);
     }
-    match read(Path::new(name)) {
+    match crate::sources::read_setup(Path::new(name)) {
         Ok(d) => {
             let file = sources.add(name, d.text.clone());
             parse(file, &d.text).map(|machine| (machine, gr_machine::doubts(file, &d.text)))

@@ -86,8 +86,9 @@ pub fn idle_for(setup: &SetupArgs, files: &[PathBuf]) -> Option<String> {
     // What can't be looked into here, or is not there, is told by the command itself.
     let is_gcode = |path: &PathBuf| {
         let mut head = Vec::new();
-        let read = std::fs::File::open(path).and_then(|f| f.take(4096).read_to_end(&mut head));
-        path.is_file() && read.is_ok() && !crate::exchange::is_exchange(path, &String::from_utf8_lossy(&head))
+        // What a pipe gives it gives once: to the command.
+        let mut read = || std::fs::File::open(path).and_then(|f| f.take(4096).read_to_end(&mut head));
+        path.is_file() && read().is_ok() && !crate::exchange::is_exchange(path, &String::from_utf8_lossy(&head))
     };
     let first = files.first()?.display();
     files.iter().all(is_gcode).then(|| format!("{option} says how STEP-NC files are meant; {first} is G-code"))

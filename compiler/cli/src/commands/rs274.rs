@@ -177,9 +177,17 @@ fn usage(name: &str) -> Quit {
     Quit(1)
 }
 
+/// The bytes of a stored file: a pipe that nobody writes to would never end.
+fn stored(path: &Path) -> std::io::Result<Vec<u8>> {
+    match std::fs::metadata(path) {
+        Ok(m) if !m.is_file() => Err(std::io::ErrorKind::InvalidInput.into()),
+        _ => std::fs::read(path),
+    }
+}
+
 /// Reads a tool table; lines that can't be read are told on standard output, as the real command does.
 fn read_tools(path: &Path) -> Option<ToolTable> {
-    let text = decode(std::fs::read(path).ok()?).text;
+    let text = decode(stored(path).ok()?).text;
     let (table, found) = gr_interp::read_tools(&text, FileId(0));
     for d in found.iter().filter(|d| d.code == gr_text::code::TOOL_TABLE_BAD_LINE) {
         let at = d.primary().1.start as usize;
@@ -423,7 +431,7 @@ fn setup(choice: &Choice, tools: ToolTable) -> (Setup, Vec<String>) {
     };
     let mut refused = Vec::new();
     if let Some(path) = &choice.ini {
-        match std::fs::read(path) {
+        match stored(path) {
             Ok(bytes) => {
                 let (ini, found) = gr_interp::read_ini(&decode(bytes).text, FileId(0), path.parent(), None);
                 for key in gr_interp::wrong_arc_tolerances(&ini) {
@@ -449,7 +457,7 @@ fn setup(choice: &Choice, tools: ToolTable) -> (Setup, Vec<String>) {
 /// Stored parameters; a file that is not there holds none.
 fn parameters(choice: &Choice) -> Result<BTreeMap<u32, f64>, String> {
     let Some(path) = choice.vars.as_ref().filter(|p| p.exists()) else { return Ok(BTreeMap::new()) };
-    let bytes = std::fs::read(path).map_err(|_| fill(rs274::VAR_FILE_OPEN.text(), &[path.display().to_string()]))?;
+    let bytes = stored(path).map_err(|_| fill(rs274::VAR_FILE_OPEN.text(), &[path.display().to_string()]))?;
     gr_interp::read_parameters(&decode(bytes).text, FileId(0)).map_err(|d| {
         let number = d.code == gr_text::code::PARAMETER_FILE_NUMBER_RANGE;
         (if number { rs274::VAR_FILE_NUMBER } else { rs274::VAR_FILE_ORDER }).text().to_string()

@@ -219,6 +219,12 @@ fn actions() {
     assert!(numbered.contains("#7=MACHINING_WORKINGSTEP('WS DRILL',"), "{numbered}");
     c.edit(&uri, "#19=DRILLING($,$,'DRILL1',10.,$,#44,", "#19=DRILLING($,$,'DRILL1',10.,$,#444,");
     let made = act(&mut c, ",$,#4|44,", "Create #444 as MILLING_CUTTING_TOOL");
+    let _ = c.diagnostics(&uri);
+    let position = c.position(&uri, ",$,#4|44,");
+    let params = json!({ "textDocument": { "uri": uri }, "range": { "start": position, "end": position }, "context": { "diagnostics": [] } });
+    let offered = c.request("textDocument/codeAction", params);
+    let create = offered.as_array().and_then(|l| l.iter().find(|a| a["title"].as_str().is_some_and(|t| t.starts_with("Create"))));
+    assert_eq!(create.map(|a| a["diagnostics"][0]["message"].as_str().unwrap_or("").starts_with("#444 does not exist")), Some(true), "{create:?}");
     assert!(made.contains("\n#444=MILLING_CUTTING_TOOL('',$,(),$,$,$);"), "{made}");
     c.shut_down();
 }

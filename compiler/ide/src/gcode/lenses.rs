@@ -36,7 +36,10 @@ pub fn lenses(doc: Doc<'_>, program: Option<(&Program, FileId, &Report, &Rates)>
         let name = label_text(&s.label);
         let own = calls.iter().filter(|c| c.label == s.label).count();
         let n = own + calls_elsewhere(&name);
-        found.push(Lens { line: s.first, text: if n == 1 { "1 call".into() } else { format!("{n} calls") } });
+        // Nobody calls a main program.
+        if n > 0 || !s.heads_file {
+            found.push(Lens { line: s.first, text: if n == 1 { "1 call".into() } else { format!("{n} calls") } });
+        }
     }
     found.sort_by_key(|l| l.line);
     found

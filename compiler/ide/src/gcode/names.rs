@@ -35,6 +35,8 @@ pub struct Sub {
     pub last: u32,
     /// The label's bytes.
     pub span: Span,
+    /// A program by its O number, the first of its file: mostly the main program.
+    pub heads_file: bool,
 }
 
 /// The word of a keyword.
@@ -79,7 +81,8 @@ pub fn subs(doc: Doc<'_>) -> Vec<Sub> {
                         last.last = line.saturating_sub(1);
                     }
                     let span = label_span(doc, line, s.span.shifted(base));
-                    found.push(Sub { label: s.what.label.clone(), first: line, last: line, span });
+                    let heads_file = found.is_empty() && s.what.keyword == Keyword::Program;
+                    found.push(Sub { label: s.what.label.clone(), first: line, last: line, span, heads_file });
                     open = Some(found.len() - 1);
                     if s.what.keyword == Keyword::Program {
                         found[open.unwrap_or(0)].last = doc.count().saturating_sub(1);

@@ -43,6 +43,21 @@ fn local_names_stay_in_their_sub() {
     assert_eq!(rename(doc(&f), &name, None, "b").len(), 3);
 }
 
+/// A main program is called by nobody, and that is no news; one that is called, or a subprogram that nobody calls, is.
+#[test]
+fn calls_of_programs_by_number() {
+    let fanuc = Dialect::find("fanuc-mill").expect("there");
+    let told = |text: &str, elsewhere: usize| {
+        let chunk = |t: &str| Chunk { text: t.into(), scan: Arc::new(gr_gcode::scan(t, fanuc)) };
+        let f = File::new("a", gr_gcode::split_chunks(text, 2).into_iter().map(chunk).collect());
+        let lenses = super::lenses::lenses(Doc { file: &f, dialect: fanuc }, None, &|_| elsewhere);
+        lenses.into_iter().map(|l| format!("{} {}", l.line, l.text)).collect::<Vec<_>>()
+    };
+    let text = "%\nO1000\nM98 P2000\nM30\nO2000\nM99\nO3000\nM99\n%\n";
+    assert_eq!(told(text, 0), ["4 1 call", "6 0 calls"]);
+    assert_eq!(told("O2000\nM99\n", 2), ["0 2 calls"]);
+}
+
 #[test]
 fn words_parameters_functions() {
     let at = |line: &str| {

@@ -3,6 +3,7 @@ local M = {}
 
 local robot = require("gcc-robot")
 local program = require("gcc-robot.program")
+local settings = require("gcc-robot.settings")
 
 --- Targets for completion on the command line.
 function M.targets(lead)
@@ -32,48 +33,7 @@ local function saved_name()
   return name
 end
 
-local function client_of(buffer)
-  local get = vim.lsp.get_clients or vim.lsp.get_active_clients
-  for _, client in ipairs(get()) do
-    local ours = client.name == "gcc-robot" or client.name == "gcc_robot"
-    if ours and vim.lsp.buf_is_attached(buffer, client.id) then
-      return client
-    end
-  end
-  return nil
-end
-
--- The settings of the server as options, so that what is built is what the editor shows.
-local function settings_of(buffer)
-  local client = client_of(buffer)
-  if not client then
-    return {}
-  end
-  local ask = { textDocument = { uri = vim.uri_from_bufnr(buffer) } }
-  local answer = client.request_sync("gccRobot/buildOptions", ask, 5000, buffer)
-  local options = answer and answer.result and answer.result ~= vim.NIL and answer.result.options
-  return options or {}
-end
-
 local errorformat = "%f:%l:%c: %trror[%.%#]: %m,%f:%l:%c: %tarning[%.%#]: %m,%f:%l:%c: %tint[%.%#]: %m,%-G%.%#"
-
--- Options without those that are given again; switches have no value behind them.
-local function without(options, given)
-  local again, long = {}, { ["-t"] = "--tools", ["-i"] = "--ini" }
-  for _, word in ipairs(given) do
-    again[word:match("^%-%-[^=]+") or long[word:sub(1, 2)] or word] = true
-  end
-  local kept, i = {}, 1
-  while i <= #options do
-    local value = options[i + 1]
-    local has_value = value and not vim.startswith(value, "--")
-    if not again[options[i]] then
-      vim.list_extend(kept, options, i, has_value and i + 1 or i)
-    end
-    i = i + (has_value and 2 or 1)
-  end
-  return kept
-end
 
 --- Builds the file for a target (first argument; the rest goes to `gcc-robot build`). Findings go to the
 --- quickfix list. Without -o the result lies beside the source.
@@ -83,8 +43,8 @@ function M.build(arguments)
     return
   end
   local command = { "--message-format", "short", "build", name, "--target", arguments[1] }
-  -- What is named here comes last, but an option must not come twice.
-  vim.list_extend(command, without(settings_of(0), arguments))
+  -- What is named here comes last.
+  vim.list_extend(command, settings.options(0, arguments))
   vim.list_extend(command, arguments, 2)
   if not vim.tbl_contains(arguments, "-o") and not vim.tbl_contains(arguments, "--output") then
     vim.list_extend(command, { "-o", vim.fn.fnamemodify(name, ":h") .. "/build/" })
@@ -214,7 +174,7 @@ end
 --- Shows what a target makes of this buffer in a window beside it; the cursors of both go together.
 function M.output(arguments)
   local source = vim.api.nvim_get_current_buf()
-  local client = client_of(source)
+  local client = settings.client(source)
   if not client then
     vim.notify("gcc-robot: the language server is not running for this buffer", vim.log.levels.ERROR)
     return

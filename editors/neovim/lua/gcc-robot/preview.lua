@@ -130,6 +130,7 @@ function M.start(buffer, arguments)
     return
   end
   local command = { program, "preview", name, "--serve", "--editor" }
+  vim.list_extend(command, require("gcc-robot.settings").without_lints(buffer, arguments or {}))
   vim.list_extend(command, arguments or {})
   local said = {}
   local job = vim.fn.jobstart(command, {
