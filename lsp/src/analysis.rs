@@ -408,9 +408,10 @@ impl Analysis {
         document.latest.store(version, Ordering::Relaxed);
         document.edited = Some(std::time::Instant::now());
         document.stale = true;
-        // Tables of a big file take a while to be put away.
+        // Tables of a big file take a while to be put away: not beside the answers that are asked for now, but when it is looked at anew.
         let old = std::mem::take(&mut document.derived);
-        let _ = self.background.send(Box::new(move || drop(old)));
+        let older = if old.is_much() { document.spent.replace(old) } else { Some(old) };
+        let _ = self.background.send(Box::new(move || drop(older)));
         self.look_again(uri);
         self.callers_again(uri);
     }
@@ -535,8 +536,10 @@ impl Analysis {
                 continue;
             }
             let view = self.view_of(document);
+            let mut spent = None;
             if let Some(d) = self.documents.get_mut(&uri) {
                 d.stale = false;
+                spent = d.spent.take();
             }
             self.checking[lane] = true;
             let (own, publish) = (self.own.clone(), publish.clone());
@@ -545,6 +548,7 @@ impl Analysis {
                 if big {
                     publish(Event::Busy { uri: view.uri.clone(), begins: true });
                 }
+                drop(spent);
                 let (uri, version) = (view.uri.clone(), view.version);
                 let look = || {
                     if let Ok(Some((lines, found))) = crate::features::early(&view) {

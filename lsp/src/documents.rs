@@ -151,6 +151,13 @@ pub struct Derived {
     tokens: Mutex<Option<(String, Arc<Vec<lsp::SemanticToken>>)>>,
 }
 
+impl Derived {
+    /// Whether it holds tables of a whole file.
+    pub fn is_much(&self) -> bool {
+        self.exchange.get().is_some()
+    }
+}
+
 /// Everything a request needs of a document, at one version. Edits wait while `session` is held: take what is
 /// needed of it first, then [`View::release`].
 pub struct View {
@@ -459,6 +466,8 @@ pub struct Document {
     pub edited: Option<std::time::Instant>,
     /// Worked out once per version.
     pub derived: Arc<Derived>,
+    /// The same of a version that was edited since, where that is much: putting it away takes a while, in which answers would wait.
+    pub spent: Option<Arc<Derived>>,
     /// A client has it open: else it is what stands on disk.
     pub open: bool,
     /// `version`, for the views.
@@ -486,6 +495,7 @@ impl Document {
             focus: 0,
             edited: None,
             derived: Arc::default(),
+            spent: None,
             open: true,
             latest: Arc::new(AtomicI32::new(version)),
             sent_tokens: Arc::default(),

@@ -19,13 +19,21 @@ pub fn diagnostics(text: &str, file: FileId) -> Vec<Diagnostic> {
 
 /// As [`diagnostics`], of a file that was read already.
 pub fn diagnostics_of(text: &[u8], exchange: &Exchange, file: FileId) -> Vec<Diagnostic> {
+    diagnostics_while(text, exchange, file, &|| true).unwrap_or_default()
+}
+
+/// The same as long as somebody wants to know, which is asked between the layers of the check; then none.
+pub fn diagnostics_while(text: &[u8], exchange: &Exchange, file: FileId, wanted: &dyn Fn() -> bool) -> Option<Vec<Diagnostic>> {
     let model = Model::new(text, exchange);
     let mut out = Out { text, exchange, file, faulty: vec![false; exchange.instances.len()], list: Vec::new() };
     for f in &exchange.faults {
         out.fault(f);
     }
     if exchange.faults.iter().any(|f| f.code == code::P21_NOT_AN_EXCHANGE_FILE) {
-        return out.list;
+        return Some(out.list);
+    }
+    if !wanted() {
+        return None;
     }
     let kind = dialect(&model);
     for f in gr_p21::check_header(text, exchange) {
@@ -33,7 +41,7 @@ pub fn diagnostics_of(text: &[u8], exchange: &Exchange, file: FileId) -> Vec<Dia
     }
     out.schema(&model, kind);
     if understood(&model, kind) {
-        out.layers(&model, kind);
+        out.layers(&model, kind, wanted);
     } else {
         out.dangling();
     }
@@ -41,10 +49,13 @@ pub fn diagnostics_of(text: &[u8], exchange: &Exchange, file: FileId) -> Vec<Dia
         // What was cut off is referred to: that is the same mistake.
         out.list.retain(|d| d.code != code::P21_DANGLING_REFERENCE);
     }
+    if !wanted() {
+        return None;
+    }
     out.lost_names();
     out.in_comments();
     out.list.sort_by_key(|d| (d.primary().1.start, d.primary().1.end));
-    out.list
+    Some(out.list)
 }
 
 /// Whether the instances are worth comparing with ISO 14649.
@@ -283,8 +294,12 @@ impl Out<'_> {
         }
     }
 
-    fn layers(&mut self, model: &Model<'_>, kind: Dialect) {
+    /// The rest of them is left out as soon as nobody wants them.
+    fn layers(&mut self, model: &Model<'_>, kind: Dialect, wanted: &dyn Fn() -> bool) {
         self.dangling();
+        if !wanted() {
+            return;
+        }
         let hurt = self.faulty.clone();
         for f in crate::check::check(self.text, self.exchange) {
             // References to nothing are reported above, also those the schema can't see.
@@ -300,6 +315,9 @@ impl Out<'_> {
                 self.faulty[n] = true;
             }
         }
+        if !wanted() {
+            return;
+        }
         // Another spelling is no reason to be silent about the rest.
         let mut quiet = self.faulty.clone();
         for d in self.list.iter().filter(|d| d.severity != Severity::Error) {
@@ -311,6 +329,9 @@ impl Out<'_> {
             }
         }
         self.rules(model, &quiet);
+        if !wanted() {
+            return;
+        }
         let findings = crate::lint::lint(model, &|n| quiet.get(n as usize) == Some(&true));
         for f in findings {
             self.finding(f, kind);

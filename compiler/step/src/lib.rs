@@ -15,7 +15,7 @@ mod rules;
 mod schema;
 
 pub use check::check;
-pub use diagnose::{diagnostics, diagnostics_of};
+pub use diagnose::{diagnostics, diagnostics_of, diagnostics_while};
 pub use dialect::{Dialect, dialect};
 pub use lint::{lint, short};
 pub use model::{Model, Node, Val};

@@ -276,3 +276,24 @@ fn instances_inside_a_comment_are_told_once() {
     let comment = all[0].labels.iter().find(|l| l.text.contains("comment")).expect("a label");
     assert_eq!(comment.span.start as usize, text.find("/* #18").unwrap_or(0));
 }
+
+/// A check that nobody waits for any more ends between its layers; one that goes through says what any other does.
+#[test]
+fn a_check_can_be_cut_short() {
+    let text = include_str!("../../../docs/examples/stepnc/mistakes.p21");
+    let exchange = gr_p21::parse(text.as_bytes());
+    let file = gr_text::FileId(0);
+    let asked = std::cell::Cell::new(0);
+    let run = |times: u32| {
+        asked.set(0);
+        let wanted = || asked.replace(asked.get() + 1) < times;
+        gr_step::diagnostics_while(text.as_bytes(), &exchange, file, &wanted)
+    };
+    let whole = run(u32::MAX);
+    assert_eq!(whole, Some(gr_step::diagnostics_of(text.as_bytes(), &exchange, file)));
+    let layers = asked.get();
+    assert!(layers >= 4, "{layers}");
+    for times in 0..layers {
+        assert_eq!(run(times), None, "{times}");
+    }
+}

@@ -91,7 +91,8 @@ pub fn diagnose(mut view: View) -> Answer<(Vec<Diagnostic>, Elsewhere)> {
                 return Err(Failure::Overtaken);
             }
             if exchange.text.len() > MOST_PLANNED {
-                gr_step::diagnostics_of(exchange.text.as_bytes(), &exchange.tables, FileId(0))
+                let wanted = || !view.is_overtaken();
+                gr_step::diagnostics_while(exchange.text.as_bytes(), &exchange.tables, FileId(0), &wanted).ok_or(Failure::Overtaken)?
             } else {
                 let mut found = view.host.check_exchange(&view.path, &exchange.text, &view.station);
                 let motion = if asks_machine(&view, &found) { view.motion()? } else { None };
