@@ -464,9 +464,21 @@ impl<'a> Probe<'a> {
     /// Whether the tool can be put there.
     pub fn reaches(&self, p: V3) -> bool {
         match &self.machine.chain {
-            Chain::TwoLegs(k) => legs_reach(k, k.place_of(self.flange(p).position)),
+            Chain::TwoLegs(k) => legs_reach(k, self.platform(k, p)),
             _ => self.joints(p).is_some(),
         }
+    }
+
+    /// Arm, yaw and height of the platform when the tool point is there: the tool turns with the yaw, which follows from the place. Not a
+    /// number where there is none.
+    fn platform(&self, k: &TwoLegs, p: V3) -> V3 {
+        let [across, beside, _] = self.tool.position;
+        if across == 0.0 && beside == 0.0 {
+            return k.place_of(self.flange(p).position);
+        }
+        // Turned by the yaw, arm and tool together lead to the place.
+        let along = libm::sqrt(p[0] * p[0] + p[1] * p[1] - beside * beside);
+        [along - across, libm::atan2(p[1], p[0]) - libm::atan2(beside, along), self.flange(p).position[2]]
     }
 
     /// What moves the tool there; none where it can't be put.
@@ -481,7 +493,7 @@ impl<'a> Probe<'a> {
     fn sensed(&self, p: V3, geometry: bool) -> Option<Sensitivity> {
         match &self.machine.chain {
             Chain::TwoLegs(k) => {
-                let at = k.place_of(self.flange(p).position);
+                let at = self.platform(k, p);
                 if !legs_reach(k, at) {
                     return None;
                 }
@@ -543,6 +555,12 @@ impl<'a> Probe<'a> {
             return extent;
         }
         let way = self.flange([0.0; 3]).position;
+        if matches!(self.machine.chain, Chain::TwoLegs(_)) {
+            // Beside the platform's axis the tool goes round it with the yaw.
+            let round = libm::hypot(way[0], way[1]);
+            let [x, y, z] = extent;
+            return [(x.0 - round, x.1 + round), (y.0 - round, y.1 + round), (z.0 + by * way[2], z.1 + by * way[2])];
+        }
         [0, 1, 2].map(|i| (extent[i].0 + by * way[i], extent[i].1 + by * way[i]))
     }
 

@@ -244,6 +244,31 @@ fn compensation() {
     }
 }
 
+/// A tool beside the platform's axis goes round it with the yaw: it reaches what the platform reaches, as far as it stands away.
+#[test]
+fn a_tool_beside_the_platform() {
+    use gr_accuracy::map::Probe;
+    let m = gr_machine::builtin("usp/2ups-prp").unwrap();
+    let gr_machine::Chain::TwoLegs(k) = &m.chain else { panic!("two legs") };
+    let tool = [40.0, -25.0, -60.0];
+    let probe = Probe::new(&m).held(gr_machine::math::Frame::shift(tool), gr_machine::math::Frame::IDENTITY.turn);
+    let extent = probe.extent();
+    let (mut inside, mut outside) = (0, 0);
+    for arm in (580..1000).step_by(17).map(f64::from) {
+        for yaw in (-40..=40).map(|d| f64::from(d).to_radians() * 1.013) {
+            for z in (-700..=700).step_by(93).map(f64::from) {
+                let (s, c) = yaw.sin_cos();
+                let tip = [(arm + tool[0]) * c - tool[1] * s, (arm + tool[0]) * s + tool[1] * c, z + tool[2]];
+                let good = k.broken([arm, yaw, z]).is_empty();
+                assert_eq!(probe.reaches(tip), good, "{arm} {yaw} {z}");
+                assert!(!good || (0..3).all(|i| extent[i].0 <= tip[i] && tip[i] <= extent[i].1), "{tip:?} {extent:?}");
+                (inside, outside) = (inside + usize::from(good), outside + usize::from(!good));
+            }
+        }
+    }
+    assert!(inside > 500 && outside > 500, "{inside} {outside}");
+}
+
 /// The rectangles of stock that fit, and the volume.
 #[test]
 fn rectangles_and_volume() {

@@ -512,6 +512,11 @@ impl<'a> Gather<'a> {
                 return None;
             }
         };
+        if self.control == Control::Position && frame.position[..2].iter().any(|v| v.abs() > TINY) {
+            // Its place follows from the turn, and the turn from its place: only the other way round is worked out.
+            self.cannot(&format!("a tool beside the axis of a platform that turns with its place (`{name}`)"));
+            return None;
+        }
         let key = (number, name, bits(&frame));
         let index = match self.tool_numbers.get(&key) {
             Some(index) => *index,

@@ -239,6 +239,19 @@ fn a_line_leaves_the_work_space() {
     insta::assert_snapshot!("leaves_the_work_space", told);
 }
 
+/// A tool beside the axis of the platform goes round with it: no place of it is worked out.
+#[test]
+fn a_tool_beside_the_platform() {
+    let tool = |position: &str| {
+        let text = format!("format = 1\nid = \"shop/legs\"\nextends = \"usp/2ups-prp\"\n[[tool]]\nnumber = 1\nname = \"mill\"\nposition = {position}\n");
+        gr_machine::parse(FileId(0), &text).expect("a good machine file")
+    };
+    let text = "G21 G90\nT1 M6\nG43.1 Z60\nG0 X800 Y0 Z0\nG1 X810 F600\nM30\n";
+    let told = faults(text, &tool("[10, 0, -60]"));
+    assert!(told.starts_with("E0523 line 4: a tool beside the axis of a platform that turns with its place (`mill`) can't be done"), "{told}");
+    assert!(faults(text, &tool("[0, 0, -60]")).starts_with("planned"), "{}", faults(text, &tool("[0, 0, -60]")));
+}
+
 /// Each condition of the parallel machine by its name.
 #[test]
 fn conditions_by_name() {
