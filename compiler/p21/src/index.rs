@@ -24,25 +24,25 @@ pub struct Entry {
 /// resumes at the next line that begins with `#id=`; use [`crate::parse`] to hear what is wrong.
 pub fn index(text: &[u8]) -> Index {
     let mut entries = Vec::with_capacity(text.len() / 96 + 4);
-    let mut at = 0;
+    let (mut at, mut plain) = (0, 0);
     while at < text.len() {
         at = skip_blank(text, at);
         if at >= text.len() {
             break;
         }
         if text[at] != b'#' {
-            at = end_of(text, at);
+            at = statement_end(text, at, &mut plain);
             continue;
         }
         let start = at;
         let (id, after) = number(text, at + 1);
         let mut p = skip_blank(text, after);
         if after == at + 1 || text.get(p) != Some(&b'=') {
-            at = end_of(text, at + 1);
+            at = statement_end(text, at + 1, &mut plain);
             continue;
         }
         p = skip_blank(text, p + 1);
-        let end = end_of(text, p);
+        let end = statement_end(text, p, &mut plain);
         entries.push(Entry { id, start: start as u32, end: end as u32, keyword: p as u32 });
         at = end;
     }
@@ -80,35 +80,6 @@ pub(crate) fn skip_blank(text: &[u8], mut at: usize) -> usize {
     at
 }
 
-/// Where the statement around `at` ends. One that lost its own end does not reach into the next instance.
-fn end_of(text: &[u8], at: usize) -> usize {
-    let end = statement_end(text, at);
-    // Behind the head of an instance `=` stands in strings and comments alone.
-    match memchr(b'=', &text[at..end]) {
-        None => end,
-        Some(_) => next_instance(text, at, end).unwrap_or(end),
-    }
-}
-
-/// Byte of the first instance that begins on a line of its own, outside of strings and comments.
-#[cold]
-#[inline(never)]
-fn next_instance(text: &[u8], mut at: usize, end: usize) -> Option<usize> {
-    while at < end {
-        at += memchr::memchr3(b'#', b'\'', b'/', &text[at..end])?;
-        match text[at] {
-            b'#' if first_on_line(text, at) && begins_instance(text, at) => return Some(at),
-            b'#' => at += 1,
-            b'\'' => at = string_end(text, at)?,
-            _ => match crate::lex::comment(text, at) {
-                Some(past) => at = past?,
-                None => at += 1,
-            },
-        }
-    }
-    None
-}
-
 /// Whether nothing but blanks stands before `at` on its line.
 pub(crate) fn first_on_line(text: &[u8], at: usize) -> bool {
     let before = text[..at].iter().rev().find(|b| !matches!(b, b' ' | b'\t'));
@@ -126,13 +97,25 @@ pub(crate) fn begins_instance(text: &[u8], at: usize) -> bool {
         && text.get(q).is_none_or(|b| b.is_ascii_alphabetic() || matches!(b, b'(' | b'!'))
 }
 
-/// One past the `;` that ends the statement around `at`.
-fn statement_end(text: &[u8], mut at: usize) -> usize {
+/// One past the `;` that ends the statement around `at`. One that lost its end does not reach into the next instance.
+/// `plain`: nothing that ends statements, strings or comments stands before it.
+fn statement_end(text: &[u8], mut at: usize, plain: &mut usize) -> usize {
     // A doubled apostrophe is passed as the end of one string and the start of another: where the whole began.
     let (mut string, mut closed) = (0, usize::MAX);
     loop {
-        let Some(n) = memchr::memchr3(b';', b'\'', b'/', &text[at..]) else { return text.len() };
-        at += n;
+        if *plain <= at {
+            *plain = memchr::memchr3(b';', b'\'', b'/', &text[at..]).map_or(text.len(), |n| at + n);
+        }
+        // Behind the head of an instance `=` stands in strings and comments alone.
+        if memchr(b'=', &text[at..*plain]).is_some()
+            && let Some(next) = next_instance(text, at, *plain)
+        {
+            return next;
+        }
+        at = *plain;
+        if at == text.len() {
+            return at;
+        }
         match text[at] {
             b';' => return at + 1,
             b'\'' => match memchr(b'\'', &text[at + 1..]) {
@@ -145,6 +128,8 @@ fn statement_end(text: &[u8], mut at: usize) -> usize {
                 }
                 _ => {
                     string = if at == closed { string } else { at };
+                    // It may end, or be given up, before the quote that was met last.
+                    *plain = 0;
                     if let Some(end) = string_end(text, string) {
                         at = end;
                         continue;
@@ -162,6 +147,19 @@ fn statement_end(text: &[u8], mut at: usize) -> usize {
                 None => at += 1,
             },
         }
+    }
+}
+
+/// Byte of the first instance between two places that begins on a line of its own.
+#[cold]
+#[inline(never)]
+fn next_instance(text: &[u8], mut at: usize, end: usize) -> Option<usize> {
+    loop {
+        at += memchr(b'#', &text[at..end])?;
+        if first_on_line(text, at) && begins_instance(text, at) {
+            return Some(at);
+        }
+        at += 1;
     }
 }
 
@@ -221,6 +219,13 @@ mod tests {
         // The first on its line alone: `=` for `,` begins nothing.
         let text = b"#1=A(#2, #3=B(1));\n#4=C();";
         assert_eq!(index(text).entries.len(), 2);
+    }
+
+    #[test]
+    fn files_without_any_end_take_no_longer() {
+        for line in ["#1=A()\n", "#1=A('x')\n", "#1=A(/* c */)\n"] {
+            assert_eq!(index(line.repeat(200_000).as_bytes()).entries.len(), 200_000);
+        }
     }
 
     #[test]

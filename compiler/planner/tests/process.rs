@@ -141,6 +141,18 @@ fn patterns_that_contradict_themselves_are_told() {
     );
 }
 
+/// Elements are compared with their neighbours alone: many in one line, as far apart as they are wide, take no time.
+#[test]
+fn long_lines_of_elements() {
+    let base = with("#73", "#73=MACHINING_WORKINGSTEP('many',#15,#90,#48,$);\n#91=CARTESIAN_POINT('',(0.,0.,0.));\n#92=AXIS2_PLACEMENT_3D('',#91,$,$);\n#93=DIRECTION('',(0.,1.,0.));\n");
+    let line = |spacing: &str| {
+        let row = format!("#90=RECTANGULAR_PATTERN('p',#2,(#48),#92,#34,#94,#93,10,10000,#95,$,(),());\n#94=TOLERANCED_LENGTH_MEASURE({spacing},#45);\n#95=TOLERANCED_LENGTH_MEASURE(12.,#45);\n");
+        let (p, out) = read(&base.replace("#91=", &format!("{row}#91=")));
+        (p.steps()[0].feature.copies.len(), out.iter().any(|d| d.code == code::PLAN_ELEMENTS_OVERLAP))
+    };
+    assert_eq!([line("10."), line("9.9")], [(100_000, false), (100_000, true)]);
+}
+
 #[test]
 fn patterns_inside_patterns() {
     let base = with("#73", "#73=MACHINING_WORKINGSTEP('many',#15,#80,#48,$);\n#91=CARTESIAN_POINT('',(0.,0.,0.));\n#92=AXIS2_PLACEMENT_3D('',#91,$,$);\n#93=DIRECTION('',(0.,1.,0.));\n")

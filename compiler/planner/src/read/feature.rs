@@ -1,5 +1,7 @@
 //! Features and profiles.
 
+use std::collections::BTreeMap;
+
 use gr_step::Node;
 use gr_text::code;
 
@@ -62,6 +64,26 @@ fn tolerance(feature: Node<'_>) -> (Option<f64>, Option<Origin>) {
 /// The numbers of a pattern's element, and what leaves it out or moves it.
 type Change<'m> = (Vec<i64>, Node<'m>);
 
+/// The first two places of frames that are closer than that, and how far apart they are. Places are kept by cells as wide
+/// as that, so that each is compared with those around it alone.
+fn closer_than(least: f64, frames: &[Frame]) -> Option<([f64; 3], [f64; 3], f64)> {
+    let mut cells: BTreeMap<[i64; 3], Vec<[f64; 3]>> = BTreeMap::new();
+    for frame in frames {
+        let p = frame.origin;
+        let cell = p.map(|v| (v / least).floor() as i64);
+        for n in 0..27 {
+            let beside = [n % 3, n / 3 % 3, n / 9];
+            let beside = std::array::from_fn(|i| cell[i].saturating_add(beside[i] - 1));
+            let near = cells.get(&beside).into_iter().flatten().map(|q| (*q, norm(sub(*q, p))));
+            if let Some((q, distance)) = near.into_iter().find(|(_, d)| *d < least) {
+                return Some((q, p, distance));
+            }
+        }
+        cells.entry(cell).or_default().push(p);
+    }
+    None
+}
+
 impl<'m> Reader<'m> {
     /// A feature in the frame of its setup. `operation` chooses among the elements of a compound feature.
     pub fn feature(&mut self, node: Node<'m>, setup: Option<&Setup>, operation: u64) -> Option<Feature> {
@@ -120,14 +142,8 @@ impl<'m> Reader<'m> {
             _ => 0.0,
         };
         let least = (width - 1e-6).max(1e-6);
-        let mut places: Vec<[f64; 3]> = copies.iter().map(|c| c.origin).collect();
-        places.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
-        let close = places.iter().enumerate().find_map(|(i, a)| {
-            let near = places[i + 1..].iter().take_while(|b| b[0] - a[0] < least);
-            near.map(|b| (a, b, norm(sub(*a, *b)))).find(|(.., d)| *d < least)
-        });
-        let Some((a, b, distance)) = close else { return };
-        let at = |p: &[f64; 3]| format!("X{} Y{}", gr_step::short(p[0]), gr_step::short(p[1]));
+        let Some((a, b, distance)) = closer_than(least, copies) else { return };
+        let at = |p: [f64; 3]| format!("X{} Y{}", gr_step::short(p[0]), gr_step::short(p[1]));
         let how = if distance < 1e-6 {
             format!("both lie at {}", at(a))
         } else {
