@@ -13,6 +13,8 @@ pub struct Cell {
     pub table: Frame,
     /// Part on the table.
     pub part: Frame,
+    /// The frame its controller counts from (world, robot base), in the base; none = the one usual for its language.
+    pub controller_frame: Option<Frame>,
     /// Named frames in the base, for G54 … G59.3 and robot programs.
     pub frames: BTreeMap<String, Frame>,
     /// Tools, by number.
@@ -195,13 +197,15 @@ impl Cell {
         let rails = self.external.iter().filter(|e| e.carries_machine && which(e));
         rails.fold(Frame::IDENTITY, |base, e| base.then(&e.motion()))
     }
-    /// A frame in the base as the robot's control counts it: where rails are coupled, seen from the base with these at 0.
-    pub fn in_control(&self, frame: &Frame) -> Frame {
+    /// A frame in the base as the robot's control counts it: from the controller's frame, `usual` where the file says none, and
+    /// where rails are coupled with these at 0.
+    pub fn in_control(&self, frame: &Frame, usual: &Frame) -> Frame {
+        let mut seen = *frame;
         if self.external.iter().any(|e| e.coupled == Some(true)) {
-            self.on_rails(|e| e.coupled == Some(true)).then(frame)
-        } else {
-            *frame
+            seen = self.on_rails(|e| e.coupled == Some(true)).then(&seen);
         }
+        let from = self.controller_frame.as_ref().unwrap_or(usual);
+        if *from == Frame::IDENTITY { seen } else { from.inverse().then(&seen) }
     }
     /// The zero point of the coordinates that G53, G28 and G30 mean on a robot, in the base, mm: `[[frame]]` `G53`. Rails move the base
     /// away from it, positioners turn the part alone. The directions of these coordinates are the part's.
@@ -225,6 +229,9 @@ impl Cell {
             if *f != Frame::IDENTITY {
                 out += &format!("{name} at {}\n", frame(f));
             }
+        }
+        if let Some(f) = &self.controller_frame {
+            out += &format!("its controller counts from {}\n", frame(f));
         }
         for (name, f) in &self.frames {
             out += &format!("frame {name} at {}\n", frame(f));

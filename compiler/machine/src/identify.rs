@@ -1,5 +1,5 @@
 use crate::math::{Frame, V3, cross, dot, norm, scale, sub};
-use crate::{JointKind, Kinematics, Opw, Serial};
+use crate::{JointKind, Kinematics, Opw, ParallelWrist, Serial};
 
 /// An arm in closed form that equals a chain.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -28,17 +28,21 @@ pub fn identify(chain: &Serial) -> Result<Fit, String> {
         let signs = [0, 1, 2, 3, 4, 5].map(|i| if mask & (1 << i) == 0 { 1.0 } else { -1.0 });
         for offsets in candidates() {
             if let Some(fit) = try_fit(chain, signs, offsets) {
-                let plain = |f: &Fit| f.arm.offsets().iter().filter(|o| **o != 0.0).count() * 8 + f.arm.signs().iter().filter(|s| **s < 0.0).count();
-                let better = best.as_ref().is_none_or(|b| {
-                    (fit.flange != Frame::IDENTITY, plain(&fit)) < (b.flange != Frame::IDENTITY, plain(b))
-                });
-                if better {
+                if best.as_ref().is_none_or(|b| rank(&fit) < rank(b)) {
                     best = Some(fit);
                 }
             }
         }
     }
     best.ok_or_else(|| "its zero position is turned by other than quarter turns".to_string())
+}
+
+/// Which of several equal arms is taken: the least. A model whose first axis is turned by half a turn has its front where the arm
+/// has its back, a1 below zero, and calls forward what is backward.
+fn rank(fit: &Fit) -> (bool, bool, bool, usize) {
+    let (offsets, signs) = (fit.arm.offsets(), fit.arm.signs());
+    let plain = offsets.iter().filter(|o| **o != 0.0).count() * 8 + signs.iter().filter(|s| **s < 0.0).count();
+    (fit.flange != Frame::IDENTITY, fit.arm.lengths()[0] < 0.0, offsets[0] != 0.0, plain)
 }
 
 /// Offsets of the joints, quarter turns; the sixth and fourth take halves too.
@@ -112,24 +116,14 @@ fn try_fit(chain: &Serial, signs: [f64; 6], offsets: [f64; 6]) -> Option<Fit> {
     let turn = Opw::new([0.0; 7], offsets, signs).flange(&[0.0; 6]).inverse().then(&Frame::turned(zero.turn));
     let flange = if turn.error_to(&Frame::IDENTITY).1.iter().all(|v| v.abs() < 1e-9) { Frame::IDENTITY } else { Frame::turned(turn.turn) };
     // Cheap first: one other pose must have the same direction.
-    let poses: Vec<[f64; 6]> = (0..8).map(|n| [0, 1, 2, 3, 4, 5].map(|i| libm::sin((n * 7 + i * 3 + 1) as f64) * 1.4)).collect();
+    let poses = poses();
     let other = chain.forward_frame(&poses[0]).ok()?;
     let direction = Opw::new([0.0; 7], offsets, signs).flange(&poses[0]).then(&flange);
     if direction.error_to(&other).1.iter().any(|v| v.abs() > 1e-6) {
         return None;
     }
     let arms = [0, 1, 2, 3, 4, 5, 6].map(unit);
-    let (mut a, mut b) = (vec![vec![0.0; 7]; 7], vec![0.0; 7]);
-    for q in &poses {
-        let want = chain.forward_frame(q).ok()?.position;
-        let columns: Vec<V3> = arms.iter().map(|k| k.flange(q).position).collect();
-        for i in 0..7 {
-            (0..7).for_each(|k| a[i][k] += dot(columns[i], columns[k]));
-            b[i] += dot(columns[i], want);
-        }
-    }
-    let found = crate::math::solve(a, b)?;
-    let lengths: [f64; 7] = std::array::from_fn(|i| if found[i].abs() < 1e-6 { 0.0 } else { found[i] });
+    let lengths = least_squares(&poses, |q| Some(chain.forward_frame(q).ok()?.position), |i, q| Some(arms[i].flange(q).position))?;
     let arm = Opw::new(lengths, offsets, signs);
     let mut residual = 0.0f64;
     for q in &poses {
@@ -137,4 +131,47 @@ fn try_fit(chain: &Serial, signs: [f64; 6], offsets: [f64; 6]) -> Option<Fit> {
         residual = residual.max(norm(p)).max(norm(r) * 100.0);
     }
     (residual < 1e-3 && lengths[4] > 0.0).then_some(Fit { arm, flange, residual })
+}
+
+/// Joint values far from each other, to compare arms at.
+fn poses() -> Vec<[f64; 6]> {
+    (0..8).map(|n| [0, 1, 2, 3, 4, 5].map(|i| libm::sin((n * 7 + i * 3 + 1) as f64) * 1.4)).collect()
+}
+
+/// Lengths of an arm whose place is a sum of lengths times directions, from places where it should be; `column` is where it is
+/// when one length is 1 and the others are 0.
+fn least_squares<const N: usize>(
+    poses: &[[f64; 6]],
+    want: impl Fn(&[f64; 6]) -> Option<V3>,
+    column: impl Fn(usize, &[f64; 6]) -> Option<V3>,
+) -> Option<[f64; N]> {
+    let (mut a, mut b) = (vec![vec![0.0; N]; N], vec![0.0; N]);
+    for q in poses {
+        let want = want(q)?;
+        let columns: Vec<V3> = (0..N).map(|i| column(i, q)).collect::<Option<_>>()?;
+        for i in 0..N {
+            (0..N).for_each(|k| a[i][k] += dot(columns[i], columns[k]));
+            b[i] += dot(columns[i], want);
+        }
+    }
+    let found = crate::math::solve(a, b)?;
+    Some(std::array::from_fn(|i| if found[i].abs() < 1e-6 { 0.0 } else { found[i] }))
+}
+
+/// The arm with an offset wrist that equals a chain seen from `base`, if there is one.
+pub(crate) fn offset_wrist(chain: &Serial, base: &Frame) -> Option<ParallelWrist> {
+    if chain.links().len() != 6 || chain.links().iter().any(|l| l.kind != JointKind::Revolute) {
+        return None;
+    }
+    let seen = |q: &[f64; 6]| Some(base.inverse().then(&chain.forward_frame(q).ok()?));
+    let unit = |i: usize| ParallelWrist::new(std::array::from_fn(|k| if i == k { 1.0 } else { 0.0 }));
+    let poses = poses();
+    let column = |i: usize, q: &[f64; 6]| Some(unit(i).forward_frame(q).ok()?.position);
+    let arm = ParallelWrist::new(least_squares(&poses, |q| Some(seen(q)?.position), column)?);
+    let equal = |q: &[f64; 6]| {
+        let (p, r) = arm.forward_frame(q).ok()?.error_to(&seen(q)?);
+        (norm(p) < 1e-3 && norm(r) < 1e-5).then_some(())
+    };
+    let [_, a2, a3, ..] = arm.lengths();
+    (a2 != 0.0 && a3 != 0.0 && poses.iter().all(|q| equal(q).is_some())).then_some(arm)
 }

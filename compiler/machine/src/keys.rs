@@ -127,7 +127,7 @@ pub(crate) static ROOT: &[Key] = &[
     key("joint", Tables(JOINT), "Joints, from the base to the tool."),
     key("external", Tables(EXTERNAL), "Rails and positioners."),
     key("coupling", Table(COUPLING), "Two joints that the controller counts together."),
-    key("frames", Table(FRAMES), "Base, table and part."),
+    key("frames", Table(FRAMES), "Base, table and part; where the controller counts from."),
     key(
         "frame",
         Tables(FRAME),
@@ -237,6 +237,11 @@ static FRAMES: &[Key] = &[
     key("base", Table(PLACE), "The machine in the cell."),
     key("table", Table(PLACE), "The table in the base."),
     key("part", Table(PLACE), "The part on the table."),
+    key(
+        "controller",
+        Table(PLACE),
+        "Where the controller's own coordinates (world, robot base) lie in the base: work frames of robot programs are counted from there. Left out: at the foot of the robot; for fanuc-ls, inform and val3 on axis 1 at the height of axis 2 (c1 of `lengths`).",
+    ),
 ];
 
 static FRAME: &[Key] = &[

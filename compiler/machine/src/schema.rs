@@ -603,6 +603,7 @@ impl Check {
             base: frame("base"),
             table: frame("table"),
             part: frame("part"),
+            controller_frame: frames.and_then(|f| f.get("controller")).map(place),
             frames: list("frame").iter().map(|f| (f.string("name").unwrap_or_default(), place(f))).collect(),
             tools: self.tools(list("tool")),
             spindle: raw.get("spindle").and_then(|s| self.spindle(s)),

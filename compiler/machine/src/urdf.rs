@@ -1,5 +1,6 @@
 use crate::math::{Frame, V3, norm, scale};
-use crate::{JointKind, Link, Pose, Serial, identify};
+use crate::identify::offset_wrist;
+use crate::{JointKind, Link, ParallelWrist, Pose, Serial, identify};
 use std::fmt::Write as _;
 use urdf_rs::JointType;
 
@@ -15,11 +16,13 @@ pub struct Import {
 }
 
 /// Makes a machine file of a URDF: the chain of joints from the base to the link `tip`, or without one to the end of the arm. An arm with an ortho-parallel base
-/// and a spherical wrist gets OPW lengths, every other one its joint frames and the numerical inverse.
+/// and a spherical wrist gets OPW lengths, one with an offset wrist as Universal Robots' those of `ur`, every other one its joint
+/// frames and the numerical inverse. A link `base` beside `base_link` is the frame the controller counts from.
 pub fn import_urdf(id: &str, text: &str, tip: Option<&str>) -> Result<Import, String> {
     let robot = urdf_rs::read_from_string(text).map_err(|e| format!("the file is no URDF: {e}"))?;
     let mut notes = Vec::new();
     let path = to_tool(&robot, tip, &mut notes)?;
+    let mut base = controller_base(&robot, &path)?;
     let (links, names, speeds, tip) = chain(&path, &mut notes)?;
     let chain = Serial::new(links, tip);
     if path.iter().any(|j| j.mimic.is_some()) {
@@ -35,16 +38,72 @@ pub fn import_urdf(id: &str, text: &str, tip: Option<&str>) -> Result<Import, St
             let _ = writeln!(toml, "offsets = [{}]\nsigns = [{}]", list(&fit.arm.offsets().map(f64::to_degrees)), list(&fit.arm.signs()));
             joints(&mut toml, &chain, &names, &speeds, false);
         }
-        other => {
-            notes.push(match other {
-                Ok(_) => "its flange is turned against the one of the closed form; its joint frames are kept".to_string(),
-                Err(why) => format!("no closed form: {why}; inverse kinematics will search"),
-            });
-            let _ = writeln!(toml, "kind = \"origins\"\ntip = [{}]", place(chain.tip()));
-            joints(&mut toml, &chain, &names, &speeds, true);
-        }
+        other => match from_controller(&chain, base) {
+            Some((arm, from)) => {
+                let list = arm.lengths().map(tidy).join(", ");
+                let _ = writeln!(toml, "kind = \"ur\"\n# d1 a2 a3 d4 d5 d6\nlengths = [{list}]");
+                joints(&mut toml, &chain, &names, &speeds, false);
+                if !same(&from, &Frame::IDENTITY) {
+                    notes.push(format!("the base of the machine file is the controller's, which lies at [{}] (mm, degrees) in the first link of the URDF: give frames and parts as the robot's panel counts them", place(&from)));
+                }
+                base = None;
+            }
+            None => {
+                notes.push(match other {
+                    Ok(_) => "its flange is turned against the one of the closed form; its joint frames are kept".to_string(),
+                    Err(why) => format!("no closed form: {why}; its dimensions are not those of `kind = \"ur\"` either; inverse kinematics will search"),
+                });
+                let _ = writeln!(toml, "kind = \"origins\"\ntip = [{}]", place(chain.tip()));
+                joints(&mut toml, &chain, &names, &speeds, true);
+            }
+        },
+    }
+    if let Some(base) = base.filter(|b| !same(b, &Frame::IDENTITY)) {
+        let pose = Pose::from_frame(&base);
+        let list = |v: V3| v.map(tidy).join(", ");
+        let _ = write!(toml, "\n# The link `base`: where the controller counts from.\n[frames.controller]\n");
+        let _ = write!(toml, "position = [{}]\nrotation = [{}]\n", list(pose.position), list(pose.rotation.map(f64::to_degrees)));
+        notes.push(format!("its controller counts from the link `base`, at [{}] (mm, degrees): see `[frames.controller]`", place(&base)));
     }
     Ok(Import { toml, chain, notes })
+}
+
+/// The arm with an offset wrist that a chain is, and the base it is so seen from: the controller's, and where the file has none,
+/// the root or the root turned by half a turn, as in the files of Universal Robots.
+fn from_controller(chain: &Serial, base: Option<Frame>) -> Option<(ParallelWrist, Frame)> {
+    let turned = Frame::new([0.0; 3], [0.0, 0.0, std::f64::consts::PI]);
+    let bases = base.map_or(vec![Frame::IDENTITY, turned], |b| vec![b]);
+    bases.into_iter().find_map(|b| Some((offset_wrist(chain, &b)?, b)))
+}
+
+/// The link `base` of an arm whose own first link is `base_link` (ROS-Industrial's names, both with the same prefix), seen from
+/// the root: where the controller counts from.
+fn controller_base(robot: &urdf_rs::Robot, path: &[&urdf_rs::Joint]) -> Result<Option<Frame>, String> {
+    let Some(root) = path.first().map(|j| j.parent.link.as_str()) else { return Ok(None) };
+    let standing = path.iter().take_while(|j| !moves(j)).map(|j| j.child.link.as_str());
+    for link in std::iter::once(root).chain(standing) {
+        let Some(name) = link.strip_suffix("_link").filter(|n| n.ends_with("base")) else { continue };
+        if !robot.links.iter().any(|l| l.name == name) {
+            continue;
+        }
+        let way = path_to(robot, name)?;
+        let from_root = way.first().map_or(name, |j| j.parent.link.as_str()) == root;
+        if from_root && !way.iter().any(|j| moves(j)) {
+            return Ok(Some(way.iter().fold(Frame::IDENTITY, |f, j| f.then(&placed(j)))));
+        }
+    }
+    Ok(None)
+}
+
+fn same(a: &Frame, b: &Frame) -> bool {
+    let (p, r) = a.error_to(b);
+    norm(p) < 1e-6 && norm(r) < 1e-9
+}
+
+/// Where a joint is on its parent.
+fn placed(joint: &urdf_rs::Joint) -> Frame {
+    let (xyz, rpy): (V3, V3) = (*joint.origin.xyz, *joint.origin.rpy);
+    Frame { turn: square(rpy), position: scale(xyz, 1000.0) }
 }
 
 fn joints(toml: &mut String, chain: &Serial, names: &[String], speeds: &[f64], origins: bool) {
@@ -145,8 +204,7 @@ fn chain(path: &[&urdf_rs::Joint], notes: &mut Vec<String>) -> Result<Parts, Str
     let (mut links, mut names, mut speeds) = (Vec::new(), Vec::new(), Vec::new());
     let mut here = Frame::IDENTITY;
     for joint in path {
-        let (xyz, rpy): (V3, V3) = (*joint.origin.xyz, *joint.origin.rpy);
-        here = here.then(&Frame { turn: square(rpy), position: scale(xyz, 1000.0) });
+        here = here.then(&placed(joint));
         if joint.joint_type == JointType::Fixed {
             continue;
         }

@@ -85,7 +85,13 @@ fn imported_arms_equal_their_urdf() {
         };
         let import = import_urdf("test/arm", &urdf(&chain, turn), None).unwrap();
         let machine = parse(FileId(0), &import.toml).unwrap_or_else(|e| panic!("{e:?}\n{}", import.toml));
-        assert!(matches!(machine.chain, Chain::Opw(_)), "{id}: {:?}\n{}", import.notes, import.toml);
+        // As the library has the arm: front is front, which configurations of controllers rest on.
+        let (Chain::Opw(arm), Chain::Opw(known)) = (&machine.chain, builtin(id).unwrap().chain) else {
+            panic!("{id}: {:?}\n{}", import.notes, import.toml)
+        };
+        let off = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(off(&arm.lengths(), &known.lengths()) < 1e-6, "{id}: {:?} {:?}", arm.lengths(), known.lengths());
+        assert!(off(&arm.offsets()[..3], &known.offsets()[..3]) < 1e-9 && arm.signs()[..3] == known.signs()[..3], "{id}\n{}", import.toml);
         for q in poses() {
             let (p, r) = machine.kinematics().forward_frame(&q).unwrap().error_to(&chain.forward_frame(&q).unwrap());
             assert!(norm(p) < 1e-6 && norm(r) < 1e-9, "{id}: {p:?} {r:?}");
@@ -152,4 +158,71 @@ fn an_arm_ends_where_its_gripper_begins() {
     assert_eq!(import_urdf("test/arm", &text, Some("f1")).unwrap().chain.links().len(), 7);
     assert!(import_urdf("test/arm", &text, Some("elbow")).unwrap_err().contains("no link `elbow`; its links are "));
     assert!(plain.notes.iter().all(|n| !n.contains("left out")), "{:?}", plain.notes);
+}
+
+/// A fixed link `base` beside `base_link`.
+fn with_base(text: &str, prefix: &str, origin: &str) -> String {
+    let base = format!("<link name=\"{prefix}base\"/><joint name=\"to_base\" type=\"fixed\"><parent link=\"{prefix}base_link\"/><child link=\"{prefix}base\"/><origin {origin}/></joint>\n</robot>");
+    text.replace("base_link", &format!("{prefix}base_link")).replace("</robot>", &base)
+}
+
+/// The link `base` is where the controller counts from: on a FANUC at the height of its second axis.
+#[test]
+fn the_controller_counts_from_the_link_base() {
+    let (_, chain, _) = rows().into_iter().find(|r| r.0 == "fanuc/m-20ia").unwrap();
+    let arm = urdf(&chain, [3.1415926, -1.570796, 0.0]);
+    for prefix in ["", "left_"] {
+        let import = import_urdf("test/arm", &with_base(&arm, prefix, "xyz=\"0 0 0.525\" rpy=\"0 0 0\""), None).unwrap();
+        let machine = parse(FileId(0), &import.toml).unwrap_or_else(|e| panic!("{e:?}\n{}", import.toml));
+        assert_eq!(machine.cell.controller_frame, Some(Frame::shift([0.0, 0.0, 525.0])), "{}", import.toml);
+        assert!(import.notes.iter().any(|n| n.contains("counts from the link `base`")), "{:?}", import.notes);
+    }
+    // Where both are one, nothing is to be said.
+    let same = import_urdf("test/arm", &with_base(&arm, "", "xyz=\"0 0 0\" rpy=\"0 0 0\""), None).unwrap();
+    assert_eq!(same, import_urdf("test/arm", &arm, None).unwrap());
+}
+
+/// Joint origins of ros-industrial/universal_robot's ur_description for the UR5, whose root looks backwards.
+fn ur5(d5: f64, controller: bool) -> String {
+    let rows = [
+        ("base_link", "base_link_inertia", "0 0 0", "0 0 3.141592653589793"),
+        ("base_link_inertia", "shoulder", "0 0 0.089159", "0 0 0"),
+        ("shoulder", "upper_arm", "0 0 0", "1.570796327 0 0"),
+        ("upper_arm", "forearm", "-0.425 0 0", "0 0 0"),
+        ("forearm", "wrist_1", "-0.39225 0 0.10915", "0 0 0"),
+        ("wrist_1", "wrist_2", &format!("0 {} 0", -d5), "1.570796327 0 0"),
+        ("wrist_2", "wrist_3", "0 0.0823 0", "1.570796326589793 3.141592653589793 3.141592653589793"),
+        ("wrist_3", "flange", "0 0 0", "0 -1.570796326589793 -1.570796326589793"),
+        ("flange", "tool0", "0 0 0", "1.570796326589793 0 1.570796326589793"),
+    ];
+    let mut out = String::from("<robot name=\"ur5\"><link name=\"base_link\"/>");
+    for (i, (parent, child, xyz, rpy)) in rows.iter().enumerate() {
+        let kind = if (1..7).contains(&i) { "revolute" } else { "fixed" };
+        out += &format!("<link name=\"{child}\"/><joint name=\"j{i}\" type=\"{kind}\"><parent link=\"{parent}\"/><child link=\"{child}\"/><origin xyz=\"{xyz}\" rpy=\"{rpy}\"/><axis xyz=\"0 0 1\"/><limit lower=\"-6\" upper=\"6\" effort=\"1\" velocity=\"3\"/></joint>");
+    }
+    out += "</robot>";
+    if controller { with_base(&out, "", "xyz=\"0 0 0\" rpy=\"0 0 3.141592653589793\"") } else { out }
+}
+
+/// An arm of Universal Robots is the library's, seen from the controller's base, with a link `base` and without.
+#[test]
+fn arms_with_an_offset_wrist_have_their_closed_form() {
+    let known = builtin("universal-robots/ur5").unwrap();
+    for controller in [true, false] {
+        let import = import_urdf("test/ur", &ur5(0.09465, controller), None).unwrap();
+        let machine = parse(FileId(0), &import.toml).unwrap_or_else(|e| panic!("{e:?}\n{}", import.toml));
+        assert!(matches!(machine.chain, Chain::ParallelWrist(_)) && machine.cell.controller_frame.is_none(), "{}", import.toml);
+        assert!(import.notes.iter().any(|n| n.contains("as the robot's panel counts them")), "{:?}", import.notes);
+        for q in poses() {
+            let (p, r) = machine.kinematics().forward_frame(&q).unwrap().error_to(&known.kinematics().forward_frame(&q).unwrap());
+            assert!(norm(p) < 1e-6 && norm(r) < 1e-9, "{p:?} {r:?}");
+        }
+    }
+    // One whose wrist is askew, as calibrated ones are, keeps its frames and the controller's.
+    let askew = ur5(0.09465, true).replace("-0.425 0 0\" rpy=\"0 0 0", "-0.425 0 0\" rpy=\"0.001 0 0");
+    let import = import_urdf("test/ur", &askew, None).unwrap();
+    let machine = parse(FileId(0), &import.toml).unwrap_or_else(|e| panic!("{e:?}\n{}", import.toml));
+    assert!(matches!(machine.chain, Chain::Serial(_)) && import.notes.iter().any(|n| n.contains("`kind = \"ur\"` either")), "{:?}", import.notes);
+    let turned = machine.cell.controller_frame.expect("the link base");
+    assert!((turned.turn[0][0] + 1.0).abs() < 1e-12 && norm(turned.position) == 0.0, "{}", import.toml);
 }

@@ -7,7 +7,7 @@
 use crate::name::{Names, Rule};
 use crate::number::{fix, num};
 use crate::val3::escape;
-use crate::walk::{Arms, Body, Cx, Op, Traits, Value, any_error, walk};
+use crate::walk::{Arms, Body, Cx, Op, Traits, Value, World, any_error, walk};
 use crate::{Language, Options, Output, OutputFile, orient};
 use gr_ir::Sources;
 use gr_machine::JointKind;
@@ -21,6 +21,7 @@ pub(crate) struct Delmia;
 static TRAITS: Traits = Traits {
     title: "DELMIA XML",
     arms: Arms::Any,
+    world: World::Foot,
     arcs: true,
     trailing: false,
     unverified: "the schema of the upload is not public; joint targets are as the V5 help describes them",
@@ -74,7 +75,7 @@ impl Writer {
         }
         out += "      </AccuracyProfileList>\n      <ObjectFrameProfileList>\n";
         for f in &program.frames {
-            let pose = pose(&program.machine.cell.in_control(&f.frame), [0.0; 3]).0;
+            let pose = pose(&TRAITS.in_control(&program.machine, &f.frame), [0.0; 3]).0;
             let _ = write!(
                 out,
                 "        <ObjectFrameProfile><Name>{}</Name><ObjectFrame>{pose}</ObjectFrame></ObjectFrameProfile>\n",

@@ -5,7 +5,7 @@ use crate::name::{Names, Rule};
 use crate::number::num;
 use crate::parts::Lines;
 use crate::plain::{Plain, corner, joints, one_file};
-use crate::walk::{Arms, Cx, Traits};
+use crate::walk::{Arms, Cx, Traits, World};
 use crate::{Language, Options, Output};
 use gr_ir::Sources;
 use gr_machine::math::{Frame, norm};
@@ -16,6 +16,7 @@ pub(crate) struct Denso;
 static TRAITS: Traits = Traits {
     title: "DENSO PAC",
     arms: Arms::Any,
+    world: World::Foot,
     arcs: true,
     trailing: true,
     unverified: "speeds in mm/s by MPS, and joint values in straight moves",

@@ -9,7 +9,7 @@ use crate::name::{Names, Rule};
 use crate::number::{fix, num};
 use crate::parts::Parts;
 use crate::probe::{NOT_READY, NOT_TRIPPED};
-use crate::walk::{Arms, Body, Cx, Op, Traits, Value, any_error, walk, wrapped};
+use crate::walk::{Arms, Body, Cx, Op, Traits, Value, World, any_error, walk, wrapped};
 use crate::{Language, Options, Output, OutputFile, orient};
 use gr_ir::Sources;
 use gr_machine::math::{Frame, turn_of};
@@ -19,7 +19,7 @@ use std::fmt::Write;
 
 pub(crate) struct Fanuc;
 
-static TRAITS: Traits = Traits { title: "FANUC TP", arms: Arms::Spherical, arcs: true, trailing: false, unverified: "" };
+static TRAITS: Traits = Traits { title: "FANUC TP", arms: Arms::Spherical, world: World::Shoulder, arcs: true, trailing: false, unverified: "" };
 
 const LINES: u64 = 9999;
 /// The position registers that carry frames to the controller.
@@ -297,7 +297,7 @@ impl Writer {
             self.set_frame(&format!("UTOOL[{}]", i + 1), REGISTER + 1, &tool.frame);
         }
         for (i, frame) in cx.program.frames.iter().enumerate().take(9) {
-            self.set_frame(&format!("UFRAME[{}]", i + 1), REGISTER, &cx.machine.cell.in_control(&frame.frame));
+            self.set_frame(&format!("UFRAME[{}]", i + 1), REGISTER, &TRAITS.in_control(cx.machine, &frame.frame));
         }
         self.line("  UFRAME_NUM=1");
         self.line("  UTOOL_NUM=1");

@@ -5,7 +5,7 @@
 use crate::name::{Names, Rule};
 use crate::number::{fix, num};
 use crate::parts::Parts;
-use crate::walk::{Arms, Body, Cx, Op, Traits, Value, any_error, walk, wrapped};
+use crate::walk::{Arms, Body, Cx, Op, Traits, Value, World, any_error, walk, wrapped};
 use crate::{Language, Options, Output, OutputFile, orient};
 use gr_ir::Sources;
 use gr_machine::math::{Frame, quaternion_of, turn_of};
@@ -15,7 +15,7 @@ use std::fmt::Write;
 
 pub(crate) struct Inform;
 
-static TRAITS: Traits = Traits { title: "Yaskawa INFORM", arms: Arms::Spherical, arcs: true, trailing: false, unverified: "" };
+static TRAITS: Traits = Traits { title: "Yaskawa INFORM", arms: Arms::Spherical, world: World::Shoulder, arcs: true, trailing: false, unverified: "" };
 
 const LINES: u64 = 2000;
 
@@ -216,7 +216,7 @@ impl Body for Writer {
             }
             Op::Frame(i) => {
                 self.room(12);
-                let frame = cx.machine.cell.in_control(&cx.program.frames[i].frame);
+                let frame = cx.frame_in_control(i);
                 self.set_by_hand(cx, format!("UF {}", i + 1), &frame);
             }
             Op::Set { name, value, word } => {

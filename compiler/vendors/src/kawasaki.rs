@@ -6,7 +6,7 @@ use crate::name::{Names, Rule};
 use crate::number::{num, single};
 use crate::parts::Lines;
 use crate::plain::{Plain, corner, joints, one_file, six};
-use crate::walk::{Arms, Cx, Traits};
+use crate::walk::{Arms, Cx, Traits, World};
 use crate::{Language, Options, Output, orient};
 use gr_ir::Sources;
 use gr_machine::math::Frame;
@@ -17,6 +17,7 @@ pub(crate) struct Kawasaki;
 static TRAITS: Traits = Traits {
     title: "Kawasaki AS",
     arms: Arms::Spherical,
+    world: World::Foot,
     arcs: true,
     trailing: true,
     unverified: "joint values and transformations within the move instructions",

@@ -8,7 +8,7 @@ use crate::name::{Names, Rule};
 use crate::number::{num, real, single};
 use crate::parts::Parts;
 use crate::probe::{NOT_READY, NOT_TRIPPED};
-use crate::walk::{Arms, Body, Cx, Op, Traits, Value, any_error, walk, wrapped};
+use crate::walk::{Arms, Body, Cx, Op, Traits, Value, World, any_error, walk, wrapped};
 use crate::{Language, Options, Output, OutputFile, orient};
 use gr_ir::Sources;
 use gr_machine::math::{Frame, turn_of};
@@ -16,7 +16,7 @@ use gr_robot::{RobotProgram, Target};
 
 pub(crate) struct Krl;
 
-static TRAITS: Traits = Traits { title: "KUKA KRL", arms: Arms::Spherical, arcs: true, trailing: true, unverified: "" };
+static TRAITS: Traits = Traits { title: "KUKA KRL", arms: Arms::Spherical, world: World::Foot, arcs: true, trailing: true, unverified: "" };
 
 const RESERVED: &[&str] = &[
     "AND", "ANIN", "ANOUT", "B_AND", "B_EXOR", "B_NOT", "B_OR", "BOOL", "BRAKE", "CASE", "CAST_FROM", "CAST_TO", "CHANNEL", "CHAR",
@@ -259,7 +259,7 @@ impl Body for Writer {
             Op::Frame(i) => {
                 let frame = &cx.program.frames[i];
                 let note = cx.ascii(&frame.name);
-                self.frame("$BASE", &cx.machine.cell.in_control(&frame.frame), &note);
+                self.frame("$BASE", &cx.frame_in_control(i), &note);
             }
             Op::Set { name, value, word } => {
                 let n = cx.number(name, word);

@@ -7,7 +7,7 @@ use crate::name::{Names, Rule};
 use crate::number::{num, single};
 use crate::parts::Lines;
 use crate::plain::{Plain, corner, joints, one_file, six};
-use crate::walk::{Arms, Cx, Traits};
+use crate::walk::{Arms, Cx, Traits, World};
 use crate::{Language, Options, Output, orient};
 use gr_ir::Sources;
 use gr_machine::math::Frame;
@@ -19,6 +19,7 @@ pub(crate) struct Melfa;
 static TRAITS: Traits = Traits {
     title: "MELFA-BASIC",
     arms: Arms::Any,
+    world: World::Foot,
     arcs: true,
     trailing: true,
     unverified: "the structure flags of positions",

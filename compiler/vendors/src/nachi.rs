@@ -6,7 +6,7 @@
 use crate::name::{Names, Rule};
 use crate::number::{fix, num};
 use crate::parts::Lines;
-use crate::walk::{Arms, Body, Cx, Op, Traits, Value, any_error, walk};
+use crate::walk::{Arms, Body, Cx, Op, Traits, Value, World, any_error, walk};
 use crate::{Language, Options, Output, OutputFile, orient};
 use gr_ir::Sources;
 use gr_robot::{RobotProgram, Target};
@@ -16,6 +16,7 @@ pub(crate) struct Nachi;
 static TRAITS: Traits = Traits {
     title: "Nachi robot language",
     arms: Arms::Spherical,
+    world: World::Foot,
     arcs: true,
     trailing: false,
     unverified: "the move instruction's mechanism and pose fields, and the numbers of functions",
@@ -47,7 +48,7 @@ struct Writer {
 
 impl Writer {
     fn place(&mut self, cx: &Cx, t: &Target) -> String {
-        let frame = cx.program.frames.get(cx.frame).map(|f| f.frame).unwrap_or_default();
+        let frame = cx.frame_in_control(cx.frame);
         let seen = frame.then(&orient::frame(t.position, &t.quaternion));
         let [y, p, r] = orient::fixed_xyz(&seen.turn, self.angles);
         self.angles = [y, p, r];

@@ -7,7 +7,7 @@ use crate::name::{Names, Rule};
 use crate::number::{num, single};
 use crate::parts::Lines;
 use crate::plain::{Plain, corner, joints, one_file, per_cent, six};
-use crate::walk::{Arms, Cx, Traits};
+use crate::walk::{Arms, Cx, Traits, World};
 use crate::{Language, Options, Output, orient};
 use gr_ir::Sources;
 use gr_machine::math::Frame;
@@ -18,6 +18,7 @@ pub(crate) struct Pdl2;
 static TRAITS: Traits = Traits {
     title: "Comau PDL2",
     arms: Arms::Any,
+    world: World::Foot,
     arcs: true,
     trailing: true,
     unverified: "the configuration text of positions, and that straight moves don't heed it",

@@ -64,7 +64,7 @@ impl<W: Plain> Body for W {
                 self.tool(cx, i, &frame);
             }
             Op::Frame(i) => {
-                let frame = cx.machine.cell.in_control(&cx.program.frames[i].frame);
+                let frame = cx.frame_in_control(i);
                 self.frame(cx, i, &frame);
             }
             Op::Set { name, value, word } => set(self, cx, name, value, word),

@@ -8,7 +8,7 @@ use crate::name::{Names, Rule};
 use crate::number::{down, num, short, single};
 use crate::parts::Parts;
 use crate::probe::{NOT_READY, NOT_TRIPPED};
-use crate::walk::{Arms, Body, Cx, Op, Traits, Value, any_error, walk, wrapped};
+use crate::walk::{Arms, Body, Cx, Op, Traits, Value, World, any_error, walk, wrapped};
 use crate::{Language, Options, Output, OutputFile};
 use gr_ir::Sources;
 use gr_machine::math::{Frame, quaternion_of};
@@ -20,7 +20,7 @@ use std::sync::LazyLock;
 
 pub(crate) struct Rapid;
 
-static TRAITS: Traits = Traits { title: "ABB RAPID", arms: Arms::Spherical, arcs: true, trailing: true, unverified: "" };
+static TRAITS: Traits = Traits { title: "ABB RAPID", arms: Arms::Spherical, world: World::Foot, arcs: true, trailing: true, unverified: "" };
 
 /// Names that RAPID has itself: reserved words, instructions, functions, data types and data.
 static RESERVED: LazyLock<Vec<&str>> = LazyLock::new(|| {
@@ -132,7 +132,7 @@ impl Writer {
             let _ = write!(
                 head,
                 "  TASK PERS wobjdata {name}:=[FALSE,TRUE,\"\",{},[[0,0,0],[1,0,0,0]]];\r\n",
-                pose(&program.machine.cell.in_control(&frame.frame))
+                pose(&TRAITS.in_control(&program.machine, &frame.frame))
             );
         }
         for (value, name) in by_name(&self.speeds) {

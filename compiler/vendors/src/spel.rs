@@ -6,7 +6,7 @@ use crate::name::{Names, Rule};
 use crate::number::{num, single};
 use crate::parts::Lines;
 use crate::plain::{Plain, joints, one_file, per_cent, six};
-use crate::walk::{Arms, Cx, Traits};
+use crate::walk::{Arms, Cx, Traits, World};
 use crate::{Language, Options, Output, orient};
 use gr_ir::Sources;
 use gr_machine::math::Frame;
@@ -17,6 +17,7 @@ pub(crate) struct Spel;
 static TRAITS: Traits = Traits {
     title: "Epson SPEL+",
     arms: Arms::Any,
+    world: World::Foot,
     arcs: true,
     trailing: true,
     unverified: "points written within moves, without flags of the arm",

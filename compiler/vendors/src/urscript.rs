@@ -7,7 +7,7 @@
 use crate::name::{Names, Rule};
 use crate::number::{num, single};
 use crate::probe::{NOT_READY, NOT_TRIPPED};
-use crate::walk::{Arms, Body, Cx, Op, Traits, Value, any_error, walk, wrapped};
+use crate::walk::{Arms, Body, Cx, Op, Traits, Value, World, any_error, walk, wrapped};
 use crate::{Language, Options, Output, OutputFile, orient};
 use gr_ir::Sources;
 use gr_machine::math::Frame;
@@ -18,7 +18,7 @@ use std::fmt::Write;
 pub(crate) struct UrScript;
 
 static TRAITS: Traits =
-    Traits { title: "URScript", arms: Arms::Six, arcs: true, trailing: true, unverified: "" };
+    Traits { title: "URScript", arms: Arms::Six, world: World::Foot, arcs: true, trailing: true, unverified: "" };
 
 const RESERVED: &[&str] = &[
     "AND", "BREAK", "CONTINUE", "DEF", "ELIF", "ELSE", "END", "FALSE", "FOR", "GLOBAL", "HALT", "IF", "IN", "LOCAL", "NOT", "OR", "PASS",
@@ -166,7 +166,7 @@ impl Writer {
 
 /// The pose in the base: meters and rotation vector.
 fn point(cx: &Cx, t: &Target) -> String {
-    let frame = cx.program.frames.get(cx.frame).map(|f| f.frame).unwrap_or_default();
+    let frame = cx.frame_in_control(cx.frame);
     pose(&frame.then(&orient::frame(t.position, &t.quaternion)), cx.decimals() + 3)
 }
 
@@ -226,7 +226,7 @@ impl Body for Writer {
             }
             Op::Frame(i) => {
                 let name = cx.ascii(&cx.program.frames[i].name);
-                self.line(cx, &format!("# frame {name}: {}", pose(&cx.program.frames[i].frame, 7)));
+                self.line(cx, &format!("# frame {name}: {}", pose(&cx.frame_in_control(i), 7)));
             }
             Op::Set { name, value, word } => {
                 let n = cx.number(name, word);

@@ -1,23 +1,22 @@
 //! Stäubli VAL3 (CS8, CS9): a folder with project, data and programs, all XML.
 //!
 //! Joint moves are joint values; straight moves and arcs keep the configuration they start with (`ssame` …), so no
-//! configuration need be said. The controller's world lies at the height of the second joint.
+//! configuration need be said.
 
 use crate::name::{Names, Rule};
 use crate::number::{down, num};
 use crate::parts::Parts;
-use crate::walk::{Arms, Body, Cx, Op, Traits, Value, any_error, walk, wrapped};
+use crate::walk::{Arms, Body, Cx, Op, Traits, Value, World, any_error, walk, wrapped};
 use crate::{Language, Options, Output, OutputFile, orient};
 use gr_ir::Sources;
 use gr_machine::math::Frame;
-use gr_machine::{Chain, Machine};
 use gr_robot::{RobotProgram, Target};
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
 pub(crate) struct Val3;
 
-static TRAITS: Traits = Traits { title: "Stäubli VAL3", arms: Arms::Spherical, arcs: true, trailing: true, unverified: "" };
+static TRAITS: Traits = Traits { title: "Stäubli VAL3", arms: Arms::Spherical, world: World::Shoulder, arcs: true, trailing: true, unverified: "" };
 
 const RESERVED: &[&str] = &[
     "AND", "BEGIN", "BOOL", "BREAK", "CALL", "CASE", "CONFIG", "DEFAULT", "DO", "ELSE", "ELSEIF", "END", "ENDFOR", "ENDIF", "ENDSWITCH",
@@ -116,8 +115,7 @@ impl Writer {
              xmlns=\"http://www.staubli.com/robotics/VAL3/Data/2\">\n  <Datas>\n"
         );
         for (frame, name) in program.frames.iter().zip(&self.frames) {
-            let mut f = frame.frame;
-            f.position[2] -= shoulder(&program.machine);
+            let f = TRAITS.in_control(&program.machine, &frame.frame);
             array(&mut out, name, "frame", 1, &format!("      <Value key=\"0\" {} fatherId=\"world[0]\" />\n", pose(&f, [0.0; 3], 4).0));
         }
         for (tool, name) in program.tools.iter().zip(&self.tools) {
@@ -226,14 +224,6 @@ fn pose(frame: &Frame, before: [f64; 3], decimals: usize) -> (String, [f64; 3]) 
     let (p, r) = (frame.position.map(|v| num(v, decimals)), angles.map(|v| num(v.to_degrees(), 5)));
     let text = format!("x=\"{}\" y=\"{}\" z=\"{}\" rx=\"{}\" ry=\"{}\" rz=\"{}\"", p[0], p[1], p[2], r[0], r[1], r[2]);
     (text, angles)
-}
-
-/// Height of the second joint over the base.
-fn shoulder(machine: &Machine) -> f64 {
-    match &machine.chain {
-        Chain::Opw(arm) => arm.lengths()[3],
-        _ => 0.0,
-    }
 }
 
 /// Text in XML.

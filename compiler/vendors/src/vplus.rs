@@ -8,7 +8,7 @@ use crate::name::{Names, Rule};
 use crate::number::{num, single};
 use crate::parts::Lines;
 use crate::plain::{Plain, joints, one_file, six};
-use crate::walk::{Arms, Cx, Traits};
+use crate::walk::{Arms, Cx, Traits, World};
 use crate::{Language, Options, Output, orient};
 use gr_ir::Sources;
 use gr_machine::math::Frame;
@@ -19,6 +19,7 @@ pub(crate) struct VPlus;
 static TRAITS: Traits = Traits {
     title: "Adept V+",
     arms: Arms::Any,
+    world: World::Foot,
     arcs: false,
     trailing: true,
     unverified: "zero and sense of the arm's joints as the controller counts them",

@@ -6,7 +6,7 @@ use crate::orient;
 use crate::posture::Posture;
 use crate::{Options, Output};
 use gr_ir::{Source, Sources};
-use gr_machine::math::{about, add, cross, dot, norm, quaternion_of, rotate, scale, sub};
+use gr_machine::math::{Frame, about, add, cross, dot, norm, quaternion_of, rotate, scale, sub};
 use gr_machine::{Chain, Kinematics, Machine, Signal};
 use gr_robot::{Action, MAX_JOINTS, RobotProgram, Target, Word, Zone};
 use gr_text::{Code, Diagnostic, FileId, Findings, Span, code};
@@ -69,18 +69,40 @@ pub(crate) enum Arms {
     Any,
 }
 
+/// Where the controllers of a language count work frames from, when the machine file has no `[frames.controller]`.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(crate) enum World {
+    /// The foot of the robot.
+    Foot,
+    /// On the first axis, at the height of the second.
+    Shoulder,
+}
+
 /// What the walk must know of a language.
 pub(crate) struct Traits {
     /// `ABB RAPID`
     pub title: &'static str,
     /// Machines.
     pub arms: Arms,
+    /// Zero point of work frames.
+    pub world: World,
     /// Arcs through a point.
     pub arcs: bool,
     /// Source lines are remarked behind moves; otherwise in lines of their own.
     pub trailing: bool,
     /// Why it needs `--allow-unverified`; empty = it doesn't.
     pub unverified: &'static str,
+}
+
+impl Traits {
+    /// A frame in the machine's base as the controller counts it.
+    pub(crate) fn in_control(&self, machine: &Machine, frame: &Frame) -> Frame {
+        let usual = match (&machine.chain, self.world) {
+            (Chain::Opw(arm), World::Shoulder) => Frame::shift([0.0, 0.0, arm.lengths()[3]]),
+            _ => Frame::IDENTITY,
+        };
+        machine.cell.in_control(frame, &usual)
+    }
 }
 
 /// What writes a language.
@@ -166,6 +188,12 @@ pub(crate) fn walk<'p>(
 }
 
 impl<'p> Cx<'p> {
+    /// A work frame of the program as the controller counts it; the controller's own without one.
+    pub(crate) fn frame_in_control(&self, index: usize) -> Frame {
+        let frame = self.program.frames.get(index).map(|f| f.frame).unwrap_or_default();
+        self.traits.in_control(self.machine, &frame)
+    }
+
     fn fits(&mut self) -> bool {
         let joints = &self.machine.joints;
         let ok = match self.traits.arms {

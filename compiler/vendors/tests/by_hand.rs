@@ -126,6 +126,49 @@ fn val3() {
     has("val3", &p, &["j1=\"10\" j2=\"20\" j3=\"70\" j4=\"20\" j5=\"50\" j6=\"30\"", "shoulder=\"ssame\" elbow=\"esame\" wrist=\"wsame\""]);
 }
 
+/// Where the controller counts from. With the forearm level and the wrist bent down by 90° the tool (100 mm) of an M-20iA is at
+/// X 150 + 835 = 985, Z 525 + 790 + 250 − 100 − 100 = 1365 over its foot. Its world is on axis 1 at the height of axis 2, 525 mm
+/// up (URDF, `m20ia_macro.xacro`: "ROS base_link to Fanuc World Coordinates", 0 0 0.525): the control shows X 985, Z 840. The
+/// same of a GP25 (`gp25_macro.xacro`: "ROS base_link to Robot Manufacturer World Coordinates", 0 0 0.505): X 150 + 795 = 945,
+/// Z 760 + 200 − 100 − 100 = 760, seen from a user frame at X 500, Z 200 over its foot.
+#[test]
+fn worlds_of_controllers() {
+    let mut p = program("fanuc/m-20ia", [0.0, 0.0, 0.0, 0.0, -90.0, 0.0]);
+    p.targets[0].position = [985.0 - 500.0, 0.0, 1365.0 - 200.0];
+    has("fanuc-ls", &p, &["PR[91,1]=500.000    ;", "PR[91,3]=(-325.000)    ;", "PR[92,3]=100.000    ;"]);
+    let events = gr_vendors::read::read("fanuc-ls", &texts(&emit("fanuc-ls", &p))).unwrap();
+    let shown = events.iter().find_map(|e| match e {
+        gr_vendors::read::Event::Linear(place, ..) => Some(place.frame?.apply(place.pose?.position)),
+        _ => None,
+    });
+    assert_eq!(shown, Some([985.0, 0.0, 840.0]));
+
+    let mut p = program("yaskawa/gp25", [0.0, 0.0, 0.0, 0.0, -90.0, 0.0]);
+    p.home.joints = p.targets[0].joints;
+    // At home: Z 760 − (−305) in the user frame, which the operator sets.
+    has("inform", &p, &["'UF 1: X 500 Y 0 Z -305", "C00000=445.000,0.000,1065.000"]);
+    let told = emit("inform", &p).findings.iter().any(|f| format!("{f:?}").contains("X 500 Y 0 Z -305 Rx 0 Ry 0 Rz 0"));
+    assert!(told, "the hint has the same numbers");
+}
+
+/// The machine file's word comes before what is usual for a language; a UR whose base looks backwards: X −0.6, Y −0.05, and the
+/// turn about Z by 180° before the half turn about (cos 15°, sin 15°, 0) is one about (cos 105°, sin 105°, 0), or its opposite.
+#[test]
+fn a_controller_that_counts_from_elsewhere() {
+    let mut p = program("fanuc/m-20ia", [10.0, 10.0, -10.0, 20.0, -40.0, 20.0]);
+    p.machine.cell.controller_frame = Some(Frame::shift([0.0, 0.0, 0.0]));
+    has("fanuc-ls", &p, &["PR[91,3]=200.000    ;"]);
+    let mut p = program("universal-robots/ur5", [10.0, -80.0, 100.0, -100.0, -80.0, 20.0]);
+    p.machine.cell.controller_frame = Some(Frame::new([0.0; 3], [0.0, 0.0, std::f64::consts::PI]));
+    // π·cos 105° = −0.813104, π·sin 105° = 3.0345455.
+    let text = text("urscript", &p);
+    let told = ["-0.813104,3.0345455,0]", "0.813104,-3.0345455,0]"].iter().any(|r| text.contains(&format!("movel(p[-0.6,-0.05,0.205,{r}")));
+    assert!(told, "{text}");
+    let mut p = program("kuka/kr16-2", [-100.0, -80.0, 90.0, 135.0, -40.0, 10.0]);
+    p.machine.cell.controller_frame = Some(Frame::shift([0.0, 0.0, 50.0]));
+    has("krl", &p, &["X 500.0,Y 0.0,Z 150.0"]);
+}
+
 /// DELMIA: degrees and m; turns about Z, Y, X: yaw 30, pitch 0, roll 180.
 #[test]
 fn delmia() {

@@ -57,7 +57,9 @@ impl Compare<'_> {
     /// Follows a place and says where the tool comes to in the base.
     fn go(&mut self, place: &Place) -> Result<[f64; 3], String> {
         let mut place = place.clone();
-        if let (true, Chain::Opw(arm), Some(frame)) = (self.target == "val3", &self.program.machine.chain, &mut place.frame) {
+        // Their world lies at the height of the second axis.
+        let raised = matches!(self.target, "fanuc-ls" | "val3");
+        if let (true, Chain::Opw(arm), Some(frame)) = (raised, &self.program.machine.chain, &mut place.frame) {
             frame.position[2] += arm.lengths()[3];
         }
         let joints = place.resolve(self.machine(), &self.joints, &self.tool, &self.frame).ok_or(format!("{place:?} is not reached"))?;
