@@ -229,6 +229,16 @@ fn exchange(megabytes: usize) {
         50,
     );
     show("edit → definition", times);
+    // Where the file was looked at since the edit before: its tables have to be put away some time.
+    let mut idle = Vec::new();
+    for _ in 0..10 {
+        c.diagnostics();
+        let began = Instant::now();
+        c.edit(uri, line / 2 * 2 + 1, 1, 0, "");
+        drop(c.request("textDocument/definition", at.clone()));
+        idle.push(began.elapsed());
+    }
+    show("diagnostics, edit → definition", idle);
 }
 
 fn main() {
