@@ -266,7 +266,7 @@ fn setups_begin_from_above() {
     let program = text(&made.stdout);
     let lines: Vec<&str> = program.lines().collect();
     let stop = lines.iter().position(|l| l.contains("setup turned")).unwrap_or_else(|| panic!("{program}"));
-    insta::assert_snapshot!("setups_begin_from_above", lines[stop - 3..stop + 6].join("\n"));
+    insta::assert_snapshot!("setups_begin_from_above", lines[stop - 5..stop + 9].join("\n"));
 }
 
 /// What set-points can't say stands beside them; an option that has no effect is refused.

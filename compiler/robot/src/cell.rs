@@ -173,6 +173,19 @@ impl Cells {
         made
     }
 
+    /// Spindle and coolant off while somebody works at the part, and on again as they were.
+    pub fn rest(&mut self) -> (Made, Made) {
+        let (turning, speed, coolants) = (self.turning, self.speed, [("M7", self.mist), ("M8", self.flood)]);
+        let off = self.off();
+        let mut on = if turning == Turn::Stop { Made::NOTHING } else { self.turn(turning, speed) };
+        for (word, _) in coolants.into_iter().filter(|(_, was)| *was) {
+            let more = self.coolant(word, true, true);
+            on.actions.extend(more.actions);
+            on.by_hand = on.by_hand.or(more.by_hand);
+        }
+        (off, on)
+    }
+
     /// M62 … M65: a row for the output's own number (`M62P3`) comes before one for all.
     pub fn digital(&self, index: i32, on: bool, synced: bool) -> Made {
         let (own, other) = match (on, synced) {

@@ -621,6 +621,36 @@ fn places_of_the_machine_in_a_job() {
     assert_eq!(up.map(|p| p.map(|v| (v * 1e6).round() / 1e6)), Some([10.0, 10.0, 170.0]), "{}", told(&p));
 }
 
+/// While the operator clamps the part anew nothing spins or runs; then it does again as the program had it, before the tool comes.
+#[test]
+fn the_spindle_stands_while_the_part_is_clamped() {
+    let order = |on: &str, off: &str| {
+        let text = format!("G21 G90\nT1 M6\nG43 H1\n{on}\nG0 X10 Y10 Z20\nG1 Z0 F600\nG0 Z20\n{off}\nG0 X20 Y10\nG1 Z0\nG0 Z20\nM30\n");
+        let setup = |name: &str, line: u32| gr_robot::Setup {
+            name: name.into(),
+            from_line: Some(line),
+            workingsteps: Vec::new(),
+            part: cell().cell.part_in_base(),
+            place: gr_ir::Source::default(),
+        };
+        let options = Options { setups: vec![setup("one", 0), setup("two", 8)], ..Options::default() };
+        let p = plan(&motion(&text), &cell(), &Texts::new([(FileId(0), text.as_str())]), &options).unwrap_or_else(|e| panic!("{}", messages(&e, &text)));
+        let steps = p.program.steps.iter().skip_while(|s| s.source.is_none_or(|s| s.line < 6)).filter_map(|s| match &s.action {
+            Action::Signal { word, .. } => Some(word.to_string()),
+            Action::WaitInput { .. } => Some("wait".into()),
+            Action::Pause { .. } => Some("stop".into()),
+            Action::Joint { .. } => Some("joint".into()),
+            _ => None,
+        });
+        steps.take_while(|s| s != "joint").collect::<Vec<_>>().join(" ")
+    };
+    let spindle = order("M3 S5000", "");
+    assert_eq!(spindle, "M5 stop M3 S5000 wait");
+    assert_eq!(order("M3 S5000 M8", ""), "M5 M9 stop M3 S5000 wait M8");
+    assert_eq!(order("M3 S5000 M8", "M5 M9"), "M5 M9 stop");
+    assert_eq!(order("M8", ""), "M9 stop M8");
+}
+
 /// M2 in a cut: the tool is lifted before the spindle stops; what the program stops itself before, it stops there.
 #[test]
 fn the_spindle_turns_until_the_tool_is_out() {

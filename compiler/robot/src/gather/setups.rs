@@ -36,9 +36,13 @@ impl Gather<'_> {
         let begun = Clamped { item: self.out.items.len(), setup, source: self.source, cutting: self.cutting };
         self.clampings.push(begun);
         self.retract();
+        // Nobody turns a part under a tool that spins.
+        let (off, on) = self.cells.rest();
+        self.made(off);
         let name = self.setup_name(setup);
         self.act(Action::Message(format!("setup {name}")));
         self.act(Action::Pause { optional: false });
+        self.made(on);
         (self.at, self.at_change) = (None, None);
         self.anew = true;
     }
