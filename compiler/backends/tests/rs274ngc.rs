@@ -349,6 +349,17 @@ fn coarse_arcs_still_make_circles() {
     }
 }
 
+/// LinuxCNC takes no arcs of less than 0.00127 mm: rounding makes one of these.
+#[test]
+fn arcs_of_no_radius_are_straight() {
+    let text = "G21 G90 G17 F100\nG0 X30 Y20 Z0\nG3 X30 Y20 Z-1 I-0.0013\nG3 X29.9972 Y20 I-0.0014\nM2\n";
+    for units in [Units::Mm, Units::Inch] {
+        for decimals in [None, Some(3), Some(6)] {
+            run(&write(text, &Options { decimals, units, ..options(Language::Linuxcnc) }));
+        }
+    }
+}
+
 /// A steep helix of a radius below the last decimal keeps a radius.
 #[test]
 fn tiny_helices_keep_a_radius() {

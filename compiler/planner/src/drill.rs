@@ -222,6 +222,12 @@ fn beyond(e: &mut Emit<'_>, step: &Workingstep, feature: &Feature, depth: f64) {
     let slack = feature.tolerance.unwrap_or(0.0).max(0.05);
     let point = tip(tool);
     let deepest = match &feature.shape {
+        // The point of a countersink is in the hole below its cone.
+        Shape::Hole { diameter, final_diameter: Some(low), .. } if o.keyword == "COUNTER_SINKING" && tool.tip_angle.is_some() => {
+            let half = tool.tip_angle.unwrap_or_default();
+            let wide = if low < diameter { *diameter } else { *low };
+            (wide / 2.0 / libm::tan(half)).max(feature.depth)
+        }
         Shape::Hole { bottom: HoleBottom::Through, .. } => feature.depth + point + o.overcut.unwrap_or(0.0).max(BREAK_THROUGH),
         Shape::Hole { diameter, bottom: HoleBottom::Conical(angle, _), .. } => feature.depth + diameter / 2.0 / libm::tan(crate::mill::area::half_angle(*angle)).max(1e-3),
         Shape::Hole { .. } | Shape::Thread { .. } => feature.depth,
@@ -251,9 +257,30 @@ fn tip(tool: &Tool) -> f64 {
 pub(crate) fn leftovers(e: &mut Emit<'_>, steps: &[(&Workingstep, &Feature)]) {
     let drills = |s: &Workingstep| matches!(s.operation.kind, OperationKind::Drill(_)) && s.operation.toolpaths.is_empty();
     if steps.iter().all(|(s, _)| drills(s)) {
+        narrow_sink(e, steps);
         short_of_bottom(e, steps);
         left_on_walls(e, steps);
     }
+}
+
+/// A cone that nothing but countersinks cut, none of them as deep as its width needs: their depth counts to the tip.
+fn narrow_sink(e: &mut Emit<'_>, steps: &[(&Workingstep, &Feature)]) {
+    let Some((_, feature)) = steps.first().filter(|_| steps.iter().all(|(s, _)| s.operation.keyword == "COUNTER_SINKING")) else { return };
+    let Shape::Hole { diameter, final_diameter: Some(_), .. } = &feature.shape else { return };
+    let slack = feature.tolerance.unwrap_or(0.0).max(0.05);
+    let sinks = steps.iter().filter_map(|(s, _)| match &s.operation.kind {
+        OperationKind::Drill(d) => Some((&s.operation, d, d.depth?, libm::tan(s.operation.tool.tip_angle?))),
+        _ => None,
+    });
+    let wide = |depth: f64, tan: f64, o: &Operation| o.tool.diameter.min(2.0 * depth * tan);
+    let widest = sinks.max_by(|a, b| wide(a.2, a.3, a.0).total_cmp(&wide(b.2, b.3, b.0)));
+    let Some((o, d, depth, tan)) = widest.filter(|(o, _, depth, tan)| wide(*depth, *tan, o) < diameter - 2.0 * slack) else { return };
+    let short = gr_step::short;
+    let (what, of) = (format!("#{} {}", o.origin.id, o.keyword), format!("#{} {}", feature.origin.id, feature.keyword));
+    let deep = format!("{} mm deep with its tip, where it opens a cone of {} mm", short(depth), short(wide(depth, tan, o)));
+    let cone = format!("a cone of {} mm that is {}", short(*diameter), short(feature.depth));
+    let wanted = short((diameter / 2.0 / tan * 1e4).ceil() / 1e4);
+    e.say(code::PLAN_SHORT_OF_BOTTOM, Origin { span: d.depth_span, ..o.origin }, &[&what, &deep, &of, &cone, &wanted]);
 }
 
 /// The operation that gets nearest to the bottom of a hole, where none of those that make it as wide as it becomes gets there.

@@ -100,6 +100,7 @@ pub fn plan(text: &[u8], file: FileId, options: &Options) -> (Option<Planned>, V
         block: None,
         axial_depth: options.axial_depth,
         made: BTreeSet::new(),
+        drilled: drilled(&process),
         pallet: None,
     };
     p.e.b.file(file, &options.name);
@@ -115,7 +116,7 @@ pub fn plan(text: &[u8], file: FileId, options: &Options) -> (Option<Planned>, V
     p.e.push(Op::End);
     let mut holes: BTreeMap<u64, Vec<(&Workingstep, &Feature)>> = BTreeMap::new();
     for s in process.steps() {
-        for f in targets(s) {
+        for f in targets(s, &p.drilled) {
             holes.entry(f.origin.id).or_default().push((s, f));
         }
     }
@@ -180,6 +181,8 @@ struct Planner<'a> {
     axial_depth: Option<f64>,
     /// Operations that were made on their features.
     made: BTreeSet<(u64, u64)>,
+    /// Elements of compound features that drills make as wide as they are.
+    drilled: BTreeSet<u64>,
     /// The pallet is to be changed before anything else is done.
     pallet: Option<Source>,
 }
@@ -345,13 +348,13 @@ impl Planner<'_> {
         }
         match &o.kind {
             OperationKind::Drill(d) => {
-                for f in targets(s) {
+                for f in targets(s, &self.drilled) {
                     drill::drill(&mut self.e, s, d, f, security);
                 }
             }
             OperationKind::Mill(m) => {
                 let given = mill::Given { security, tolerance: self.tolerance, tells: self.tells.contains(&s.origin.id), overlap: self.overlap, axial_depth: self.axial_depth };
-                for f in targets(s) {
+                for f in targets(s, &self.drilled) {
                     mill::mill(&mut self.e, s, m, f, &given);
                     self.e.cut.insert(f.origin.id);
                 }
@@ -426,10 +429,29 @@ impl Planner<'_> {
     }
 }
 
-/// The features an operation works on: elements of a compound feature, or the feature itself.
-fn targets(s: &Workingstep) -> Vec<&Feature> {
+/// A drill this much narrower than its hole still makes it as wide as it is, mm.
+const DRILL_SLACK: f64 = 0.05;
+
+/// Elements of compound features that a drill makes as wide as they are.
+fn drilled(process: &Process) -> BTreeSet<u64> {
+    let wide = |s: &Workingstep, f: &Feature| matches!(f.shape, Shape::Hole { diameter, .. } if (diameter - s.operation.tool.diameter).abs() <= DRILL_SLACK);
+    let drills = |s: &&Workingstep| matches!(s.operation.kind, OperationKind::Drill(_)) && !matches!(s.operation.keyword.as_str(), "CENTER_DRILLING" | "COUNTER_SINKING");
+    let steps = process.steps();
+    let none = BTreeSet::new();
+    steps.iter().copied().filter(drills).flat_map(|s| targets(s, &none).into_iter().filter(|f| wide(s, f)).map(|f| f.origin.id).collect::<Vec<_>>()).collect()
+}
+
+/// The features an operation works on: elements of a compound feature, or the feature itself. `drilled`: elements that
+/// need no mill.
+fn targets<'a>(s: &'a Workingstep, drilled: &BTreeSet<u64>) -> Vec<&'a Feature> {
     let Shape::Compound(all) = &s.feature.shape else { return vec![&s.feature] };
-    let OperationKind::Drill(_) = s.operation.kind else { return all.iter().collect() };
+    let OperationKind::Drill(_) = s.operation.kind else {
+        // A mill belongs to the elements it fits into, and of those to the ones that no drill makes.
+        let narrow = |f: &&Feature| matches!(f.shape, Shape::Hole { diameter, .. } if diameter < s.operation.tool.diameter - 1e-6);
+        let fits: Vec<&Feature> = all.iter().filter(|f| !narrow(f)).collect();
+        let milled: Vec<&Feature> = fits.iter().copied().filter(|f| !drilled.contains(&f.origin.id)).collect();
+        return [milled, fits].into_iter().find(|l| !l.is_empty()).unwrap_or_else(|| all.iter().collect());
+    };
     if s.operation.keyword == "COUNTER_SINKING" {
         // It makes the cone, or what is widest.
         let opens = |f: &&Feature| match f.shape {
@@ -440,7 +462,7 @@ fn targets(s: &Workingstep) -> Vec<&Feature> {
     }
     // A drill belongs to the hole it fits best.
     let width = |f: &&Feature| match f.shape {
-        Shape::Hole { diameter, .. } if diameter >= s.operation.tool.diameter - 0.05 => diameter,
+        Shape::Hole { diameter, .. } if diameter >= s.operation.tool.diameter - DRILL_SLACK => diameter,
         _ => f64::INFINITY,
     };
     let best = all.iter().min_by(|a, b| width(a).total_cmp(&width(b)));

@@ -383,3 +383,191 @@ fn tool_directions_along_the_feature_are_none_of_their_own() {
     assert!(p.expect("a program").program.steps().filter(|s| s.op == Op::Linear).all(|s| all(&s) < 3));
     assert!(out(make("TWO_AXES()", "PLUNGE_RAMP($,6.)")).1[0].contains("TWO_AXES"));
 }
+
+/// A tool as wide as its hole, pocket or floor goes down and up: what is left of its rings is smaller than any control
+/// follows, and LinuxCNC refuses arcs of no radius.
+#[test]
+fn a_tool_that_fits_exactly_writes_no_arc_without_a_radius() {
+    let bottoms = ["FLAT_HOLE_BOTTOM()", "THROUGH_BOTTOM_CONDITION()", "SPHERICAL_HOLE_BOTTOM(4.)", "FLAT_WITH_RADIUS_HOLE_BOTTOM(4.)"];
+    for (bottom, kind, edge) in bottoms.into_iter().flat_map(|b| [(b, "ENDMILL", 0.0), (b, "BALL_ENDMILL", 3.0)]) {
+        for over in [0.0, 1e-4, 1e-3, 2e-3, 5e-3] {
+            let mut p = Part::new(BLOCK);
+            let tool = p.tool(kind, if edge > 0.0 { 2.0 * edge } else { 8.0 }, edge, None);
+            let keyword = if edge > 0.0 { "BOTTOM_AND_SIDE_FINISH_MILLING" } else { "BOTTOM_AND_SIDE_ROUGH_MILLING" };
+            let op = p.mill(&Mill::new(keyword, tool, 2.0, 3.0));
+            let (size, bottom) = (p.length(8.0 + over), p.add(bottom.replace("4.", &format!("{:?}", 4.0 + over / 2.0))));
+            p.machine("ROUND_HOLE", &[op], [30.0, 20.0, TOP], Some(8.0), &format!(",#{size},$,#{bottom}"));
+            let (planned, out) = planned(&p);
+            for s in planned.program.steps() {
+                if let Op::Arc(a) = s.op {
+                    let at = [s.start, s.end].map(|p| (p.axes[0] - a.center[0]).hypot(p.axes[1] - a.center[1]));
+                    assert!(at.iter().all(|r| *r > 0.00127), "{at:?} {}", p.text());
+                }
+            }
+            // Nothing but what the form of the edge leaves at the foot stays.
+            assert!(out.iter().all(|d| !d.message.contains("spots")), "{out:#?}");
+        }
+    }
+}
+
+/// The deepest place of a program, mm.
+fn lowest(p: &Part) -> f64 {
+    planned(p).0.program.steps().filter(|s| s.op.moves()).map(|s| s.end.axes[2]).fold(f64::INFINITY, f64::min)
+}
+
+#[test]
+fn a_ball_that_fits_exactly_reaches_the_floor_of_a_slot() {
+    for (depth, d) in [(4.0, 4.0), (3.0, 4.0), (6.0, 5.0)] {
+        let mut p = Part::new(BLOCK);
+        let tool = p.tool("BALL_ENDMILL", d, d / 2.0, None);
+        let op = p.mill(&Mill::new("BOTTOM_AND_SIDE_FINISH_MILLING", tool, 1.0, 1.0));
+        let (length, width) = (p.length(80.0), p.length(d));
+        let x = p.direction([1.0, 0.0, 0.0]);
+        let (path, section) = (p.add(format!("LINEAR_PATH($,#{length},#{x})")), p.add(format!("ROUNDED_U_PROFILE($,#{width})")));
+        let ends = [p.add(OPEN.into()), p.add(OPEN.into())];
+        p.machine("SLOT", &[op], [-10.0, 20.0, TOP], Some(depth), &format!(",#{path},#{section},(#{},#{})", ends[0], ends[1]));
+        assert!((lowest(&p) - (TOP - depth)).abs() < 1e-3, "{}", lowest(&p));
+        assert!(planned(&p).1.iter().all(|d| d.code != code::PLAN_UNREACHABLE_CORNER));
+    }
+}
+
+#[test]
+fn bottoms_of_holes_are_as_they_are_written() {
+    let part = |bottom: &str| {
+        let mut p = Part::new(BLOCK);
+        let tool = p.tool("BALL_ENDMILL", 6.0, 3.0, None);
+        let op = p.mill(&Mill::new("BOTTOM_AND_SIDE_FINISH_MILLING", tool, 2.0, 2.0));
+        let (size, bottom) = (p.length(20.0), p.add(bottom.into()));
+        p.machine("ROUND_HOLE", &[op], [30.0, 20.0, TOP], Some(11.0), &format!(",#{size},$,#{bottom}"));
+        p
+    };
+    for radius in [10.0, 12.0, 30.0] {
+        let p = part(&format!("SPHERICAL_HOLE_BOTTOM({radius:?})"));
+        let (planned, _) = planned(&p);
+        assert!((lowest(&p) - (TOP - 11.0)).abs() < 2e-2, "{}", lowest(&p));
+        // The ball of the tool keeps inside that of the floor, and comes near it all the way out.
+        let centre = TOP - 11.0 + radius;
+        let room = |x: f64, y: f64, z: f64| radius - 3.0 - (x - 30.0).hypot(y - 20.0).hypot(z + 3.0 - centre);
+        let cut: Vec<[f64; 3]> = planned.program.steps().filter(|s| s.op.moves() && s.op != Op::Rapid).map(|s| s.end.xyz()).collect();
+        let foot = centre - ((radius - 3.0).powi(2) - 49.0_f64).max(0.0).sqrt();
+        assert!(cut.iter().filter(|p| p[2] + 3.0 < foot).all(|p| room(p[0], p[1], p[2]) > -2e-3));
+        let near = cut.iter().filter(|p| room(p[0], p[1], p[2]) < 0.02).map(|p| (p[0] - 30.0).hypot(p[1] - 20.0)).fold(0.0, f64::max);
+        assert!((near - 7.0).abs() < 0.3, "{radius} {near}");
+    }
+    for (bottom, at, words) in [
+        ("SPHERICAL_HOLE_BOTTOM(6.)", "6.", "radius of #"),
+        ("FLAT_WITH_RADIUS_HOLE_BOTTOM(10.5)", "10.5", "corner_radius of #"),
+    ] {
+        let p = part(bottom);
+        let errors = refused(&p);
+        assert!(errors.len() == 1 && errors[0].code == code::PLAN_BAD_SIZE && errors[0].message.contains(words), "{errors:#?}");
+        assert_eq!(&p.text()[errors[0].labels[0].span.range()], at);
+    }
+}
+
+#[test]
+fn a_boss_outside_its_pocket_is_refused() {
+    let part = |at: [f64; 3]| {
+        let mut p = Part::new(BLOCK);
+        let tool = p.tool("ENDMILL", 4.0, 0.0, None);
+        let op = p.mill(&Mill::new("BOTTOM_AND_SIDE_ROUGH_MILLING", tool, 2.0, 3.0));
+        let profile = judge::cases::rectangle_profile(&mut p, 20.0, 16.0);
+        let round = judge::cases::circle_profile(&mut p, 5.0);
+        let boss = judge::cases::boss(&mut p, at, &round, 6.0, 0.0);
+        judge::cases::closed(&mut p, 6.0, &profile, &boss, None, "PLANAR_POCKET_BOTTOM_CONDITION()", None, Some(2.0), &[op], [40.0, 20.0]);
+        p
+    };
+    planned(&part([42.0, 20.0, TOP]));
+    // Partly in the wall.
+    planned(&part([31.0, 20.0, TOP]));
+    let errors = refused(&part([4.0, 0.0, TOP]));
+    assert!(errors.len() == 1 && errors[0].message.contains("BOSS: all of it lies outside"), "{errors:#?}");
+}
+
+/// A counterbore at a place by these operations: a hole through the block, and a wider one.
+fn counterbore(p: &mut Part, operations: &[usize], at: [f64; 3]) -> usize {
+    let (small, wide) = (p.length(6.0), p.length(12.0));
+    let (through, flat) = (p.add("THROUGH_BOTTOM_CONDITION()".into()), p.add("FLAT_HOLE_BOTTOM()".into()));
+    let a = p.feature("ROUND_HOLE", &[], [0.0; 3], Some(TOP), &format!(",#{small},$,#{through}"));
+    let b = p.feature("ROUND_HOLE", &[], [0.0; 3], Some(5.0), &format!(",#{wide},$,#{flat}"));
+    p.feature("COUNTERBORE_HOLE", operations, at, None, &format!(",(#{a},#{b})"))
+}
+
+#[test]
+fn a_mill_belongs_to_the_elements_of_a_compound_that_no_drill_makes() {
+    for d in [4.0, 8.0] {
+        let mut p = Part::new(BLOCK);
+        let (drill, mill) = (p.tool("TWIST_DRILL", 6.0, 0.0, Some(59.0)), p.tool("ENDMILL", d, 0.0, None));
+        let ops = [p.drill("DRILLING", drill, None, ""), p.mill(&Mill::new("BOTTOM_AND_SIDE_ROUGH_MILLING", mill, 2.0, 3.0))];
+        let whole = counterbore(&mut p, &ops, [30.0, 20.0, TOP]);
+        ops.iter().for_each(|o| p.step(whole, *o));
+        let (planned, _) = planned(&p);
+        let (mut tool, mut low) = (0, f64::INFINITY);
+        for s in planned.program.steps() {
+            match s.op {
+                Op::ToolChange(n) => tool = n,
+                op if op.moves() && tool == 2 => low = low.min(s.end.axes[2]),
+                _ => {}
+            }
+        }
+        assert!((low - (TOP - 5.0)).abs() < 1e-9, "{low}");
+    }
+}
+
+/// Where holes are drilled.
+fn drilled_at(p: &Part) -> Vec<[i64; 2]> {
+    let down = |s: &gr_ir::Step<'_>| s.op == Op::Linear && s.end.axes[2] < s.start.axes[2];
+    let mut all: Vec<[i64; 2]> = planned(p).0.program.steps().filter(down).map(|s| [0, 1].map(|i| s.end.axes[i].round() as i64)).collect();
+    all.dedup();
+    all
+}
+
+#[test]
+fn a_pattern_repeats_a_compound_feature_with_all_its_elements() {
+    let part = |pattern: &dyn Fn(&mut Part, usize) -> (&'static str, String)| {
+        let mut p = Part::new(BLOCK);
+        let drill = p.tool("TWIST_DRILL", 6.0, 0.0, Some(59.0));
+        let op = p.drill("DRILLING", drill, None, "");
+        let whole = counterbore(&mut p, &[], [10.0, 0.0, 0.0]);
+        let (head, rest) = pattern(&mut p, whole);
+        p.machine(head, &[op], [20.0, 20.0, TOP], None, &rest);
+        p
+    };
+    let circle = part(&|_, w| ("CIRCULAR_PATTERN", format!(",#{w},90.,4,(),(),$,0.")));
+    assert_eq!(drilled_at(&circle), [[30, 20], [20, 30], [10, 20], [20, 10]]);
+    let rows = part(&|p, w| {
+        let (by, along) = (p.length(15.0), p.direction([1.0, 0.0, 0.0]));
+        ("RECTANGULAR_PATTERN", format!(",#{w},#{by},#{along},1,2,$,$,(),()"))
+    });
+    assert_eq!(drilled_at(&rows), [[30, 20], [45, 20]]);
+    let general = part(&|p, w| {
+        let (a, b) = (p.place([0.0; 3]), p.place([5.0, 10.0, 0.0]));
+        ("GENERAL_PATTERN", format!(",#{w},(#{a},#{b})"))
+    });
+    assert_eq!(drilled_at(&general), [[20, 20], [25, 30]]);
+}
+
+/// A cone of 12 mm over a hole of 6 mm, sunk by 90 degrees: right to the hole's edge with its tip 6 mm deep.
+#[test]
+fn countersinks_are_as_deep_as_their_cone_is_wide() {
+    let told = |depth: Option<f64>, bottom: &str| {
+        let mut p = Part::new(BLOCK);
+        let (drill, sink) = (p.tool("TWIST_DRILL", 6.0, 0.0, Some(59.0)), p.tool("COUNTERSINK", 16.0, 0.0, Some(45.0)));
+        let ops = [p.drill("DRILLING", drill, None, ""), p.drill("COUNTER_SINKING", sink, depth, "")];
+        let (small, wide, low) = (p.length(6.0), p.length(12.0), p.length(6.0));
+        let (taper, through, own) = (p.add(format!("DIAMETER_TAPER(#{low})")), p.add("THROUGH_BOTTOM_CONDITION()".into()), p.add(bottom.into()));
+        let a = p.feature("ROUND_HOLE", &[], [0.0; 3], Some(TOP), &format!(",#{small},$,#{through}"));
+        let b = p.feature("ROUND_HOLE", &[], [0.0; 3], Some(3.0), &format!(",#{wide},#{taper},#{own}"));
+        p.machine("COUNTERSUNK_HOLE", &ops, [30.0, 20.0, TOP], None, &format!(",(#{a},#{b})"));
+        let out = planned(&p).1;
+        out.iter().filter(|d| d.severity == Severity::Warning).map(|d| format!("{} {}", d.code.def().code, d.message)).collect::<Vec<_>>()
+    };
+    for bottom in ["FLAT_HOLE_BOTTOM()", "THROUGH_BOTTOM_CONDITION()"] {
+        assert_eq!(told(None, bottom), Vec::<String>::new());
+        assert_eq!(told(Some(6.0), bottom), Vec::<String>::new());
+        let short = told(Some(3.0), bottom);
+        assert!(short.len() == 1 && short[0].starts_with("E0453") && short[0].contains("opens a cone of 6 mm"), "{short:?}");
+        let beyond = told(Some(7.0), bottom);
+        assert!(!beyond.is_empty() && beyond.iter().all(|m| m.starts_with("E0447")), "{beyond:?}");
+    }
+}

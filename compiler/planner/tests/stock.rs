@@ -121,7 +121,7 @@ fn a_feature_under_uncut_material_is_entered_at_feed() {
 #[test]
 fn rapids_pass_over_a_boss_that_stands_above_its_pocket() {
     let boss = |p: &mut Part| {
-        let place = p.place([0.0, 0.0, 4.0]);
+        let place = p.place([30.0, 20.0, 12.0]);
         let d = p.length(8.0);
         let circle = p.add(format!("CIRCULAR_CLOSED_PROFILE(#{place},#{d})"));
         let deep = p.place([0.0, 0.0, -9.0]);
@@ -216,7 +216,7 @@ fn rapids_pass_no_corner_of_a_boss() {
         let op = p.mill(&Mill::new("BOTTOM_AND_SIDE_ROUGH_MILLING", tool, 2.5, 3.6).strategy(strategy));
         let (a, w, l) = (p.length(8.0), p.length(50.0), p.length(30.0));
         let square = p.add(format!("RECTANGULAR_CLOSED_PROFILE($,#{a},#{a})"));
-        let (place, deep) = (p.place([0.0, 0.0, 4.0]), p.place([0.0, 0.0, -9.0]));
+        let (place, deep) = (p.place([30.0, 20.0, 16.0]), p.place([0.0, 0.0, -9.0]));
         let plane = p.add(format!("PLANE('depth',#{deep})"));
         let boss = p.add(format!("BOSS('boss',$,(),#{place},#{plane},#{square},$)"));
         let profile = p.add(format!("RECTANGULAR_CLOSED_PROFILE($,#{l},#{w})"));

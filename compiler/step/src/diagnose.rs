@@ -242,7 +242,9 @@ impl Out<'_> {
     fn lost_names(&mut self) {
         let nameless = |d: &Diagnostic| {
             let before = self.text[..d.primary().1.start as usize].trim_ascii_end();
-            let begins = before.ends_with(b";") || before.strip_suffix(b"#").is_some_and(|b| b.trim_ascii_end().ends_with(b";"));
+            let digits = before.iter().rev().take_while(|b| b.is_ascii_digit()).count();
+            let name = &before[..before.len() - digits];
+            let begins = before.ends_with(b";") || name.strip_suffix(b"#").is_some_and(|b| b.trim_ascii_end().ends_with(b";"));
             d.code == code::P21_DUPLICATE_ID || d.code == code::P21_UNEXPECTED && begins
         };
         let wanted = |d: &Diagnostic| {
@@ -342,7 +344,9 @@ impl Out<'_> {
         for (node, rule) in broken(model) {
             // Both speeds given: a lint explains the readings.
             let both = rule.entity == "milling_technology" && rule.label == "WR1" && node.attr("spindle").is_some();
-            if quiet[node.index() as usize] || both {
+            // The numbers it refers to are not what was meant where their statement has had its message.
+            let rests = || node.references().any(|n| quiet[n.index() as usize] && n.references().next().is_none());
+            if quiet[node.index() as usize] || both || rests() {
                 continue;
             }
             let code = match rule.origin {

@@ -420,7 +420,7 @@ impl<'m> Lints<'m, '_> {
         for step in self.model.all("machining_workingstep") {
             let (Some(feature), Some(op)) = (step.node("its_feature"), step.node("its_operation")) else { continue };
             let listed = feature.attr("its_operations");
-            if listed.is_some() && !feature.nodes("its_operations").contains(&op) && !feature.damaged() && !op.damaged() {
+            if listed.is_some() && !feature.nodes("its_operations").contains(&op) && !(self.faulty)(feature.index()) && !(self.faulty)(op.index()) {
                 let v = step.attr("its_operation").map_or(step.keyword_span(), Val::span);
                 self.add(code::STEP_OPERATION_ELSEWHERE, step, v, vec![op.id().to_string(), feature.id().to_string()]);
             }

@@ -252,7 +252,7 @@ fn a_cut_file_is_told_once() {
 #[test]
 fn a_lost_name_is_one_message() {
     let healthy = include_str!("../../../docs/examples/stepnc/case-study.p21");
-    for head in ["#0=", "#-18=", "#4=", "// #18=", "#=", "# 18x="] {
+    for head in ["#0=", "#-18=", "#4=", "// #18=", "#=", "# 18x=", "#18@=", "#18\"="] {
         let text = healthy.replacen("#18=MILLING", &format!("{head}MILLING"), 1);
         assert_ne!(text, healthy);
         let all: Vec<Diagnostic> = diagnostics(&text).into_iter().filter(|d| d.severity == Severity::Error).collect();
@@ -264,6 +264,30 @@ fn a_lost_name_is_one_message() {
     // Without such a name each reference is told.
     let text = healthy.replacen("#18=MILLING", "#999018=MILLING", 1);
     assert!(diagnostics(&text).iter().any(|d| d.code == code::P21_DANGLING_REFERENCE));
+}
+
+/// What rests on a damaged statement has no message of its own.
+#[test]
+fn what_refers_to_a_damaged_statement_is_silent() {
+    let healthy = include_str!("../../../docs/examples/stepnc/case-study.p21");
+    for (from, to) in [
+        ("DIRECTION('right',(1.,0.,0.))", "DIRECTION('right',(1.,,0.,0.))"),
+        ("DIRECTION('right',(1.,0.,0.))", "DIRECTION('right',(1. 0.,0.))"),
+        ("DIRECTION('right',(1.,0.,0.))", "DIRECTION('right',(1.;,0.,0.))"),
+        ("CARTESIAN_POINT('',(0.,105.,0.))", "CARTESIAN_POINT('',(0.,105.,0,0))"),
+        ("SLOT('slot A',#11,", "SLOT('slot A',,#11,"),
+        ("SLOT('slot B',#11,", "SLOT('slot B',,#11,"),
+    ] {
+        let text = healthy.replacen(from, to, 1);
+        assert_ne!(text, healthy);
+        let all: Vec<Diagnostic> = diagnostics(&text);
+        let before = diagnostics(healthy).len();
+        let places: Vec<_> = all.iter().map(|d| (d.code.def().code, d.message.clone())).collect();
+        assert_eq!(all.len(), before + 1, "{to}: {places:?}");
+        let at = all.iter().find(|d| d.severity == Severity::Error).expect("an error").primary().1.start as usize;
+        let begin = text.find(to).unwrap_or(0);
+        assert!((begin..begin + to.len()).contains(&at), "{to}: {places:?}");
+    }
 }
 
 /// A comment that ends later than was meant: one message, which points at it.

@@ -7,6 +7,9 @@ use crate::{Error, Link, P2, Pass, Path2, Region, Role, positive};
 /// More levels or lines than this are a mistake.
 const MANY: f64 = 20_000.0;
 
+/// So much less than its radius may be tried of a tool that fits exactly, mm.
+pub const HAIR: f64 = 5e-5;
+
 /// How an area is emptied (ISO 14649-11).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Strategy {
@@ -129,14 +132,16 @@ pub fn clear(region: &Region, what: &Clear) -> Result<Cleared, Error> {
     Ok(Cleared { passes, room: job.room })
 }
 
-/// Where the centre of a tool may be. A room exactly as wide as the tool may be lost to rounding: then a hair less
-/// than the radius is tried.
-pub(crate) fn room(region: &Region, d: f64) -> Result<Vec<Region>, Error> {
+/// Where the centre of a tool may be, if anywhere. A room exactly as wide as the tool may be lost to rounding: then a
+/// hair less than the radius is tried.
+pub(crate) fn places(region: &Region, d: f64) -> Result<Vec<Region>, Error> {
     let found = erode(region, d)?;
-    if !found.is_empty() {
-        return Ok(found);
-    }
-    let found = erode(region, (d - 5e-5).max(0.0))?;
+    if found.is_empty() { erode(region, (d - HAIR).max(0.0)) } else { Ok(found) }
+}
+
+/// The same, or how large a tool fits.
+pub(crate) fn room(region: &Region, d: f64) -> Result<Vec<Region>, Error> {
+    let found = places(region, d)?;
     if found.is_empty() { Err(Error::ToolTooLarge { fits: inradius(region)? }) } else { Ok(found) }
 }
 

@@ -36,7 +36,7 @@ mod region;
 mod residual;
 mod stitch;
 
-pub use clear::{Clear, Cleared, CutMode, Order, Rotation, Strategy, clear};
+pub use clear::{Clear, Cleared, CutMode, HAIR, Order, Rotation, Strategy, clear};
 pub use contour::{Contour, Lead, Side, contour, contour_closed, largest_tool, slot};
 pub use face::{Face, face};
 pub use geom::{Bounds, P2, Seg, Vertex};
@@ -45,6 +45,10 @@ pub use offset::{common, erode, grow, offset_open};
 pub use path::Path2;
 pub use region::Region;
 pub use residual::{Residual, residuals};
+
+/// No machine follows less, mm: a path within a circle of this radius is cut as a point, an arc of less radius as its
+/// chord. Controls refuse smaller arcs (LinuxCNC: below 0.00127 mm).
+pub const RESOLUTION: f64 = 1.5e-3;
 
 /// What a pass is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,7 +1,7 @@
 //! From flat passes to moves: levels, approaches, links, retracts.
 
 use crate::geom::Seg;
-use crate::{Error, Link, P2, Pass, Path2, Region, positive};
+use crate::{Error, Link, P2, Pass, Path2, RESOLUTION, Region, positive};
 use core::f64::consts::{FRAC_PI_2, PI, TAU};
 
 /// A point in the feature's frame.
@@ -220,6 +220,12 @@ fn groups(passes: &[Pass]) -> impl Iterator<Item = &[Pass]> {
     passes.chunk_by(|_, next| next.link != Link::Retract)
 }
 
+/// Whether no two points of it are further apart than a circle of [`RESOLUTION`] is wide.
+fn is_point(path: &Path2) -> bool {
+    let size = path.bounds().size();
+    size.x.max(size.y) < 2.0 * RESOLUTION
+}
+
 fn check(a: &Approach) -> Result<(), Error> {
     let angle = |a: f64| {
         if !a.is_finite() {
@@ -266,8 +272,15 @@ impl Writer<'_> {
     fn line(&mut self, p: P2, z: f64, tag: Tag) {
         self.go(P3::over(p, z), Kind::Line, tag);
     }
-    /// Along a path while the height goes evenly from `z0` to `z1`.
+    /// Along a path while the height goes evenly from `z0` to `z1`. What is smaller than any machine goes is a point, and
+    /// the chord stands for an arc of so small a radius: controls refuse those.
     fn trace(&mut self, path: &Path2, z0: f64, z1: f64, tag: Tag) {
+        if path.segs().is_empty() {
+            return;
+        }
+        if is_point(path) {
+            return self.line(path.end(), z1, tag);
+        }
         let total = path.length().max(1e-12);
         let mut done = 0.0;
         let n = path.segs().len();
@@ -275,8 +288,8 @@ impl Writer<'_> {
             done += s.len();
             let z = if i + 1 == n { z1 } else { z0 + (z1 - z0) * (done / total) };
             let kind = match *s {
-                Seg::Line { .. } => Kind::Line,
-                Seg::Arc { c, sweep, .. } => Kind::Arc { centre: c, sweep },
+                Seg::Arc { a, c, sweep, .. } if a.dist(c) >= RESOLUTION => Kind::Arc { centre: c, sweep },
+                _ => Kind::Line,
             };
             self.go(P3::over(s.b(), z), kind, tag);
         }
@@ -394,7 +407,7 @@ impl Writer<'_> {
         let fall = (top - z).max(0.0);
         let need = fall / libm::tan(angle);
         let length = path.length();
-        if need < 1e-6 || length < 1e-3 {
+        if need < 1e-6 {
             self.line(p, z, Tag::Approach);
             return Ok(());
         }
@@ -403,6 +416,10 @@ impl Writer<'_> {
             if let Some((centre, r, side)) = self.room_for_helix(path, 0.5 * self.radius) {
                 return self.helix_about(path, above, z, angle, centre, r, side);
             }
+        }
+        if is_point(path) {
+            self.line(p, z, Tag::Approach);
+            return Ok(());
         }
         let round = path.is_closed() && need > length * 0.5 && width >= length;
         let window = length.min(width).min(need * 0.5).max(1e-3);

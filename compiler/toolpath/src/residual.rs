@@ -1,7 +1,8 @@
 //! What a tool can't reach: inner corners sharper than its radius, necks narrower than its diameter.
 
 use crate::geom::Seg;
-use crate::offset::{difference, dilate, erode};
+use crate::clear::places;
+use crate::offset::{difference, dilate};
 use crate::{Error, P2, Path2, Region, positive};
 
 /// Spots are found this much narrower than they are, so that walls shared with the clean area don't count.
@@ -29,7 +30,7 @@ pub fn residuals(region: &Region, radius: f64) -> Result<Vec<Residual>, Error> {
 
 fn spots(region: &Region, r: f64) -> Result<Vec<Region>, Error> {
     let whole = core::slice::from_ref(region);
-    let room = erode(region, r)?;
+    let room = places(region, r)?;
     if room.is_empty() {
         return Ok(vec![region.clone()]);
     }

@@ -15,6 +15,9 @@ use gr_text::code;
 /// Radius difference that every control takes, mm.
 const RADIUS_ROOM: f64 = 0.002;
 
+/// LinuxCNC refuses arcs about a centre nearer than 0.00005 inch to one of their ends, mm; above the noise of its sums.
+const LEAST_RADIUS: f64 = 0.000_05 * 25.4 + 1e-9;
+
 /// One way to write an arc.
 struct Candidate {
     words: Vec<String>,
@@ -39,7 +42,7 @@ impl Emitter<'_> {
             _ => return self.arc_as_lines(view, &sweep, 0.0, 1.0),
         };
         let other = self.options.only_xy_arcs && plane != Plane::Xy;
-        if self.options.arcs == Arcs::Lines || other {
+        if self.options.arcs == Arcs::Lines || other || self.too_small(sweep.shape.radius) {
             return self.arc_as_lines(view, &sweep, 0.0, 1.0);
         }
         let parts = self.parts(&sweep, arc.turns);
@@ -48,6 +51,11 @@ impl Emitter<'_> {
             let turns = if parts == 1 { arc.turns } else { arc.turns.signum() };
             self.part(view, &sweep, plane, (from, to), turns, 0);
         }
+    }
+
+    /// Whether the control refuses an arc of this radius: with R it asks for none.
+    fn too_small(&self, radius: f64) -> bool {
+        self.linuxcnc() && self.options.arcs != Arcs::R && radius < LEAST_RADIUS
     }
 
     /// Into how many equal parts the language makes us divide.
@@ -193,6 +201,10 @@ impl Emitter<'_> {
         let arc = Arc { plane: ArcPlane::Work(meant.plane), center: c.center, turns: meant.turns };
         let (start, end) = (Pose::at(self.at), Pose::at(c.end));
         let read = Sweep::new(&start, &end, &arc);
+        let (f, s, _) = plane_axes(meant.plane);
+        if [self.at, c.end].iter().any(|p| self.too_small(libm::hypot(p[f] - c.center[f], p[s] - c.center[s]))) {
+            return false;
+        }
         let own = meant.sweep.mismatch();
         let off = read.mismatch();
         // A spiral that LinuxCNC took in the source it takes again, by its rule for the unit that is written.

@@ -211,6 +211,10 @@ fn floor(feature: &Feature, leave: f64) -> Option<(Floor, f64)> {
             let (half, wide) = (half_angle(*angle), final_diameter.unwrap_or(*diameter) / 2.0);
             Some((Floor::Cone(feature.depth - leave, wide, half), feature.depth + wide / libm::tan(half)))
         }
+        // As wide as the hole it is the rounding of its foot.
+        Shape::Hole { diameter, final_diameter, bottom: HoleBottom::Spherical(r) } if *r > final_diameter.unwrap_or(*diameter) / 2.0 + 1e-6 => {
+            Some((Floor::Ball(P2::default(), feature.depth - r, r - leave), feature.depth))
+        }
         _ => None,
     }
 }
@@ -355,7 +359,8 @@ impl Job<'_> {
                 let mut a = plain(Path2::circle(P2::default(), diameter / 2.0).map_err(words)?)?;
                 a.slope = self.slope(final_diameter.map_or(0.0, |f| libm::atan((diameter - f) / 2.0 / self.feature.depth)))?;
                 a.fillet = match bottom {
-                    HoleBottom::Radiused(r) | HoleBottom::Spherical(r) => self.fillet(r.min(diameter / 2.0)),
+                    HoleBottom::Radiused(r) => self.fillet(*r),
+                    HoleBottom::Spherical(r) if floor(self.feature, 0.0).is_none() => self.fillet(*r),
                     HoleBottom::Conical(angle, tip) => {
                         if half_angle(*angle) < 0.05 {
                             return Err(format!("a cone of {:.4} degrees", angle.to_degrees()));
@@ -506,6 +511,7 @@ impl Job<'_> {
                 e.say(gr_text::code::PLAN_AIR, self.step.origin, &[&self.name(), &why]);
             }
         }
+        self.bosses_within(e, &area)?;
         let moves = self.emptied(e, &area)?;
         if let Shape::Pocket { .. } | Shape::Hole { .. } = self.feature.shape {
             // A floor that is not flat leaves a disk further down: corners are those of the walls.
@@ -547,6 +553,20 @@ impl Job<'_> {
             self.leaves(e, &format!("stairs of up to {:.4} mm on its walls; a finishing workingstep takes them", self.stairs(&area)));
         }
         Ok(moves)
+    }
+
+    /// A boss that stands nowhere in the area it is a boss of: what it should keep would be cut away.
+    fn bosses_within(&self, e: &mut Emit<'_>, area: &Area) -> Done<()> {
+        let (Shape::Pocket { bosses, .. } | Shape::OpenPocket { bosses, .. } | Shape::Step { bosses, .. }) = &self.feature.shape else { return Ok(()) };
+        for boss in bosses {
+            let foot = path(&boss.boundary)?;
+            let within = foot.sampled(self.radius / 4.0).iter().any(|p| area.outline.contains(*p));
+            if !within && !foot.contains(area.outline.outer().start()) {
+                let why = format!("all of it lies outside {}; the placements of both are relative to the workpiece, not that of the boss to what it stands in", self.name());
+                e.say(gr_text::code::PLAN_CANNOT_CUT, boss.origin, &[&format!("#{} BOSS", boss.origin.id), &why]);
+            }
+        }
+        Ok(())
     }
 
     /// What a rounded edge leaves at the foot of walls that have a radius, or none.

@@ -192,7 +192,7 @@ fn job<'a>(e: &mut Emit<'_>, step: &'a Workingstep, m: &'a Milling, feature: &'a
         Shape::Hole { final_diameter, bottom, .. } => {
             let round = match bottom {
                 HoleBottom::Flat | HoleBottom::Through => true,
-                HoleBottom::Radiused(r) | HoleBottom::Spherical(r) => own(*r),
+                HoleBottom::Radiused(r) | HoleBottom::Spherical(r) => floor.is_none() && own(*r),
                 HoleBottom::Conical(..) => false,
             };
             final_diameter.is_none() && round

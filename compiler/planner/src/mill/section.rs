@@ -142,7 +142,21 @@ fn general(contour: &Contour, depth: f64, land: f64) -> Done<Path2> {
 }
 
 impl Cut {
+    /// The section `curve`, `depth` mm deep, for a tool of this radius and edge radius, mm.
     pub fn new(curve: &Path2, depth: f64, radius: f64, edge: f64) -> Done<Cut> {
+        let exact = Cut::of(curve, depth, radius, edge);
+        let reached = exact.as_ref().map_or(0.0, Cut::deepest);
+        // The centre of a ball as wide as the section has one line to go down, which rounding may lose: a hair less shows it.
+        if edge > tp::HAIR && reached < depth {
+            let freer = Cut::of(curve, depth, radius, edge - tp::HAIR).map(|c| Cut { edge, flat: radius - edge, ..c });
+            if freer.as_ref().is_ok_and(|c| c.deepest() > reached + tp::RESOLUTION) {
+                return freer;
+            }
+        }
+        exact
+    }
+
+    fn of(curve: &Path2, depth: f64, radius: f64, edge: f64) -> Done<Cut> {
         let centres = if edge > 0.0 { tp::offset_open(curve, edge).map_err(|_| "the tool does not fit its section".to_string())? } else { curve.clone() };
         let upright = |s: &Seg| match s {
             Seg::Line { a, b } => (a.x - b.x).abs() < 1e-9 || (a.y - b.y).abs() < 1e-9,
@@ -186,7 +200,7 @@ impl Cut {
         }
         at.sort_by(f64::total_cmp);
         let pairs = at.chunks_exact(2).map(|c| (c[0] + self.flat, c[1] - self.flat));
-        pairs.filter(|(a, b)| b - a > -1e-6).map(|(a, b)| if b < a { ((a + b) / 2.0, (a + b) / 2.0) } else { (a, b) }).collect()
+        pairs.filter(|(a, b)| b - a > -1e-6).map(|(a, b)| if b - a < tp::RESOLUTION { ((a + b) / 2.0, (a + b) / 2.0) } else { (a, b) }).collect()
     }
 
     /// How deep the tip gets.
@@ -247,7 +261,7 @@ impl Cut {
                 }
             }
         }
-        out.dedup_by(|a, b| (a.0 - b.0).abs() < 1e-6 && (a.1 - b.1).abs() < 1e-6);
+        out.dedup_by(|a, b| (a.0 - b.0).abs() < tp::RESOLUTION && (a.1 - b.1).abs() < tp::RESOLUTION);
         Ok(out)
     }
 }

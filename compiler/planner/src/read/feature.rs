@@ -90,22 +90,12 @@ impl<'m> Reader<'m> {
         let piece = node.node("its_workpiece").map(|w| w.id());
         let place = setup.and_then(|s| s.workpieces.iter().find(|p| Some(p.0) == piece)).map_or(Frame::default(), |p| p.1);
         let outer = self.outer(node, &place, 0)?;
-        let (patterns, node) = self.base_of_pattern(node)?;
-        let mut copies = outer;
-        let mut replaced = false;
-        for pattern in &patterns {
-            let mut next = Vec::new();
-            for o in &copies {
-                next.extend(self.pattern(*pattern, o, replaced)?);
-                if next.len() > MOST_COPIES {
-                    self.say(code::PLAN_TOO_MUCH, *pattern, &[&title(*pattern), &MOST_COPIES.to_string(), "features"]);
-                    return None;
-                }
-            }
-            copies = next;
-            // A general pattern says where its feature goes, whatever that feature's own placement.
-            replaced = pattern.keyword() == "GENERAL_PATTERN";
-        }
+        self.feature_in(node, outer, setup, operation)
+    }
+
+    /// A feature, or a pattern of it, in frames that its placement is relative to.
+    fn feature_in(&mut self, node: Node<'m>, outer: Vec<Frame>, setup: Option<&Setup>, operation: u64) -> Option<Feature> {
+        let (patterns, node, copies, replaced) = self.copies(node, outer)?;
         let placement = match node.node("feature_placement") {
             Some(p) => self.placement(p)?,
             None if node.is_a("two5d_manufacturing_feature") => {
@@ -123,7 +113,7 @@ impl<'m> Reader<'m> {
             self.missing(circle, "base_feature_diameter", "all features of the pattern lie on one spot");
             return None;
         }
-        let shape = self.shape(node, operation, &placement, setup)?;
+        let shape = self.shape(node, operation, &placement, &copies, setup)?;
         if let Some(pattern) = patterns.first() {
             self.apart(*pattern, &copies, &shape);
         }
@@ -133,6 +123,29 @@ impl<'m> Reader<'m> {
         let (keyword, name) = (node.keyword().to_string(), node.string("its_id").into_owned());
         let (tolerance, fit) = tolerance(node);
         Some(Feature { origin: origin(node), keyword, name, frame, placement, depth, shape, copies, tolerance, fit })
+    }
+
+    /// The patterns around a feature, what they repeat, and the frames its placement is relative to: in the place of
+    /// which a general pattern puts its own, then the last is true.
+    #[allow(clippy::type_complexity)]
+    fn copies(&mut self, node: Node<'m>, outer: Vec<Frame>) -> Option<(Vec<Node<'m>>, Node<'m>, Vec<Frame>, bool)> {
+        let (patterns, node) = self.base_of_pattern(node)?;
+        let mut copies = outer;
+        let mut replaced = false;
+        for pattern in &patterns {
+            let mut next = Vec::new();
+            for o in &copies {
+                next.extend(self.pattern(*pattern, o, replaced)?);
+                if next.len() > MOST_COPIES {
+                    self.say(code::PLAN_TOO_MUCH, *pattern, &[&title(*pattern), &MOST_COPIES.to_string(), "features"]);
+                    return None;
+                }
+            }
+            copies = next;
+            // A general pattern says where its feature goes, whatever that feature's own placement.
+            replaced = pattern.keyword() == "GENERAL_PATTERN";
+        }
+        Some((patterns, node, copies, replaced))
     }
 
     /// Elements of a pattern that lie on one spot, or round ones that overlap: the first two are told.
@@ -157,6 +170,17 @@ impl<'m> Reader<'m> {
     /// the rest may be cut from another side.
     fn goes_through(&mut self, node: Node<'m>, setup: Option<&Setup>, copies: &[Frame], depth: f64) {
         let Some([low, _]) = self.stock(setup).filter(|_| self.model.all("setup").count() <= 1) else { return };
+        // An element of a compound feature opens into one that goes deeper.
+        let ends = |n: Node<'m>| {
+            let at = n.node("feature_placement")?.node("location")?;
+            let floor = n.node("depth")?.node("position")?.node("location")?;
+            Some(self.point(at)?[2] + self.point(floor)?[2])
+        };
+        let own = ends(node);
+        let deeper = |n: &Node<'m>| n.id() != node.id() && ends(*n).zip(own).is_some_and(|(a, b)| a < b - 1e-6);
+        if self.parents.get(&node.id()).is_some_and(|p| p.is_a("compound_feature") && p.nodes("elements").iter().any(deeper)) {
+            return;
+        }
         let ends = copies.iter().filter(|c| c.upright()).map(|c| c.point([0.0, 0.0, -depth])[2]);
         let highest = ends.fold(f64::NEG_INFINITY, f64::max);
         if highest > low[2] + 0.01 {
@@ -175,9 +199,19 @@ impl<'m> Reader<'m> {
             self.say(code::PLAN_GOES_ROUND, node, &[&title(node)]);
             return None;
         }
-        let outer = self.outer(parent, workpiece, depth + 1)?;
+        // Patterns around the compound feature repeat its elements with it.
+        let mut whole = parent;
+        for _ in 0..DEEPEST {
+            let Some(pattern) = self.parents.get(&whole.id()).copied().filter(|p| p.is_a("replicate_feature")) else { break };
+            whole = pattern;
+        }
+        let outer = self.outer(whole, workpiece, depth + 1)?;
+        let (_, _, copies, replaced) = self.copies(whole, outer)?;
+        if replaced {
+            return Some(copies);
+        }
         let own = parent.node("feature_placement").and_then(|p| self.placement(p))?;
-        Some(outer.iter().map(|o| o.place(&own)).collect())
+        Some(copies.iter().map(|o| o.place(&own)).collect())
     }
 
     /// The patterns around a feature, outermost first, and what they repeat.
@@ -329,7 +363,8 @@ impl<'m> Reader<'m> {
         Some(depth)
     }
 
-    fn shape(&mut self, node: Node<'m>, operation: u64, placement: &Frame, setup: Option<&Setup>) -> Option<Shape> {
+    /// `copies`: where the feature lies, for the elements of a compound one.
+    fn shape(&mut self, node: Node<'m>, operation: u64, placement: &Frame, copies: &[Frame], setup: Option<&Setup>) -> Option<Shape> {
         Some(match node.keyword() {
             "PLANAR_FACE" => self.face(node)?,
             "CLOSED_POCKET" => {
@@ -411,7 +446,7 @@ impl<'m> Reader<'m> {
                         self.not_lowered(e, " as an element of a compound feature");
                         return None;
                     }
-                    elements.push(self.feature(e, setup, operation)?);
+                    elements.push(self.feature_in(e, copies.to_vec(), setup, operation)?);
                 }
                 let own = |f: &Feature| self.model.get(f.origin.id).is_some_and(|n| n.nodes("its_operations").iter().any(|o| o.id() == operation));
                 let chosen: Vec<Feature> = elements.iter().filter(|f| own(f)).cloned().collect();
@@ -598,14 +633,38 @@ impl<'m> Reader<'m> {
         let bottom = match bottom.keyword() {
             "THROUGH_BOTTOM_CONDITION" => HoleBottom::Through,
             "FLAT_HOLE_BOTTOM" => HoleBottom::Flat,
-            "FLAT_WITH_RADIUS_HOLE_BOTTOM" => HoleBottom::Radiused(bottom.length("corner_radius").unwrap_or(0.0)),
-            "SPHERICAL_HOLE_BOTTOM" => HoleBottom::Spherical(bottom.length("radius").unwrap_or(diameter / 2.0)),
+            "FLAT_WITH_RADIUS_HOLE_BOTTOM" => {
+                let half = final_diameter.unwrap_or(diameter) / 2.0;
+                let radius = bottom.length("corner_radius").unwrap_or(0.0);
+                let must = format!("0 to {}, half the diameter of the hole", gr_step::short(half));
+                self.radius_fits(bottom, "corner_radius", radius, (0.0..=half + 1e-6).contains(&radius), &must)?;
+                HoleBottom::Radiused(radius)
+            }
+            "SPHERICAL_HOLE_BOTTOM" => {
+                let half = final_diameter.unwrap_or(diameter) / 2.0;
+                let radius = bottom.length("radius").unwrap_or(half);
+                let must = format!("{} or more, half the diameter of the hole", gr_step::short(half));
+                self.radius_fits(bottom, "radius", radius, radius >= half - 1e-6, &must)?;
+                // A ball much wider than the hole is a dish: it must end below the top of the hole.
+                let dish = radius - libm::sqrt((radius * radius - half * half).max(0.0));
+                let must = format!("such that its ball, {} mm deep in this hole, is no deeper than the hole, {} mm", gr_step::short(dish), gr_step::short(depth));
+                self.radius_fits(bottom, "radius", radius, dish <= depth + 1e-6, &must)?;
+                HoleBottom::Spherical(radius)
+            }
             "CONICAL_HOLE_BOTTOM" => {
                 HoleBottom::Conical(self.angle(bottom.real("tip_angle").unwrap_or(0.0)), bottom.length("tip_radius"))
             }
             _ => HoleBottom::Flat,
         };
         Some(Shape::Hole { diameter, final_diameter, bottom })
+    }
+
+    /// A radius of a bottom that its hole has room for, or what it must be.
+    fn radius_fits(&mut self, bottom: Node<'m>, attribute: &str, radius: f64, fits: bool, must: &str) -> Option<()> {
+        if !fits {
+            self.say_at(code::PLAN_BAD_SIZE, bottom, attribute, &[&title(bottom), attribute, &gr_step::short(radius), must]);
+        }
+        fits.then_some(())
     }
 
     fn slot_ends(&mut self, node: Node<'m>) -> Option<Vec<SlotEnd>> {
