@@ -2,6 +2,7 @@
 
 use std::path::Path;
 use std::sync::Arc;
+use std::sync::atomic::Ordering::Relaxed;
 
 use gr_lsp::Settings;
 use gr_lsp::host::{Host, Made, OutputJob, Plain, Plan, Station};
@@ -191,10 +192,10 @@ proptest! {
     }
 }
 
-/// A command that can't stand a certain text.
-struct Fragile;
+/// A host that does something when a STEP-NC file is looked at as a whole.
+struct Watched<F>(F);
 
-impl Host for Fragile {
+impl<F: Fn(&str) + Send + Sync> Host for Watched<F> {
     fn station(&self, _: &Path, _: &Settings) -> Station {
         Station::default()
     }
@@ -202,33 +203,7 @@ impl Host for Fragile {
         Vec::new()
     }
     fn check_exchange(&self, path: &Path, text: &str, station: &Station) -> Vec<Diagnostic> {
-        assert!(!text.contains("BREAK"), "a mistake of the server, on purpose");
-        Plain.check_exchange(path, text, station)
-    }
-    fn plan(&self, _: &Path, _: &str, _: &Station) -> Option<Plan> {
-        None
-    }
-    fn undeclared(&self, _: &Path, _: &str, _: &Settings) -> bool {
-        false
-    }
-    fn output(&self, _: &OutputJob<'_>) -> Result<Made, String> {
-        Err(String::new())
-    }
-}
-
-/// Counts how often a STEP-NC file is looked at as a whole.
-#[derive(Default)]
-struct Counting(std::sync::atomic::AtomicUsize);
-
-impl Host for Counting {
-    fn station(&self, _: &Path, _: &Settings) -> Station {
-        Station::default()
-    }
-    fn check_project(&self, _: &Path, _: &str) -> Vec<Diagnostic> {
-        Vec::new()
-    }
-    fn check_exchange(&self, path: &Path, text: &str, station: &Station) -> Vec<Diagnostic> {
-        self.0.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+        (self.0)(text);
         Plain.check_exchange(path, text, station)
     }
     fn plan(&self, _: &Path, _: &str, _: &Station) -> Option<Plan> {
@@ -247,8 +222,9 @@ impl Host for Counting {
 fn a_burst_of_keys_is_looked_at_once() {
     let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_time().build().expect("a runtime");
     runtime.block_on(async {
-        let host = Arc::new(Counting::default());
-        let mut c = Client::of(host.clone()).await;
+        let looks = Arc::new(std::sync::atomic::AtomicUsize::new(0));
+        let counter = looks.clone();
+        let mut c = Client::of(Arc::new(Watched(move |_: &str| drop(counter.fetch_add(1, Relaxed))))).await;
         let uri = "file:///programs/big.p21";
         let mut text = String::from("ISO-10303-21;\nDATA;\n");
         (1..120_000).for_each(|n| text.push_str(&format!("#{n}=CARTESIAN_POINT('',(0.,0.,0.));\n")));
@@ -261,7 +237,7 @@ fn a_burst_of_keys_is_looked_at_once() {
             c.notify("textDocument/didChange", json!({ "textDocument": { "uri": uri, "version": version }, "contentChanges": change })).await;
         }
         let _ = c.published(61, &mut Vec::new()).await;
-        let looks = host.0.load(std::sync::atomic::Ordering::Relaxed);
+        let looks = looks.load(Relaxed);
         assert!(looks < 10, "{looks} looks for 60 keys");
     });
     runtime.shutdown_background();
@@ -272,7 +248,8 @@ fn a_burst_of_keys_is_looked_at_once() {
 fn a_mistake_of_the_server_is_told() {
     let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_time().build().expect("a runtime");
     runtime.block_on(async {
-        let mut c = Client::of(Arc::new(Fragile)).await;
+        let fragile = |text: &str| assert!(!text.contains("BREAK"), "a mistake of the server, on purpose");
+        let mut c = Client::of(Arc::new(Watched(fragile))).await;
         let uri = "file:///programs/part.p21";
         c.open(uri, "ISO-10303-21;\nDATA;\n#1=A(#2);\n").await;
         let mut said = Vec::new();

@@ -43,6 +43,20 @@ pub enum Plane {
     Uw = 6,
 }
 
+impl Plane {
+    /// Its G-code.
+    pub fn code(self) -> &'static str {
+        match self {
+            Plane::Xy => "G17",
+            Plane::Xz => "G18",
+            Plane::Yz => "G19",
+            Plane::Uv => "G17.1",
+            Plane::Uw => "G18.1",
+            Plane::Vw => "G19.1",
+        }
+    }
+}
+
 /// How the controller follows the path.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub enum PathMode {

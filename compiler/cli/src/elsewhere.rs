@@ -13,14 +13,14 @@ use crate::pipeline::{Motion, Unit, motion_of};
 
 /// Where the translation goes another way.
 pub fn differs(unit: &Unit, source: &Motion, written: &str, to: &'static Dialect, length: f64) -> Option<Diagnostic> {
-    // Feeds and times follow from the ways; the numbers of tools are told elsewhere.
-    let tolerance = Tolerance { length, rate: 1.0, limit: 50, ..Tolerance::default() };
+    // Times follow from the ways; the numbers of tools are told elsewhere.
+    let tolerance = Tolerance { length, rate: 1e-3, limit: 50, ..Tolerance::default() };
     let mut there = Setup { dialect: to, ..unit.setup.clone() };
     if to.family != unit.setup.dialect.family {
         // Another control does not run that startup code.
         there.ini = gr_interp::Ini::default();
     }
-    let (first, why) = first(unit, source, &tolerance, |change| {
+    let (first, why) = first(unit, source, &tolerance, &[Aspect::Path, Aspect::Feed, Aspect::Event], |change| {
         motion_of("<translation>", written.to_string(), &change(&there)).program
     })?;
     let place = first.a.map_or(Source::default(), |(_, s)| s);
@@ -33,7 +33,7 @@ pub fn compared(same: Diff, a: (&Unit, &Motion), b: &Unit, tolerance: &Tolerance
     if [a.0, b].iter().any(|u| u.setup.dialect.family == Family::Ufmg2008) {
         return same;
     }
-    let found = first(a.0, a.1, tolerance, |change| lowered(b, &change(&b.setup)));
+    let found = first(a.0, a.1, tolerance, &[Aspect::Path, Aspect::Feed], |change| lowered(b, &change(&b.setup)));
     let Some((mut first, why)) = found else { return same };
     first.message = format!("the ways part here on a machine {}: {}", why.machine(), why.remedy().replace('`', ""));
     let mut out = same;
@@ -49,11 +49,13 @@ fn lowered(unit: &Unit, setup: &Setup) -> Program {
 /// Makes of a machine another one.
 type Change<'a> = &'a dyn Fn(&Setup) -> Setup;
 
-/// The first difference in the ways, and what makes it. `other`: what the other program does there.
+/// The first difference in one of these aspects, the first of them before the others, and what makes it. `other`: what the
+/// other program does there.
 fn first(
     unit: &Unit,
     motion: &Motion,
     tolerance: &Tolerance,
+    aspects: &[Aspect],
     other: impl Fn(Change<'_>) -> Program,
 ) -> Option<(Difference, Unknown)> {
     let unknown: Vec<Unknown> = Unknown::ALL.into_iter().filter(|u| u.is(&unit.setup, motion)).collect();
@@ -63,13 +65,13 @@ fn first(
             which.iter().for_each(|u| u.change(&mut setup, machine));
             setup
         };
-        diff(&lowered(unit, &change(&unit.setup)), &other(&change), tolerance)
-            .differences
-            .into_iter()
-            .find(|d| d.aspect == Aspect::Path)
+        let found = diff(&lowered(unit, &change(&unit.setup)), &other(&change), tolerance).differences;
+        aspects.iter().find_map(|a| found.iter().find(|d| d.aspect == *a).cloned())
     };
     for machine in machines(motion) {
-        let Some(all) = look(&unknown, machine) else { continue };
+        // What differs on every machine is told elsewhere.
+        let new = |d: &Difference| d.aspect == Aspect::Path || look(&[], machine).is_none();
+        let Some(all) = look(&unknown, machine).filter(new) else { continue };
         let alone = unknown.iter().find_map(|u| look(&[*u], machine).map(|d| (d, *u)));
         return Some(alone.unwrap_or((all, unknown[0])));
     }

@@ -231,6 +231,9 @@ fn a_translation_holds_on_every_machine_or_says_so() {
         "G21 G90\nT1 M6\no1 if [#5403 gt 100]\nG0 Z10\no1 endif\nG0 X1\nM2\n",
         "G21 G90 F100\nG0 X1 Y1 Z10\nG81 Z-1 R2\nX5\nG80\nM2\n",
         "G21 G91\nG0 X1 Y1\nG1 Z-1 F100\nM2\n",
+        // The feed of the first way depends on its length, the wait on what is in store.
+        "G21 G90 G93\nG1 X10 Y0 Z0 F2\nX20 F2\nM2\n",
+        "G21 G90\nG0 X1\nG4 P[ABS[#5221]]\nG0 X2\nM2\n",
     ] {
         for command in ["build a.ngc -o o.ngc", "verify a.ngc"] {
             let (found, status) = codes(&program(text), command);

@@ -390,7 +390,7 @@ impl<S: Sink> Interp<'_, S> {
     pub(crate) fn comp_on(&mut self, g: i16) -> Res {
         let plane = self.m.plane();
         if !matches!(plane, Plane::Xy | Plane::Xz) {
-            return Err(Fault::new(code::COMP_NOT_HERE, rs274::COMP_PLANE).arg(format!("the plane is {}, it must be G17 or G18", crate::queue::plane_code(plane))));
+            return Err(Fault::new(code::COMP_NOT_HERE, rs274::COMP_PLANE).arg(format!("the plane is {}, it must be G17 or G18", plane.code())));
         }
         if self.m.side() != Side::Off {
             return Err(Fault::new(code::COMP_NOT_HERE, rs274::COMP_TWICE).arg("it is on already"));

@@ -206,18 +206,6 @@ fn move_arc_end(arc: &mut ArcMove, p: [f64; 2], start: Option<[f64; 2]>, toleran
     Ok(())
 }
 
-/// The code that chooses a plane.
-pub(crate) fn plane_code(plane: Plane) -> &'static str {
-    match plane {
-        Plane::Xy => "G17",
-        Plane::Yz => "G19",
-        Plane::Xz => "G18",
-        Plane::Uv => "G17.1",
-        Plane::Vw => "G19.1",
-        Plane::Uw => "G18.1",
-    }
-}
-
 /// Indices in [`Axes`] of the first, second and third axis of a plane.
 pub(crate) fn plane_axes(plane: Plane) -> [usize; 3] {
     match plane {

@@ -5,7 +5,7 @@
 //! meant; if it fails, the centre is moved to where both radii agree and written with more decimals, and if that
 //! does not help either the arc is divided or becomes straight pieces.
 
-use super::emit::{Emitter, plane_word};
+use super::emit::Emitter;
 use super::write::AXES;
 use super::{Arcs, Language};
 use crate::sweep::Sweep;
@@ -229,7 +229,7 @@ impl Emitter<'_> {
     fn write(&mut self, view: &View<'_, '_>, start: &Pose, end: &Pose, plane: Plane, turns: i32, c: &Candidate) {
         let (f, s, _) = plane_axes(plane);
         if plane != self.plane {
-            self.w.block(plane_word(plane));
+            self.w.block(plane.code());
             self.plane = plane;
         }
         let mut line = vec![if turns > 0 { "G3".to_string() } else { "G2".to_string() }];

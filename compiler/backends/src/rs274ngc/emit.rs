@@ -292,7 +292,7 @@ impl<'a> Emitter<'a> {
             remarks.iter().for_each(|r| self.w.comment(r));
         }
         let units = if self.options.units == Units::Inch { "G20" } else { "G21" };
-        let plane = plane_word(self.plane);
+        let plane = self.plane.code();
         let rest = match self.options.language {
             Language::Linuxcnc if self.options.arcs == super::Arcs::IjkAbsolute => "G40 G80 G90 G90.1 G94",
             Language::Linuxcnc if self.options.diameters || turns(self.program, self.sources) => {
@@ -408,17 +408,6 @@ impl<'a> Emitter<'a> {
             }
             (Stop::Pallet, _) => self.cannot("a pallet change", view.source),
         }
-    }
-}
-
-pub(super) fn plane_word(plane: Plane) -> &'static str {
-    match plane {
-        Plane::Xy => "G17",
-        Plane::Xz => "G18",
-        Plane::Yz => "G19",
-        Plane::Uv => "G17.1",
-        Plane::Uw => "G18.1",
-        Plane::Vw => "G19.1",
     }
 }
 

@@ -17,14 +17,7 @@ pub fn codes(m: &Modal) -> Vec<String> {
     if m.motion >= 0 {
         codes.push(code_name(b'g', f64::from(m.motion) / 10.0));
     }
-    codes.push(match m.plane() {
-        Plane::Xy => "G17",
-        Plane::Xz => "G18",
-        Plane::Yz => "G19",
-        Plane::Uv => "G17.1",
-        Plane::Uw => "G18.1",
-        Plane::Vw => "G19.1",
-    }.into());
+    codes.push(m.plane().code().into());
     codes.push(if m.units() == Units::Inch { "G20" } else { "G21" }.into());
     codes.push(match m.side() {
         Side::Off => "G40",
