@@ -11,7 +11,7 @@ use gr_text::{Diagnostic, code};
 
 use crate::pipeline::{Motion, Unit, motion_of};
 
-/// Where the translation goes another way.
+/// Where the translation goes another way: read back as it is, or on such a machine.
 pub fn differs(unit: &Unit, source: &Motion, written: &str, to: &'static Dialect, length: f64) -> Option<Diagnostic> {
     // Times follow from the ways; the numbers of tools are told elsewhere.
     let tolerance = Tolerance { length, rate: 1e-3, limit: 50, ..Tolerance::default() };
@@ -20,12 +20,18 @@ pub fn differs(unit: &Unit, source: &Motion, written: &str, to: &'static Dialect
         // Another control does not run that startup code.
         there.ini = gr_interp::Ini::default();
     }
-    let (first, why) = first(unit, source, &tolerance, &[Aspect::Path, Aspect::Feed, Aspect::Event], |change| {
-        motion_of("<translation>", written.to_string(), &change(&there)).program
-    })?;
-    let place = first.a.map_or(Source::default(), |(_, s)| s);
-    let (file, span) = gr_backends::Sources::place(&crate::emit::texts(source), place);
-    Some(Diagnostic::new(code::EMIT_ELSEWHERE, file, span, &[why.machine().into(), why.remedy().into()]))
+    let told = |difference: &Difference, code, args: &[String]| {
+        let place = difference.a.map_or(Source::default(), |(_, s)| s);
+        let (file, span) = gr_backends::Sources::place(&crate::emit::texts(source), place);
+        Some(Diagnostic::new(code, file, span, args))
+    };
+    let again = |setup: &Setup| motion_of("<translation>", written.to_string(), setup).program;
+    let same = diff(&source.program, &again(&there), &tolerance).differences;
+    if let Some(difference) = same.iter().find(|d| d.aspect == Aspect::Path) {
+        return told(difference, code::EMIT_NOT_EQUAL, std::slice::from_ref(&difference.message));
+    }
+    let (first, why) = first(unit, source, &tolerance, &[Aspect::Path, Aspect::Feed, Aspect::Event], |change| again(&change(&there)))?;
+    told(&first, code::EMIT_ELSEWHERE, &[why.machine().into(), why.remedy().into()])
 }
 
 /// Two programs that go the same way in the simulation, compared on such a machine.
@@ -131,8 +137,8 @@ impl Unknown {
     fn change(self, setup: &mut Setup, n: &Numbers) {
         match self {
             Unknown::Stored => {
-                // G55 is in force, and no origin is where another is.
-                setup.params.insert(5220, 2.0);
+                // No origin is where another is.
+                setup.params.insert(5220, n.system);
                 for (k, base) in [5161u32, 5181, 5211].into_iter().chain((1..=9).map(|n| 5201 + 20 * n)).enumerate() {
                     for axis in 0..9u32 {
                         setup.params.insert(base + axis, n.origin + n.step * k as f64 + 0.75 * f64::from(axis));
@@ -157,20 +163,22 @@ impl Unknown {
 
 /// Numbers of a machine, none of which can be mistaken for zero or for another.
 struct Numbers {
+    /// The work offset in force.
+    system: f64,
     origin: f64,
     step: f64,
     length: f64,
     start: f64,
 }
 
-const NEAR: Numbers = Numbers { origin: 1.5, step: 2.25, length: 3.5, start: 0.625 };
-const BELOW: Numbers = Numbers { origin: -411.5, step: 12.25, length: 93.5, start: -41.375 };
-const ABOVE: Numbers = Numbers { origin: 211.5, step: 31.25, length: 193.5, start: 141.375 };
+const NEAR: Numbers = Numbers { system: 2.0, origin: 1.5, step: 2.25, length: 3.5, start: 0.625 };
+const BELOW: Numbers = Numbers { system: 1.0, origin: -411.5, step: 12.25, length: 93.5, start: -41.375 };
+const ABOVE: Numbers = Numbers { system: 9.0, origin: 211.5, step: 31.25, length: 193.5, start: 141.375 };
 
-/// One machine tells whether ways depend on it; where the program asks what its values are, it may take another branch
-/// on others.
+/// Origins above and below the machine's zero tell whether heights depend on them; where the program asks what its values
+/// are, it may take another branch on others.
 fn machines(motion: &Motion) -> &'static [Numbers] {
     let asks = |text: &str| text.lines().any(|l| l.contains('#') && l.contains(['5', '<']));
     let branches = motion.sources.iter().any(|(_, f)| asks(&f.text));
-    if branches { &[NEAR, BELOW, ABOVE] } else { &[NEAR] }
+    if branches { &[NEAR, BELOW, ABOVE] } else { &[NEAR, BELOW] }
 }

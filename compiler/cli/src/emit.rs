@@ -616,11 +616,14 @@ fn normalised(motion: &Motion, unit: &Unit, options: &TargetOptions, name: &str)
         table = plan.own_table.then(|| gr_planner::tool_table(&plan.tools));
     }
     let texts = texts(motion);
-    Ok(rs274ngc::emit(&motion.program, &o, &texts).map(|mut e| {
+    Ok(rs274ngc::emit(&motion.program, &o, &texts).and_then(|mut e| {
         e.notes.extend(state_told(motion, unit, options, &o, &e.text));
+        if e.notes.iter().any(|d| d.severity == gr_text::Severity::Error) {
+            return Err(e.notes);
+        }
         let mut artifacts = vec![Artifact { lines: e.lines, ..Artifact::new("", e.text.into_bytes()) }];
         artifacts.extend(table.map(|t| Artifact::new(".tbl", t.into_bytes())));
-        (artifacts, e.notes)
+        Ok((artifacts, e.notes))
     }))
 }
 

@@ -159,6 +159,7 @@ pub fn assembled(args: &SetupArgs, lints: &LintArgs, from: &Path, sources: &mut 
     if let Some(path) = &tools {
         reader.tools(path, &mut setup);
     } else {
+        reader.no_table(&setup);
         setup.tools = gr_interp::assumed_tools();
     }
     reader.named_as(args.vars.is_none(), "vars");
@@ -423,6 +424,13 @@ impl Reader<'_> {
         self.show(&found);
         setup.ini = ini;
         self.ini = Some((file, text));
+    }
+    /// A tool table that the INI file names and that is not there: LinuxCNC does not start without it.
+    fn no_table(&mut self, setup: &Setup) {
+        let (Some((file, text)), Some(name)) = (self.ini.clone(), setup.ini.get("EMCIO", "TOOL_TABLE")) else { return };
+        let place = text.find(name).map_or(Span::default(), |at| Span::new(at as u32, (at + name.len()) as u32));
+        let args = [name.to_string(), "TOOL_TABLE".into(), "there is no such file".into()];
+        self.show(&[Diagnostic::new(code::INI_VALUE, file, place, &args)]);
     }
     /// Remapped codes whose subroutine is nowhere.
     fn remaps(&mut self, setup: &Setup) {

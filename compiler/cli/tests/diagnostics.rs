@@ -94,7 +94,7 @@ fn tables_and_settings() {
     let machine = file("m.toml", &shipped("spec/machines/generic/mill3.toml").replace("[start]", "[cutting]\naxial_depth = 1.5\n\n[start]"));
     told("E0448", &[machine, file("a.p21", &plan(&[]))], "check --machine m.toml a.p21");
     told("E0829", &[part.clone(), file("a.ini", "[TRAJ]\nwhat is this\n")], "check -i a.ini a.ngc");
-    for line in ["[TRAJ]\nSPINDLES = 9", "[AXIS_X]\nMAX_LIMIT = 400 # mm", "[EMCIO]\nTOOL_CHANGE_AT_G30 = YES"] {
+    for line in ["[TRAJ]\nSPINDLES = 9", "[AXIS_X]\nMAX_LIMIT = 400 # mm", "[EMCIO]\nTOOL_CHANGE_AT_G30 = YES", "[EMCIO]\nTOOL_TABLE = none.tbl"] {
         told("E0852", &[part.clone(), file("a.ini", &format!("{line}\n"))], "check -i a.ini a.ngc");
     }
     // What a strict check does not pass is not passed in set-up files either.
@@ -181,6 +181,8 @@ fn what_a_written_program_cannot_carry() {
     told("E0603", std::slice::from_ref(&arc), "build a.ngc --target rs274ngc --decimals 1 -o a.nc");
     told("E0604", &[arc], "build a.ngc --target rs274ngc --to grbl --arcs ijk-absolute -o a.nc");
     told("E0605", &[file("a.ngc", "G21 G90\nG10 L2 P2 X10\nG55 G0 X1\nM2\n")], "build a.ngc --target rs274ngc -o a.nc");
+    let own = [file("a.ngc", "G20 G90\nT1 M6\nG0 X1\nM2\n"), file("a.ini", "[RS274NGC]\nREMAP=M6 modalgroup=6 ngc=change\n[TRAJ]\nLINEAR_UNITS=mm\n"), file("change.ngc", "o<change> sub\nG53 G0 Z1\nM6\no<change> endsub\nM2\n")];
+    told("E0609", &own, "build a.ngc -i a.ini --target rs274ngc -o a.nc");
     told("E0608", &[file("a.ngc", "G21 G90\nG0 X1 Y1 Z1\nG28.1\nM2\n")], "build a.ngc --target rs274ngc -o a.nc");
     told("E0606", &[file("a.p21", &plan(&[]))], "build a.p21 --cutter-compensation control -o a.nc");
     told("E0614", &[file("a.ngc", PART)], "build a.ngc --target rs274ngc --from-line 4 -o a.nc");

@@ -217,7 +217,7 @@ pub struct Motion {
 
 /// Runs a program and lowers it to motion.
 pub fn lower(path: &str, text: Text, setup: &Setup, rules: Option<&Rules>) -> Motion {
-    let Streamed { sink, files, clean, .. } = stream(path, text, setup, rules, Mute(Lowering::new()));
+    let Streamed { sink, files, clean, .. } = stream(path, text, setup, rules, Mute(Lowering::new().on(setup.machine_units)));
     let mut lowering = sink.0;
     let texts = files.texts();
     for (i, (name, _)) in texts.iter().enumerate() {

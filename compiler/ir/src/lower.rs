@@ -13,6 +13,8 @@ const RAD: f64 = std::f64::consts::PI / 180.0;
 pub struct Lowering {
     out: Builder,
     points: Vec<f64>,
+    /// Units of the machine, in which it is told of its tool table.
+    machine: Units,
 }
 
 impl Lowering {
@@ -22,7 +24,11 @@ impl Lowering {
     }
     /// Goes on from a pose and a state (for a program lowered in pieces).
     pub fn from_state(pose: Pose, state: State) -> Lowering {
-        Lowering { out: Builder::from_state(pose, state), points: Vec::new() }
+        Lowering { out: Builder::from_state(pose, state), ..Lowering::default() }
+    }
+    /// On a machine with these length units; without it, mm.
+    pub fn on(self, machine: Units) -> Lowering {
+        Lowering { machine, ..self }
     }
     /// The program.
     pub fn finish(self) -> Program {
@@ -43,7 +49,10 @@ impl Lowering {
     }
     #[inline]
     fn axes(&self, a: &Axes) -> Axes {
-        let k = self.scale();
+        Self::scaled(a, self.scale())
+    }
+    #[inline]
+    fn scaled(a: &Axes, k: f64) -> Axes {
         let r = RAD;
         [a[0] * k, a[1] * k, a[2] * k, a[3] * r, a[4] * r, a[5] * r, a[6] * k, a[7] * k, a[8] * k]
     }
@@ -176,15 +185,11 @@ impl Lowering {
             Call::SetNaivecamTolerance(t) => Op::MergeTolerance(t * k),
             Call::SetPlannerMode(kind, corner) => Op::Planner((kind != 0).then_some(corner)),
             Call::UseToolLengthOffset(ref a) => Op::ToolOffset(self.axes(a)),
-            Call::SetToolTableEntry(pocket, tool, ref o, diameter, front, back, orientation) => Op::ToolEntry {
-                pocket,
-                tool,
-                offset: self.axes(o),
-                diameter: diameter * k,
-                front: front * RAD,
-                back: back * RAD,
-                orientation,
-            },
+            Call::SetToolTableEntry(pocket, tool, ref o, diameter, front, back, orientation) => {
+                let k = if self.machine == Units::Inch { 25.4 } else { 1.0 };
+                let (offset, diameter) = (Self::scaled(o, k), diameter * k);
+                Op::ToolEntry { pocket, tool, offset, diameter, front: front * RAD, back: back * RAD, orientation }
+            }
             _ => return None,
         })
     }

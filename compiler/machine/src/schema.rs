@@ -252,12 +252,31 @@ impl Check {
             let joint = &machine.joints[i];
             self.value(&given.span, format!("at home the controller's `{}` is at {}, outside of its limits: it is counted together with another joint", joint.name, joint.show(value)));
         }
+        let frames = raw.get("frame").map_or(&[][..], Node::list);
+        self.frame_names(frames);
         let named = |n: &&Node| n.string("name").as_deref() == Some(MACHINE_ZERO);
-        let Some(frame) = raw.get("frame").and_then(|l| l.list().iter().find(named)) else { return };
+        let Some(frame) = frames.iter().find(named) else { return };
         if machine.kind != Kind::Robot {
             self.value(&frame.span, format!("the frame `{MACHINE_ZERO}` is for robots: on this machine G53, G28 and G30 mean places of its own axes"));
         } else if let Some(rotation) = frame.get("rotation") {
             self.value(&rotation.span, format!("the frame `{MACHINE_ZERO}` has no `rotation`: X, Y and Z of the machine are those of the part, as on the mill the program is for"));
+        }
+    }
+
+    /// A program calls frames by the codes of its work offsets, letter by letter.
+    fn frame_names(&mut self, frames: &[Node]) {
+        const CODES: [&str; 9] = ["G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3"];
+        let mut seen = Vec::new();
+        for name in frames.iter().filter_map(|f| f.get("name")) {
+            let text = name.text().unwrap_or_default();
+            let like = text.trim().strip_prefix(['g', 'G']).is_some_and(|rest| rest.starts_with(|c: char| c.is_ascii_digit()));
+            if seen.contains(&text) {
+                self.value(&name.span, format!("the frame `{text}` is given twice"));
+            } else if like && text != MACHINE_ZERO && !CODES.contains(&text) {
+                let close = suggestion(&text.trim().to_uppercase(), &CODES).unwrap_or("G54");
+                self.value(&name.span, format!("no program calls a frame `{text}`; did you mean `{close}`?"));
+            }
+            seen.push(text);
         }
     }
 
@@ -914,6 +933,7 @@ mod tests {
             ("[io.G38]\nwait = \"di\"\n", "signal = ", &["\"do\""]),
             ("[io.G38]\n", "value = ", &["1"]),
             ("[io.M8]\nroutine = \"Cool\"\n", "signal = ", &["\"do\""]),
+            ("[[frame]]\n", "name = ", &["\"g55\"", "\"G55 \"", "\"G59.4\"", "\"G060\"", "\"G55\"\n[[frame]]\nname = \"G55\""]),
             ("[[frame]]\nname = \"G53\"\nposition = [0, 0, 900]\n", "rotation = ", &["[0, 0, 90]"]),
             (tool, "mass = ", &["-1", "0"]),
             (tool, "diameter = ", &["-10", "0"]),

@@ -119,6 +119,13 @@ local function filetype_of(name, lines)
   return vim.bo.filetype
 end
 
+test("the root is found in a folder with blanks and commas", function()
+  local folder = scratch .. "/my parts, all"
+  vim.fn.mkdir(folder .. "/sub", "p")
+  vim.fn.writefile({ "schema = 1" }, folder .. "/gcc-robot.toml")
+  equal(require("gcc-robot").root(folder .. "/sub/pocket.ngc"), folder, "the root")
+end)
+
 test("names of G-code files, any case", function()
   for _, ending in ipairs({ "ngc", "NGC", "nc", "Nc", "cnc", "tap", "eia", "gc", "g", "gcode", "GCODE" }) do
     equal(filetype_of("part." .. ending), "gcode", ending)

@@ -299,15 +299,15 @@ fn rename_name(view: &View, named: &Named, new: &str, moves_files: bool) -> Resu
         Name::Line(n) => jumped_to(reach, *n).map_or(Ok(None), Err)?,
         _ => None,
     };
-    let edited: BTreeMap<usize, String> = places.iter().map(|(i, spans)| (*i, replaced(reach.text(*i), spans, &new))).collect();
+    let edited: BTreeMap<usize, String> = places.iter().map(|(i, spans)| (*i, replaced(reach.text(*i), spans, |s| names::spelled(name, reach.dialect, s, &new)))).collect();
     reach.prove(view, &edited, moved.as_ref().map(|m| (m.0, m.1.as_path())))?;
     Ok(edit_of(view, named, &new, moved))
 }
 
 /// A text with other names in it.
-fn replaced(mut text: String, spans: &[gr_ide::Occurrence], new: &str) -> String {
+fn replaced(mut text: String, spans: &[gr_ide::Occurrence], new: impl Fn(gr_text::Span) -> String) -> String {
     for o in spans.iter().rev() {
-        text.replace_range(o.span.range(), new);
+        text.replace_range(o.span.range(), &new(o.span));
     }
     text
 }
@@ -378,7 +378,8 @@ fn jumped_to(reach: &Reach, n: i64) -> Option<String> {
 fn edit_of(view: &View, named: &Named, new: &str, moved: Option<(usize, PathBuf)>) -> lsp::WorkspaceEdit {
     let edits = |i: usize, spans: &[gr_ide::Occurrence]| -> Vec<lsp::TextEdit> {
         let text = Text::new(&named.reach.text(i));
-        spans.iter().map(|o| lsp::TextEdit { range: text.range(o.span, view.columns), new_text: new.to_string() }).collect()
+        let new_text = |o: &gr_ide::Occurrence| names::spelled(&named.name, named.reach.dialect, o.span, new);
+        spans.iter().map(|o| lsp::TextEdit { range: text.range(o.span, view.columns), new_text: new_text(o) }).collect()
     };
     let of = |(i, spans): &(usize, Vec<gr_ide::Occurrence>)| (named.reach.files[*i].uri.clone(), edits(*i, spans));
     let all = named.places.iter().map(of);

@@ -406,7 +406,9 @@ impl Emitter<'_> {
         }
         let from = [self.at[0], self.at[1]];
         let offset = |a: [f64; 3], b: [f64; 2]| [a[0] - b[0], a[1] - b[1]];
-        let words = self.axis_words(view.start, view.end, view.source, &[0, 1]);
+        let mut words = self.axis_words(view.start, view.end, view.source, &[0, 1]);
+        // Words that are only repeated have no place in a spline.
+        words.retain(|w| w.starts_with(['X', 'Y']));
         let to = [self.at[0], self.at[1]];
         let mut line = vec![if order == 4 { "G5".to_string() } else { "G5.1".to_string() }];
         line.extend(words);

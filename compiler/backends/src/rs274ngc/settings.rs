@@ -77,7 +77,8 @@ impl Emitter<'_> {
     /// Words of the axes in which two offsets differ, with all the decimals an offset needs.
     fn changed(&self, new: &Axes, old: &Axes) -> Vec<String> {
         let places = self.w.places.max(9);
-        let differs = (0..9).filter(|i| new[*i] != old[*i]);
+        // The same value, stored in inches and told in mm, may differ in its last bit.
+        let differs = (0..9).filter(|i| (new[*i] - old[*i]).abs() > 1e-10);
         differs.map(|i| format!("{}{}", AXES[i], self.w.axis_fine(i, new[i], places).0)).collect()
     }
 

@@ -299,6 +299,8 @@ fn a_new_name_changes_nothing_or_is_refused() {
     let fanuc = json!({ "dialect": "fanuc-mill" });
     let macros = "O0001\nG21 G90 F100\nG65 P2000 A1.\nM98 P2000\nM30\nO2000\nG1 X5.\nM99\n";
     assert_eq!(renaming(&[("m.nc", macros)], fanuc.clone(), "O2|000", "2001"), Ok(()));
+    let packed = "O0001\nG21 G90 F100\nM98 P20002\nM98 P0002 L2\nM30\nO0002\nG1 X5.\nM99\n";
+    assert_eq!(renaming(&[("m.nc", packed)], fanuc.clone(), "O0|002", "9"), Ok(()));
     let told = renaming(&[("m.nc", "#101=20\nGOTO #101\nN20 G1 X1 F100\nM30\n")], fanuc, "N2|0", "30").expect_err("a computed jump");
     assert!(told.contains("computed"), "{told}");
     // An editor that renames no files.

@@ -7,7 +7,7 @@ use gr_gcode::{Form, Keyword, Label, Parameter, Symbols, Word};
 use gr_text::Span;
 
 use super::doc::{Doc, LineOf};
-use crate::{Edit, Occurrence, Role};
+use crate::{Occurrence, Role};
 
 /// Something that has a name.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -482,9 +482,12 @@ fn plain_name(new: &str) -> Result<String, String> {
     if good { Ok(inside.to_string()) } else { Err("a name has letters, digits and _".into()) }
 }
 
-/// Edits that rename a name in one file. `new` was checked.
-pub fn rename(doc: Doc<'_>, name: &Name, line: Option<u32>, new: &str) -> Vec<Edit> {
-    occurrences(doc, name, line).into_iter().map(|o| Edit { span: o.span, text: new.to_string() }).collect()
+/// How a new name is written where the old one stands: O0002 of a Fanuc control keeps its four digits, and in `M98 P20002` it
+/// has to.
+pub fn spelled(name: &Name, dialect: &gr_spec::Dialect, old: Span, new: &str) -> String {
+    let padded = dialect.family == gr_spec::Family::Fanuc && matches!(name, Name::Sub(Label::Number(_)));
+    let width = if padded { old.range().len().min(4) } else { 0 };
+    format!("{new:0>width$}")
 }
 
 /// The name of the same kind with other letters or digits.

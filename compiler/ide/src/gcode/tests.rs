@@ -6,7 +6,7 @@ use proptest::prelude::*;
 
 use super::complete::{Around, complete, signature};
 use super::hover::{Facts, hover};
-use super::names::{definitions, linked, name_at, occurrences, rename};
+use super::names::{definitions, linked, name_at, occurrences};
 use super::{Doc, outline, tokens};
 
 fn file(text: &str) -> File {
@@ -40,7 +40,7 @@ fn local_names_stay_in_their_sub() {
     let (name, span) = name_at(doc(&f), call).expect("a name");
     assert_eq!(&TEXT[span.range()], "a");
     assert_eq!(definitions(doc(&f), &name, None).len(), 1);
-    assert_eq!(rename(doc(&f), &name, None, "b").len(), 3);
+    assert_eq!(occurrences(doc(&f), &name, None).len(), 3);
 }
 
 /// A main program is called by nobody, and that is no news; one that is called, or a subprogram that nobody calls, is.

@@ -38,10 +38,12 @@ end
 --- The folder with the nearest root marker above a file, else the file's own folder.
 function M.root(path)
   local folder = vim.fn.fnamemodify(path, ":p:h")
+  -- In a list of folders a blank or a comma parts two, and `;` means upwards.
+  local upwards = folder:gsub("([ ,;\\])", "\\%1") .. ";"
   for _, marker in ipairs(M.root_markers) do
-    local found = vim.fn.findfile(marker, folder .. ";")
+    local found = vim.fn.findfile(marker, upwards)
     if found == "" then
-      found = vim.fn.finddir(marker, folder .. ";")
+      found = vim.fn.finddir(marker, upwards)
     end
     if found ~= "" then
       return vim.fn.fnamemodify(found, ":p:h" .. (vim.fn.isdirectory(found) == 1 and ":h" or ""))
