@@ -56,6 +56,9 @@ pub fn from_line(
     if inside_cycle(program, found.index) || cursor.state().sync.is_some() || threaded(program, found.index) {
         return fault(code::FROM_LINE_INSIDE_CYCLE);
     }
+    if put_away(program, found.index, sources) {
+        return fault(code::FROM_LINE_SHIFT_PUT_AWAY);
+    }
     let asks = |w: Words| w.names_axes() || w.has(b'm') || w.has(b't') || w.has(b's');
     let skipped = Words::at(sources, file, target).is_some_and(asks);
     if let Some(at) = found.begins_at.filter(|_| skipped) {
@@ -401,6 +404,14 @@ fn names_system(program: &Program, index: usize, line: u32, sources: &dyn Source
     let codes = [540, 550, 560, 570, 580, 590, 591, 592, 593];
     program.steps().take(index).any(|s| selected(&s))
         || (0..line).map_while(|l| Words::at(sources, FileId(0), l)).any(|w| codes.iter().any(|g| w.g(*g)))
+}
+
+/// Whether a shift by G92 is put away by G92.2 where the program begins, and comes back by G92.3.
+fn put_away(program: &Program, index: usize, sources: &dyn Sources) -> bool {
+    let asked = |s: &gr_ir::Step<'_>, codes: &[u32]| Words::at(sources, s.source.file, s.source.line).is_some_and(|w| codes.iter().any(|g| w.g(*g)));
+    let shift = |s: &gr_ir::Step<'_>| matches!(s.op, Op::LocalOffset(_));
+    let last = program.steps().take(index).filter(shift).last();
+    last.is_some_and(|s| asked(&s, &[922])) && program.steps().skip(index).filter(shift).any(|s| asked(&s, &[923]))
 }
 
 /// Whether the length unit changed while a tool offset was active.

@@ -405,6 +405,9 @@ fn starts_from_a_line() {
     insta::assert_snapshot!("from_line_offsets", from(OFFSETS, 7).unwrap().0);
     assert_eq!(slug(from(COMPENSATED, 5)), "from-line/inside-compensation");
     assert!(from(COMPENSATED, 3).is_ok());
+    let shifted = "G21 G90\nG0 X0 Y0 Z5\nG92 X10\nG92.2\nG0 X5\nX6\nG92.3\nG0 X7\nX8\nM2\n";
+    assert_eq!(slug(from(shifted, 6)), "from-line/shift-put-away");
+    assert!(from(shifted, 3).is_ok() && from(shifted, 9).is_ok());
     assert_eq!(slug(from(PLAIN, 99)), "from-line/nothing-left");
     assert_eq!(from(STRUCTURED, 4).unwrap().1, ["from-line/inside-loop"]);
 }

@@ -185,6 +185,8 @@ fn what_a_written_program_cannot_carry() {
     told("E0609", &own, "build a.ngc -i a.ini --target rs274ngc -o a.nc");
     told("E0608", &[file("a.ngc", "G21 G90\nG0 X1 Y1 Z1\nG28.1\nM2\n")], "build a.ngc --target rs274ngc -o a.nc");
     told("E0606", &[file("a.p21", &plan(&[]))], "build a.p21 --cutter-compensation control -o a.nc");
+    let shifted = "G21 G90\nG0 X0 Y0 Z5\nG92 X10\nG92.2\nG0 X5\nX6\nG92.3\nG0 X7\nM2\n";
+    told("E0650", &[file("a.ngc", shifted)], "build a.ngc --target rs274ngc --from-line 6 -o a.nc");
     told("E0614", &[file("a.ngc", PART)], "build a.ngc --target rs274ngc --from-line 4 -o a.nc");
     let deep = "G21 G90 F100\nG0 X0 Y0 Z5\nX9\nG1 Z-3\nX5\nG0 Z5\nX20\nG1 Z-3\nX30\nM2\n";
     let bare = "G21 G90 F100\nT1 M6\nG0 X1 Y1\nG43 H1 Z5\nG1 Z-1\nM2\n";
