@@ -224,7 +224,10 @@ fn a_burst_of_keys_is_looked_at_once() {
     runtime.block_on(async {
         let looks = Arc::new(std::sync::atomic::AtomicUsize::new(0));
         let counter = looks.clone();
-        let mut c = Client::of(Arc::new(Watched(move |_: &str| drop(counter.fetch_add(1, Relaxed))))).await;
+        let count = move |_: &str| {
+            counter.fetch_add(1, Relaxed);
+        };
+        let mut c = Client::of(Arc::new(Watched(count))).await;
         let uri = "file:///programs/big.p21";
         let mut text = String::from("ISO-10303-21;\nDATA;\n");
         (1..120_000).for_each(|n| text.push_str(&format!("#{n}=CARTESIAN_POINT('',(0.,0.,0.));\n")));
