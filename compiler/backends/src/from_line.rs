@@ -7,7 +7,7 @@ pub(crate) use approach::is_lathe;
 
 use std::collections::BTreeMap;
 
-use crate::sources::{Words, is_hidden};
+use crate::sources::{SYSTEMS, Words, is_hidden};
 use gr_ir::Sources;
 use gr_ir::{Axes, Builder, FrameId, Marker, Note, Op, Override, PathMode, Pose, Program, Source, State, Turn, Units};
 use gr_text::{Diagnostic, FileId, Span, code};
@@ -401,9 +401,8 @@ fn build(program: &Program, from: &From, state: &State, pose: &Pose, safe: f64, 
 fn names_system(program: &Program, index: usize, line: u32, sources: &dyn Sources) -> bool {
     let begun = crate::begins(program);
     let selected = |s: &gr_ir::Step<'_>| s.index >= begun && matches!(s.op, Op::WorkOffset(..));
-    let codes = [540, 550, 560, 570, 580, 590, 591, 592, 593];
     program.steps().take(index).any(|s| selected(&s))
-        || (0..line).map_while(|l| Words::at(sources, FileId(0), l)).any(|w| codes.iter().any(|g| w.g(*g)))
+        || (0..line).map_while(|l| Words::at(sources, FileId(0), l)).any(|w| SYSTEMS[1..].iter().any(|g| w.g(*g)))
 }
 
 /// Whether a shift by G92 is put away by G92.2 where the program begins, and comes back by G92.3.

@@ -112,6 +112,9 @@ pub fn is_hidden(program: &Program, index: usize) -> bool {
     before.take_while(|s| !s.op.moves()).any(|s| matches!(s.op, Op::Note(Note::Comment, "AXIS,hide")))
 }
 
+/// Codes, times ten, of the work offsets by their numbers.
+pub(crate) const SYSTEMS: [u32; 10] = [0, 540, 550, 560, 570, 580, 590, 591, 592, 593];
+
 /// Where the program, or a file it calls, first stores a reference point of its own, and by which code.
 pub fn stores_reference(program: &Program, sources: &dyn Sources) -> Option<(Source, &'static str)> {
     let files: std::collections::BTreeSet<_> = program.steps().map(|s| s.source.file).collect();

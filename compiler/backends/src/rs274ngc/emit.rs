@@ -2,15 +2,13 @@
 
 use super::write::Writer;
 use super::{Emitted, Language, Options};
-use crate::sources::{Words, stores_reference};
+use crate::sources::{SYSTEMS, Words, stores_reference};
 use gr_ir::Sources;
 use gr_ir::{Axes, FeedMode, Marker, Note, Op, Override, Plane, Program, Source, State, Stop, Turn, Units, View};
 use gr_text::{Code, Diagnostic, FileId, Findings, code};
 
 /// Decimals of compensated contours at least.
 const CONTOUR_PLACES: usize = 7;
-/// Codes, times ten, of the work offsets by their numbers.
-const SYSTEMS: [u32; 10] = [0, 540, 550, 560, 570, 580, 590, 591, 592, 593];
 /// Findings reported at most.
 const MOST_FAULTS: usize = 100;
 

@@ -125,8 +125,8 @@ impl Emitter<'_> {
         let words = self.words(view.source)?;
         let here = words.g(100) && self.number_of('l', view.source) == Some(20);
         if here && self.options.language == Language::FanucMill {
-            let named = (0..9).filter(|i| words.has(AXES[*i].to_ascii_lowercase() as u8));
-            if !self.options.stored_known || !named.clone().all(|i| self.anchored[i] && !self.loose[i]) {
+            let mut named = (0..9).filter(|i| words.has(AXES[*i].to_ascii_lowercase() as u8));
+            if !self.options.stored_known || !named.all(|i| self.anchored[i] && !self.loose[i]) {
                 self.cannot("a work offset set from where the tool stands (G10 L20)", view.source);
                 return Some(String::new());
             }
