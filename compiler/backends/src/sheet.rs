@@ -15,6 +15,29 @@ pub struct Options {
     pub rates: Rates,
     /// Rows of the tool table.
     pub tools: Vec<ToolRow>,
+    /// Rails and positioners of the machine.
+    pub external: Vec<Standing>,
+}
+
+/// Where a rail or positioner has to stand while the program runs.
+#[derive(Clone, PartialEq, Debug, Default)]
+pub struct Standing {
+    /// Name on the controller.
+    pub name: String,
+    /// mm, or degrees where it turns.
+    pub position: f64,
+    /// It turns.
+    pub turns: bool,
+    /// It carries the machine rather than the part.
+    pub carries_machine: bool,
+}
+
+impl Standing {
+    fn text(&self) -> String {
+        let unit = if self.turns { "°" } else { " mm" };
+        let carries = if self.carries_machine { "machine" } else { "part" };
+        format!("stands at {}{unit}, carries the {carries}", number(self.position))
+    }
 }
 
 /// What a tool table says of a tool.
@@ -34,6 +57,7 @@ pub struct Sheet {
     title: String,
     report: Report,
     rates: Rates,
+    external: Vec<Standing>,
 }
 
 /// Gathers everything.
@@ -45,7 +69,7 @@ pub fn sheet(program: &Program, options: &Options) -> Sheet {
             from_table(tool, row);
         }
     }
-    Sheet { title: options.title.clone(), report, rates: options.rates }
+    Sheet { title: options.title.clone(), report, rates: options.rates, external: options.external.clone() }
 }
 
 /// The table knows the tool better than the program's comments do; a row the program itself wrote (G10 L1) is
@@ -215,6 +239,9 @@ impl Sheet {
             let values: Vec<String> = axes[..3].iter().map(|v| number(*v)).collect();
             let _ = writeln!(out, "{:<8} X{} Y{} Z{}", offset_name(*n), values[0], values[1], values[2]);
         }
+        for e in &self.external {
+            let _ = writeln!(out, "{:<8} {}", e.name, e.text());
+        }
         out.push('\n');
         out.push_str(&table(&self.tool_rows()));
         for c in &r.cycles {
@@ -265,6 +292,15 @@ impl Sheet {
             .iter()
             .map(|(n, axes)| serde_json::json!({"name": offset_name(*n), "number": n, "values": axes}))
             .collect();
+        let external: Vec<_> = self
+            .external
+            .iter()
+            .map(|e| {
+                let unit = if e.turns { "degrees" } else { "mm" };
+                let carries = if e.carries_machine { "machine" } else { "part" };
+                serde_json::json!({"name": e.name, "carries": carries, "position": rounded(e.position), "unit": unit})
+            })
+            .collect();
         let cycles: Vec<_> = r
             .cycles
             .iter()
@@ -286,7 +322,7 @@ impl Sheet {
             "rapid_mm": r.totals.rapid_nm as f64 / 1e6, "moves": r.totals.moves, "untimed_moves": r.totals.untimed,
             "depends_on_run_time": r.run_time,
             "extent": {"feed": extent_json(&r.cut), "all": extent_json(&r.all), "machine": extent_json(&r.machine)},
-            "offsets": offsets, "tools": tools, "cycles": cycles, "stretches": stretches, "remarks": remarks(self),
+            "offsets": offsets, "external": external, "tools": tools, "cycles": cycles, "stretches": stretches, "remarks": remarks(self),
         });
         let mut text = serde_json::to_string_pretty(&value).unwrap_or_default();
         text.push('\n');
@@ -318,6 +354,9 @@ impl Sheet {
         for (n, axes) in &r.offsets {
             let values: Vec<String> = axes[..3].iter().map(|v| number(*v)).collect();
             pair(&offset_name(*n), format!("X {}   Y {}   Z {}", values[0], values[1], values[2]));
+        }
+        for e in &self.external {
+            pair(&e.name, e.text());
         }
         out.push_str("</table>\n<table class=\"tools\">\n");
         for (i, row) in self.tool_rows().iter().enumerate() {

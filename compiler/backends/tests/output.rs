@@ -105,13 +105,17 @@ fn csv_rows() {
 
 #[test]
 fn sheet_as_text() {
-    let options = sheet::Options { title: "part.ngc".into(), ..Default::default() };
+    let rail = sheet::Standing { name: "E1".into(), position: 1500.0, turns: false, carries_machine: true };
+    let table = sheet::Standing { name: "E2".into(), position: -90.0, turns: true, carries_machine: false };
+    let options = sheet::Options { title: "part.ngc".into(), external: vec![rail, table], ..Default::default() };
     let sheet = sheet::sheet(&part(), &options);
     insta::assert_snapshot!(sheet.text());
     let value: serde_json::Value = serde_json::from_str(&sheet.json()).expect("valid JSON");
     assert_eq!(value["tools"][1]["tool"], 2);
     assert_eq!(value["tools"][0]["note"], "T1 end mill 10");
+    assert_eq!(value["external"][1]["position"], -90.0);
     assert!(sheet.html().contains("<td>T2</td>"));
+    assert!(sheet.html().contains("<th>E1</th><td>stands at 1500 mm, carries the machine</td>"));
 }
 
 /// Colour of a pixel.

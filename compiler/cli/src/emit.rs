@@ -11,7 +11,7 @@ use gr_ir::{Program, Source};
 use gr_machine::Machine;
 use gr_planner::Tool;
 use gr_robot::along::is_planned;
-use gr_text::{Diagnostic, FileId, Span};
+use gr_text::{Diagnostic, FileId};
 
 use crate::options::UnitArg;
 use crate::commands::check::Checked;
@@ -420,7 +420,7 @@ fn of_motion(mut motion: Motion, unit: &Unit, goal: &Goal<'_>) -> Result<Built, 
             let trace = (goal.target == "html").then(|| traced(&motion, unit, goal.machine));
             one_picture(&motion.program, trace.as_ref(), unit, goal.target, &name)?
         }
-        "sheet" | "sheet-json" | "sheet-html" => Ok((one(sheet(&motion, unit, goal.target, &name)), Vec::new())),
+        "sheet" | "sheet-json" | "sheet-html" => Ok((one(sheet(&motion, unit, goal, &name)), Vec::new())),
         other => return Err(format!("the target {other} can't be made by this version")),
     };
     Ok(match (made, corrected) {
@@ -504,14 +504,20 @@ pub fn tool_rows(motion: &Motion, unit: &Unit) -> Vec<gr_backends::sheet::ToolRo
     unit.setup.tools.rows.iter().filter(|t| &*t.comment != gr_interp::ASSUMED).map(row).collect()
 }
 
-fn sheet(motion: &Motion, unit: &Unit, kind: &str, name: &str) -> Vec<u8> {
+fn sheet(motion: &Motion, unit: &Unit, goal: &Goal<'_>, name: &str) -> Vec<u8> {
+    let standing = |e: &gr_machine::External| {
+        let turns = e.joint.kind == gr_machine::JointKind::Revolute;
+        let position = if turns { e.position.to_degrees() } else { e.position };
+        gr_backends::sheet::Standing { name: e.joint.name.clone(), position, turns, carries_machine: e.carries_machine }
+    };
     let options = gr_backends::sheet::Options {
         title: name.to_string(),
         tools: tool_rows(motion, unit),
         rates: gr_driver::rates(&unit.setup),
+        external: goal.machine.map_or(Vec::new(), |m| m.cell.external.iter().map(standing).collect()),
     };
     let sheet = gr_backends::sheet::sheet(&motion.program, &options);
-    let text = match kind {
+    let text = match goal.target {
         "sheet-json" => sheet.json(),
         "sheet-html" => sheet.html(),
         _ => sheet.text(),
@@ -756,17 +762,15 @@ fn joints(motion: &Motion, goal: &Goal<'_>) -> Result<Made, String> {
         (None, Some(Reference::Ufmg2008)) => &builtin,
         (None, _) => return Err("the target joint-gcode needs --machine; `gcc-robot machine list` shows the ids".into()),
     };
-    let texts = texts(motion);
-    let place = |s: Source| -> (FileId, Span) { gr_backends::Sources::place(&texts, s) };
-    Ok(plan(&motion.program, machine, &options, &place))
+    Ok(plan(&motion.program, machine, &options, &texts(motion)))
 }
 
-fn plan(program: &Program, machine: &Machine, options: &joint::Options, place: &dyn Fn(Source) -> (FileId, Span)) -> Made {
-    let made = joint::compile(program, machine, options, place)?;
+fn plan(program: &Program, machine: &Machine, options: &joint::Options, texts: &dyn gr_backends::Sources) -> Made {
+    let (made, warnings) = gr_robot::opinion::planar(program, machine, options, texts)?;
     let artifacts = vec![
         Artifact { lines: main_lines(program, made.sources()), ..Artifact::new("", made.gcode().into_bytes()) },
         Artifact::new("-cartesian.csv", made.cartesian_csv().into_bytes()),
         Artifact::new("-joint.csv", made.joint_csv().into_bytes()),
     ];
-    Ok((artifacts, Vec::new()))
+    Ok((artifacts, warnings))
 }

@@ -446,6 +446,67 @@ fn every_arm_is_checked() {
     assert!(!found.contains("E0281"), "{found}");
 }
 
+fn text_lines(bytes: &[u8]) -> Vec<String> {
+    text(bytes).lines().map(str::to_string).collect()
+}
+
+/// The planar arm stands where its file says: what rests on coordinates that nothing has named is told, and a cut that begins
+/// elsewhere is led up to.
+#[test]
+fn the_planar_arm_knows_where_it_stands() {
+    let folder = tempfile::tempdir().unwrap();
+    let source = folder.path().join("a.ngc");
+    let source = source.to_str().unwrap();
+    let made = |program: &str| {
+        std::fs::write(source, format!("G21 G90 G17 F600\n{program}\nM2\n")).unwrap();
+        let o = run(&["build", source, "--machine", "ufmg/plano-3r", "--target", "joint-gcode", "--interval", "1", "--message-format", "short", "-q"]);
+        (text_lines(&o.stdout), text(&o.stderr))
+    };
+    let (named, found) = made("G0 X0 Y0\nG1 X50 Y20");
+    assert_eq!(found, "");
+    let (led, found) = made("G1 X50 Y20");
+    assert_eq!(led, named);
+    assert!(found.contains(":2:") && found.contains("E0559") && found.contains("X0"), "{found}");
+    for (program, line) in [("G92 X10 Y0\nG0 X20 Y0\nG1 X40", ":2:"), ("G10 L20 P1 X10\nG0 X20 Y0", ":2:"), ("G0 Y20\nG1 X40", ":2:"), ("G91 G0 X10", ":2:")] {
+        let (_, found) = made(program);
+        assert!(found.contains(line) && found.matches("E0559").count() == 1, "{program}: {found}");
+    }
+    for program in ["G0 X50\nG1 Y20", "G0 X20 Y0\nG92 X0\nG0 X20\nG1 X40 Y0", "G92.1\nG0 X50 Y20", "G53 G0 X50\nG92 X0\nG1 X10"] {
+        assert_eq!(made(program).1, "", "{program}");
+    }
+}
+
+/// Nothing has named an axis of a mill: it stays where the machine stands, along the axes of the program, as LinuxCNC has it. On a
+/// part that is clamped turned that can be no coordinate of it.
+#[test]
+fn axes_of_a_mill_that_nothing_has_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let (source, machine) = (folder.path().join("a.ngc"), folder.path().join("m.toml"));
+    let made = |base: &str, rest: &str, program: &str| {
+        std::fs::write(&machine, format!("format = 1\nid = \"shop/mill\"\nextends = \"generic/{base}\"\n{rest}")).unwrap();
+        std::fs::write(&source, format!("G21 G90\n{program}\nM2\n")).unwrap();
+        let o = run(&["build", source.to_str().unwrap(), "--machine", machine.to_str().unwrap(), "--target", "joint-gcode", "--message-format", "short", "-q"]);
+        (text_lines(&o.stdout).into_iter().filter(|l| l.starts_with("G0 ")).collect::<Vec<_>>(), text(&o.stderr))
+    };
+    let home = "[home]\njoints = [300, 150, -10]\n";
+    // From X300 Y150 of the machine: 100 and 50 from the part's zero point.
+    let (moves, found) = made("mill3", home, "G10 L2 P1 X200 Y100 R90\nG0 X10\nG0 Y5");
+    assert_eq!((moves, found.as_str()), (vec!["G0 X300 Y110 Z-10".to_string(), "G0 X195 Y110 Z-10".into()], ""));
+    let (moves, _) = made("mill3", home, "G10 L2 P1 X200 Y100 R45\nG0 X10");
+    // Along the turned X: the way across it, (-100 + 50)/√2, stays.
+    let (c, across) = (0.5f64.sqrt(), (50.0 - 100.0) * 0.5f64.sqrt());
+    let place = |v: f64| format!("{}", (v * 1e6).round() / 1e6);
+    assert_eq!(moves, [format!("G0 X{} Y{} Z-10", place(200.0 + c * (10.0 - across)), place(100.0 + c * (10.0 + across)))]);
+    // A part that is clamped turned about the tool.
+    let turned = "[frames.part]\nposition = [200, 100, -100]\nrotation = [0, 0, 90]\n";
+    let (moves, found) = made("mill3", turned, "G0 X10 Y0 Z5\nG53 G0 Z0");
+    assert_eq!((moves, found.as_str()), (vec!["G0 X200 Y110 Z-95".to_string(), "G0 X200 Y110 Z0".into()], ""));
+    for base in ["mill3", "mill5-ac-table"] {
+        let (_, found) = made(base, turned, "G0 X10 Y0 Z5\nG53 G0 Z0\nG53 G0 Y0");
+        assert!(found.contains(":4:") && found.contains("E0554") && found.matches("error").count() == 1, "{base}: {found}");
+    }
+}
+
 /// A file has the name of the program in it; programs of one build have different names on the controller.
 #[test]
 fn files_are_named_as_their_programs() {

@@ -34,7 +34,9 @@ impl Kinematics for Cartesian {
         if all.iter().any(|v| !v.is_finite()) {
             return Err(KinematicsError::NotFinite);
         }
-        if let Some(i) = (self.joints.len()..6).find(|i| all[*i] != 0.0) {
+        // A tool that points along Z turns about itself without three axes.
+        let spins = self.joints.len() == 3 && all[3] == 0.0 && all[4] == 0.0;
+        if let Some(i) = (self.joints.len()..6).find(|i| all[*i] != 0.0 && !(spins && *i == 5)) {
             return Err(KinematicsError::OutOfPlane { word: WORDS[i], value: all[i] });
         }
         let joints = (0..self.joints.len()).map(|i| all.get(i).copied().unwrap_or(0.0)).collect();
@@ -54,6 +56,8 @@ mod tests {
         assert_eq!(k.inverse(&pose).unwrap()[0].joints, [1.0, 2.0, 3.0]);
         let turned = Pose { rotation: [0.0, 0.1, 0.0], ..pose };
         assert_eq!(k.inverse(&turned), Err(KinematicsError::OutOfPlane { word: 'B', value: 0.1 }));
+        let spun = Pose { rotation: [0.0, 0.0, 0.5], ..pose };
+        assert_eq!(k.inverse(&spun).unwrap()[0].joints, [1.0, 2.0, 3.0]);
         assert!(k.forward(&[1.0]).is_err());
     }
 }

@@ -615,6 +615,11 @@ impl Check {
                     row.key
                 );
                 self.value(&signal.span, what);
+            } else if ["signal", "routine", "wait", "seconds"].iter().all(|k| row.node.get(k).is_none()) {
+                let what = format!("`[io.{}]` says nothing: name the output (`signal`), the `routine` or the input to `wait` for, or leave the row out", row.key);
+                self.value(&row.node.span, what);
+            } else if let (Some(value), None) = (row.node.get("value"), row.node.get("signal")) {
+                self.value(&value.span, format!("`value` in `[io.{}]` is the level of an output: name it with `signal`", row.key));
             }
         }
         let number = |table: &str, key: &str| raw.get(table).and_then(|t| t.value_of(key));
@@ -871,6 +876,8 @@ mod tests {
                 "{word}"
             );
         }
+        let empty = faults(&format!("{cell}[io.M7]\n[io.M8]\nsignal = \"a\"\n"));
+        assert_eq!(empty.iter().map(|(slug, at)| (*slug, at.as_str())).collect::<Vec<_>>(), [("machine/bad-value", "[io.M7]")]);
         for word in ["S", "M3", "M19", "M53", "M60", "M62", "M62P0", "M66P12", "M68P3", "M100", "M199"] {
             assert!(parse(FileId(0), &format!("{cell}[io.{word}]\nsignal = \"a\"\n")).is_ok(), "{word}");
         }
@@ -933,6 +940,8 @@ mod tests {
             ("[io.G38]\nwait = \"di\"\n", "signal = ", &["\"do\""]),
             ("[io.G38]\n", "value = ", &["1"]),
             ("[io.M8]\nroutine = \"Cool\"\n", "signal = ", &["\"do\""]),
+            ("[io.M8]\nroutine = \"Cool\"\n", "value = ", &["0"]),
+            ("[io.M8]\n", "value = ", &["1"]),
             ("[[frame]]\n", "name = ", &["\"g55\"", "\"G55 \"", "\"G59.4\"", "\"G060\"", "\"G55\"\n[[frame]]\nname = \"G55\""]),
             ("[[frame]]\nname = \"G53\"\nposition = [0, 0, 900]\n", "rotation = ", &["[0, 0, 90]"]),
             (tool, "mass = ", &["-1", "0"]),

@@ -118,7 +118,12 @@ impl Chooser<'_> {
         let ranked = self.ranked(chain, &coarse);
         let mut last = None;
         for few in ranked.chunks(3) {
-            match self.walked(chain, few) {
+            // Each by itself, in the order of their ranks: as many threads as turns, the same nodes.
+            let each = std::thread::scope(|s| {
+                let threads: Vec<_> = few.iter().map(|spin| s.spawn(|| self.walk(chain, *spin))).collect();
+                threads.into_iter().map(|t| t.join().unwrap_or_else(|e| std::panic::resume_unwind(e))).collect::<Vec<_>>()
+            });
+            match self.gathered(each) {
                 Ok(nodes) => return Ok(nodes),
                 Err(fault) => last = furthest(last, fault),
             }
@@ -163,10 +168,15 @@ impl Chooser<'_> {
     }
 
     fn walked(&self, chain: Chain, spins: &[f64]) -> Result<Vec<Node>, Fault> {
+        self.gathered(spins.iter().map(|spin| self.walk(chain, *spin)))
+    }
+
+    /// What came of several turns.
+    fn gathered(&self, each: impl IntoIterator<Item = Result<Vec<Node>, Fault>>) -> Result<Vec<Node>, Fault> {
         let mut nodes = Vec::new();
         let mut last = None;
-        for spin in spins {
-            match self.walk(chain, *spin) {
+        for one in each {
+            match one {
                 Ok(more) => nodes.extend(more),
                 Err(fault) => last = furthest(last, fault),
             }

@@ -2,7 +2,7 @@
 //! values yet. Frames, tools, tool directions, speeds, signals and the words a robot has no meaning for are settled
 //! here.
 
-mod places;
+pub(crate) mod places;
 pub(crate) mod probing;
 mod setups;
 mod signals;

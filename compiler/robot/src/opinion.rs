@@ -2,9 +2,10 @@
 //! same. A robot is planned; the planar arm, which has a way of its own, is asked point by point; a machine tool has to have
 //! the axes. Limits of a machine tool's axes are the interpreter's matter.
 
+use gr_backends::joint;
 use gr_ir::{Program, Source, Sources};
 use gr_machine::{Chain, Kind, Machine};
-use gr_text::{Diagnostic, code};
+use gr_text::{Diagnostic, Severity, code};
 
 use crate::{Options, plan};
 
@@ -62,9 +63,24 @@ pub fn opinion(program: &Program, machine: &Machine, texts: &dyn Sources, option
 }
 
 fn by_point(program: &Program, machine: &Machine, texts: &dyn Sources) -> Vec<Diagnostic> {
-    use gr_backends::joint;
-    let place = |s: Source| texts.place(s);
-    let found = joint::compile(program, machine, &joint::Options::default(), &place).err().unwrap_or_default();
+    let found = match planar(program, machine, &joint::Options::default(), texts) {
+        Ok((_, warnings)) => warnings,
+        Err(found) => found,
+    };
     // What joint G-code can't say is no matter of the arm.
     found.into_iter().filter(|d| d.code.def().code.starts_with("E05")).collect()
+}
+
+/// The joint positions of a planar arm, and warnings.
+pub fn planar(program: &Program, machine: &Machine, options: &joint::Options, texts: &dyn Sources) -> Result<(joint::JointProgram, Vec<Diagnostic>), Vec<Diagnostic>> {
+    let place = |s: Source| texts.place(s);
+    let mut found = crate::gather::places::unnamed_of_planar(program, machine, texts);
+    match joint::compile(program, machine, options, &place) {
+        Ok(made) if !found.iter().any(|d| d.severity == Severity::Error) => Ok((made, found)),
+        Ok(_) => Err(found),
+        Err(more) => {
+            found.extend(more);
+            Err(found)
+        }
+    }
 }

@@ -23,7 +23,10 @@ pub fn plan(program: &Program, machine: &Machine, sources: &dyn Sources, options
     }
     // Setups have places of their own for the part.
     let mill = options.setups.is_empty().then(|| settled(program, machine, sources, control_tool)).flatten();
-    let settled = mill.or_else(|| settled_arm(program, machine, sources, &options.setups));
+    if let Some(untold) = mill.as_ref().and_then(|s| s.finding(sources)) {
+        return Err(vec![untold]);
+    }
+    let settled = mill.map(|s| s.program).or_else(|| settled_arm(program, machine, sources, &options.setups));
     gather.run(settled.as_ref().unwrap_or(program));
     let Gather { out: gathered, findings, .. } = gather;
     let mut solver = Solver::new(machine);

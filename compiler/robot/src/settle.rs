@@ -6,8 +6,9 @@
 
 use gr_backends::sources::{Words as Letters, is_hidden};
 use gr_ir::{ArcPlane, Axes, Builder, Marker, Op, Pose, Program, Source, Sources, State, View, plane_axes};
-use gr_machine::math::{Frame, V3, solve};
+use gr_machine::math::{Frame, V3, add, dot, rot_z, rotate, solve, sub};
 use gr_machine::{Kind, Kinematics, Machine};
+use gr_text::{Diagnostic, code};
 
 use crate::Setup;
 use crate::words::{Asked, Slides, Words, placed, tool, work_shift};
@@ -186,26 +187,48 @@ pub(crate) fn place_of_machine(program: &Program, view: &View<'_, '_>, sources: 
 
 /// The program with the numbers that such coordinates have in the frame of the part. None on machines that have none: the program is
 /// good as it is.
-pub fn settled(program: &Program, machine: &Machine, sources: &dyn Sources, tool: fn(&Machine, &State) -> Frame) -> Option<Program> {
+pub fn settled(program: &Program, machine: &Machine, sources: &dyn Sources, tool: fn(&Machine, &State) -> Frame) -> Option<Settled> {
     if machine.kind != Kind::Mill {
         return None;
     }
     let Ok(Words::Joints(slides)) = Words::of(machine) else { return None };
     let home = crate::plan::home_joints(machine)?;
     let start = program.start_state().machine(&program.start().axes);
-    let stood = [0, 1, 2].map(|i| home.get(slides.sliding[i]).map_or(0.0, |v| v - start[i]));
-    let settle = Settle { machine, of: Of::Slides { kinematics: machine.kinematics(), slides, stood, tool } };
+    let home = [0, 1, 2].map(|i| home.get(slides.sliding[i]).copied().unwrap_or(0.0));
+    let settle = Settle { machine, of: Of::Slides { kinematics: machine.kinematics(), slides, start: [start[0], start[1], start[2]], home, tool } };
     let mut coordinates = Coordinates::new(program);
-    let axes = settle.axes(&program.start().axes, coordinates.by(), program.start_state(), None);
+    let axes = settle.axes(&program.start().axes, coordinates.by(), program.start_state(), None).unwrap_or(program.start().axes);
+    let mut untold = None;
     let mut out = Builder::from_state(Pose { axes, ..*program.start() }, *program.start_state());
     out.names_of(program);
     let mut cursor = program.cursor();
     while let Some(view) = cursor.next() {
         let by = coordinates.step(program, &view, sources);
-        let axes = if view.op.moves() { settle.axes(&view.end.axes, by, view.state, None) } else { view.end.axes };
-        out.push_to(view.op, &Pose { axes, ..*view.end }, view.source);
+        let axes = if view.op.moves() { settle.axes(&view.end.axes, by, view.state, None) } else { Ok(view.end.axes) };
+        if let Err(axes) = axes {
+            untold.get_or_insert((view.source, axes));
+        }
+        out.push_to(view.op, &Pose { axes: axes.unwrap_or(view.end.axes), ..*view.end }, view.source);
     }
-    Some(out.finish())
+    Some(Settled { program: out.finish(), untold })
+}
+
+/// A program with the numbers that its coordinates have in the frame of the part.
+pub struct Settled {
+    /// The program.
+    pub program: Program,
+    /// The first move with coordinates, named in the list, whose numbers can't be told: the part is turned against the machine.
+    untold: Option<(Source, [bool; 3])>,
+}
+
+impl Settled {
+    /// What can't be told.
+    pub fn finding(&self, sources: &dyn Sources) -> Option<Diagnostic> {
+        let (source, axes) = self.untold?;
+        let (file, span) = sources.place(source);
+        let names: Vec<&str> = (0..3).filter(|i| axes[*i]).map(|i| ["X", "Y", "Z"][i]).collect();
+        Some(Diagnostic::new(code::MACHINE_TURNED_PART, file, span, &[names.join(" ")]))
+    }
 }
 
 /// The same of an arm whose file has a place for G53, with the part where the setups of a job put it.
@@ -234,7 +257,7 @@ pub(crate) fn settled_arm(
         let part = setup_at(setups, workingstep, || main_line(program, view.source)).map(|i| setups[i].part);
         out.push_to(
             view.op,
-            &Pose { axes: settle.axes(&view.end.axes, by, view.state, part), ..*view.end },
+            &Pose { axes: settle.axes(&view.end.axes, by, view.state, part).unwrap_or(view.end.axes), ..*view.end },
             view.source,
         );
     }
@@ -270,8 +293,10 @@ enum Of {
     Slides {
         kinematics: Box<dyn Kinematics>,
         slides: Slides,
-        /// How far the machine stood at the start from where the program believes it, along its slides, mm.
-        stood: V3,
+        /// Where the program believes the slides at its start, mm.
+        start: V3,
+        /// Where they stand there.
+        home: V3,
         tool: fn(&Machine, &State) -> Frame,
     },
     /// The tool point, seen from this place of the base in the directions of the part, mm.
@@ -279,43 +304,68 @@ enum Of {
 }
 
 impl Settle<'_> {
-    /// Coordinates in the work frame that put the slides of those that are not by a word of it where they belong; as they are where
-    /// the slides don't go with them.
-    fn axes(&self, axes: &Axes, by: [By; 3], state: &State, part: Option<Frame>) -> Axes {
+    /// Coordinates in the work frame of a place whose named ones are places of it. Those that lead to a place of the machine bring its
+    /// own coordinate there; along those that nothing has named the machine stays where it stands. Which ones they are, where their
+    /// numbers don't follow from that.
+    fn axes(&self, axes: &Axes, by: [By; 3], state: &State, part: Option<Frame>) -> Result<Axes, [bool; 3]> {
         const TIMES: usize = 2;
         const FAR: f64 = 100.0;
         // An arm doesn't stand anywhere by itself.
-        let stood = match &self.of {
-            Of::Slides { stood, .. } => Some(*stood),
-            Of::Place(_) => None,
-        };
-        let fixed: Vec<usize> =
-            (0..3).filter(|i| by[*i] == By::Machine || by[*i] == By::Nothing && stood.is_some()).collect();
+        let stands = matches!(self.of, Of::Slides { .. });
+        let wanted = [0, 1, 2].map(|i| by[i] == By::Machine || by[i] == By::Nothing && stands);
+        let fixed: Vec<usize> = (0..3).filter(|i| wanted[*i]).collect();
         let mut out = *axes;
         if fixed.is_empty() {
-            return out;
+            return Ok(out);
+        }
+        if self.turns_along(&fixed, state) {
+            return Err(wanted);
         }
         let machine = state.machine(axes);
-        let goal = |i: usize| machine[i] + stood.filter(|_| by[i] == By::Nothing).map_or(0.0, |s| s[i]);
+        // Along which direction of the machine, and how far.
+        let turn = placed(self.machine, state).then(&Frame { turn: rot_z(state.rotation), ..Frame::IDENTITY }).turn;
+        let rows: Vec<(V3, f64)> = fixed
+            .iter()
+            .map(|i| match (by[*i], &self.of) {
+                (By::Nothing, Of::Slides { start, home, .. }) => {
+                    let along = turn.map(|row| row[*i]);
+                    let gone = sub([machine[0], machine[1], machine[2]], *start);
+                    (along, dot(along, add(rotate(&placed(self.machine, state).turn, gone), *home)))
+                }
+                _ => (std::array::from_fn(|k| f64::from(u8::from(k == *i))), machine[*i]),
+            })
+            .collect();
         for _ in 0..TIMES {
-            let Some(here) = self.slid(&out, state, part) else { return *axes };
+            let Some(here) = self.slid(&out, state, part) else { return Ok(*axes) };
             let mut slope = vec![vec![0.0; fixed.len()]; fixed.len()];
             for (k, axis) in fixed.iter().enumerate() {
                 let mut moved = out;
                 moved[*axis] += FAR;
-                let Some(there) = self.slid(&moved, state, part) else { return *axes };
-                for (row, slide) in slope.iter_mut().zip(&fixed) {
-                    row[k] = (there[*slide] - here[*slide]) / FAR;
+                let Some(there) = self.slid(&moved, state, part) else { return Ok(*axes) };
+                for (row, (along, _)) in slope.iter_mut().zip(&rows) {
+                    row[k] = dot(*along, sub(there, here)) / FAR;
                 }
             }
-            let left = fixed.iter().map(|i| goal(*i) - here[*i]).collect();
-            let Some(by) = solve(slope, left).filter(|by| by.iter().all(|v| v.abs() < 1e6)) else { return *axes };
+            let left = rows.iter().map(|(along, goal)| goal - dot(*along, here)).collect();
+            let Some(by) = solve(slope, left).filter(|by| by.iter().all(|v| v.abs() < 1e6)) else { return Err(wanted) };
             for (axis, by) in fixed.iter().zip(by) {
                 // What is there but for rounding stays as the program has it.
                 out[*axis] += if by.abs() < 1e-9 { 0.0 } else { by };
             }
         }
-        out
+        Ok(out)
+    }
+
+    /// Whether a part that is clamped turned would turn rotary axes of the machine, and with them what these coordinates are.
+    fn turns_along(&self, fixed: &[usize], state: &State) -> bool {
+        let Of::Slides { slides, .. } = &self.of else { return false };
+        if slides.turning.is_empty() || !matches!(self.machine.chain, gr_machine::Chain::FiveAxis(_)) {
+            return false;
+        }
+        let turn = placed(self.machine, state).turn;
+        let upright = (turn[2][2] - 1.0).abs() < 1e-12;
+        let straight = (0..3).all(|i| (turn[i][i] - 1.0).abs() < 1e-12);
+        !straight && !(upright && fixed == [2])
     }
 
     /// Where the words of a program are in the coordinates of the machine.

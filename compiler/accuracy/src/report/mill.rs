@@ -26,7 +26,7 @@ pub fn report_of_words(
     }
     let Ok(Words::Joints(slides)) = Words::of(machine) else { return None };
     let settled = gr_robot::settled(program, machine, sources, tool);
-    let program = settled.as_ref().unwrap_or(program);
+    let program = settled.as_ref().map_or(program, |s| &s.program);
     let kinematics = machine.kinematics();
     let mut mill = Mill { walk: Walk::new(machine, &*kinematics, operations, budget, material), slides, zero: None, first_zero: None };
     let count = program.len();
