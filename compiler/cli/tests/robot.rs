@@ -439,6 +439,8 @@ fn every_arm_is_checked() {
         let (code, found) = told(command, "comau/tricept806");
         assert!(code == Some(1) && found.contains("E0534"), "{found}");
     }
+    let made = run(&["verify", source, "--machine", "comau/tricept806", "-o", folder.path().to_str().unwrap(), "--message-format", "short"]);
+    assert!(made.status.code() == Some(1) && text(&made.stderr).contains("E0534"), "{}", text(&made.stderr));
     std::fs::write(source, "G21 G90\nT1 M6\nG0 X0 Y0 Z20\nG1 Z0 F500\nX20\nG0 Z20\nM30\n").unwrap();
     let (code, found) = told("check", "abb/irb2400");
     assert_eq!((code, found.matches("E0521").count(), found.matches("E0281").count()), (Some(1), 1, 0), "{found}");
@@ -448,6 +450,34 @@ fn every_arm_is_checked() {
 
 fn text_lines(bytes: &[u8]) -> Vec<String> {
     text(bytes).lines().map(str::to_string).collect()
+}
+
+/// Part 1 of UFSC 2016 on the IRB 140, from the command line as the page says: the rows of table 5.3, and the printed points.
+#[test]
+fn ufsc2016_from_the_command_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let page = std::fs::read_to_string(root().join("docs/robots.md")).unwrap();
+    let cell = page.split("```toml").find(|t| t.contains("abb/irb140")).and_then(|t| t.split("```").next()).unwrap();
+    let machine = folder.path().join("cell.toml");
+    std::fs::write(&machine, cell).unwrap();
+    let out = folder.path().join("out");
+    let part = "tests/golden/ufsc2016/example1.p21";
+    let made = run(&["verify", part, "--machine", machine.to_str().unwrap(), "--reference", "ufsc2016", "-o", out.to_str().unwrap()]);
+    let told = text(&made.stdout) + &text(&made.stderr);
+    for row in ["842 points", "X        0.001      0.088     -0.085", "Y       -0.004      0.086     -0.082", "Z        0.001      0.083     -0.085"] {
+        assert!(told.contains(row), "{row}: {told}");
+    }
+    let printed = std::fs::read_to_string(root().join("tests/golden/ufsc2016/appC_ex1_irb140.csv")).unwrap();
+    let ours = std::fs::read_to_string(out.join("example1-errors.csv")).unwrap();
+    let ours: Vec<Vec<f64>> = ours.lines().skip(1).map(|l| l.split(',').map(|v| v.parse().unwrap()).collect()).collect();
+    // The start of the run isn't published.
+    for row in printed.lines().skip(2) {
+        let row: Vec<f64> = row.split(',').map(|v| v.parse().unwrap()).collect();
+        let own = &ours[row[0] as usize - 1];
+        for i in 0..3 {
+            assert!((own[8 + i] - row[7 + i]).abs() < 1e-6, "{row:?}: {own:?}");
+        }
+    }
 }
 
 /// The planar arm stands where its file says: what rests on coordinates that nothing has named is told, and a cut that begins

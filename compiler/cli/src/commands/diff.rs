@@ -155,7 +155,9 @@ pub fn verify(global: &Global, args: &VerifyArgs) -> Exit {
     if let Some(machine) = station.machine.as_ref().filter(|m| gr_robot::along::is_planned(m)) {
         return on_robot(global, args, station, machine, &mut renderer);
     }
-    if args.output.is_some() {
+    // A template has no joint values either: what is missing in its file is told below.
+    let incomplete = |m: &gr_machine::Machine| matches!(m.chain, gr_machine::Chain::Incomplete { .. });
+    if args.output.is_some() && !station.machine.as_ref().is_some_and(incomplete) {
         eprintln!("-o goes with --machine and a robot: without one there is no table of points to write");
         return Exit::Usage;
     }
