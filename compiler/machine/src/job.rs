@@ -81,9 +81,6 @@ fn faults(setups: &[Clamping]) -> Vec<(Span, String)> {
     let mut out = Vec::new();
     let mut last: Option<(u32, &str)> = None;
     for (i, s) in setups.iter().enumerate() {
-        if s.name.trim().is_empty() {
-            out.push((s.place, "a setup needs a name: it tells the operator how to clamp the part".into()));
-        }
         if setups[..i].iter().any(|e| e.name == s.name) {
             out.push((s.place, format!("there is another setup with the name `{}`", s.name)));
         }

@@ -394,11 +394,14 @@ pub(crate) fn faults(node: &Node, keys: &'static [Key], place: &str) -> Vec<(Ran
 
 fn table(node: &Node, keys: &'static [Key], place: &str, partial: bool, out: &mut Vec<(Range<usize>, String)>) {
     let names: Vec<&str> = keys.iter().map(|k| k.name).collect();
+    // What `extends` would bring is not missing beside a fault of that word.
+    let extends = |k: &Key| k.name == "extends" && (misspelt(node, keys, k.name) || node.get(k.name).is_some_and(|e| e.text().is_none()));
+    let partial = partial || keys.iter().any(extends);
     for e in node.entries() {
         match keys.iter().find(|k| k.name == e.key) {
-            Some(k) => value(&e.node, k, place, out),
+            Some(k) => value(&e.node, k, place, partial, out),
             None => {
-                let hint = match suggestion(&e.key, &names) {
+                let hint = match meant(&e.key, keys) {
                     Some(s) => format!("; did you mean `{s}`?"),
                     None => format!("; keys here are {}", names.join(", ")),
                 };
@@ -407,11 +410,34 @@ fn table(node: &Node, keys: &'static [Key], place: &str, partial: bool, out: &mu
         }
     }
     for k in keys.iter().filter(|k| k.required && !partial && node.get(k.name).is_none()) {
+        if misspelt(node, keys, k.name) {
+            continue;
+        }
         out.push((node.span.clone(), format!("`{}` is missing in {place}: {}", k.name, k.doc)));
     }
 }
 
-fn value(node: &Node, key: &Key, place: &str, out: &mut Vec<(Range<usize>, String)>) {
+/// The keys of a table at the root.
+pub(crate) fn of_table(name: &str) -> &'static [Key] {
+    match ROOT.iter().find(|k| k.name == name).map(|k| k.kind) {
+        Some(Table(keys)) => keys,
+        _ => &[],
+    }
+}
+
+/// The key that a word no table has most likely means.
+fn meant(word: &str, keys: &'static [Key]) -> Option<&'static str> {
+    let names: Vec<&'static str> = keys.iter().map(|k| k.name).collect();
+    suggestion(&word.to_lowercase(), &names)
+}
+
+/// Whether a table has a word that most likely means a key it doesn't have: that is told of the word.
+pub(crate) fn misspelt(node: &Node, keys: &'static [Key], name: &str) -> bool {
+    let unknown = |e: &&crate::tree::Entry| !keys.iter().any(|k| k.name == e.key);
+    node.get(name).is_none() && node.entries().iter().filter(unknown).any(|e| meant(&e.key, keys) == Some(name))
+}
+
+fn value(node: &Node, key: &Key, place: &str, partial: bool, out: &mut Vec<(Range<usize>, String)>) {
     let name = key.name;
     let mut wants = |what: &str| out.push((node.span.clone(), format!("`{name}` of {place} must be {what}")));
     match (key.kind, &node.value) {
@@ -430,12 +456,12 @@ fn value(node: &Node, key: &Key, place: &str, out: &mut Vec<(Range<usize>, Strin
             }
         }
         (Points(n), Value::List(l)) if l.len() == n && l.iter().all(|p| p.numbers().len() == 3 && p.list().len() == 3) => {}
-        (Table(keys), Value::Table(_)) => table(node, keys, &format!("`[{name}]`"), false, out),
+        (Table(keys), Value::Table(_)) => table(node, keys, &format!("`[{name}]`"), partial, out),
         (Part(keys), Value::Table(_)) => table(node, keys, &format!("`[{name}]`"), true, out),
         (Tables(keys), Value::List(l)) => {
             for item in l {
                 if matches!(item.value, Value::Table(_)) {
-                    table(item, keys, &format!("`[[{name}]]`"), false, out);
+                    table(item, keys, &format!("`[[{name}]]`"), partial, out);
                 } else {
                     out.push((item.span.clone(), format!("`{name}` must be a list of tables")));
                 }
@@ -446,18 +472,50 @@ fn value(node: &Node, key: &Key, place: &str, out: &mut Vec<(Range<usize>, Strin
                 if !io_word(&e.key) {
                     out.push((e.key_span.clone(), format!("`{}` is no word of `[{name}]`: no program of a robot has it. Words are S, M3 to M9, M19, M50 to M53, M60, M62 to M68 (one output: M62P3), M100 to M199 and G38", e.key)));
                 }
-                table(&e.node, keys, &format!("`[{name}.{}]`", e.key), false, out);
+                match e.node.value {
+                    Value::Table(_) => table(&e.node, keys, &format!("`[{name}.{}]`", e.key), false, out),
+                    _ => out.push((e.node.span.clone(), format!("`[{name}.{}]` must be a table", e.key))),
+                }
             }
         }
         (kind, _) => wants(&what(kind)),
     }
 }
 
-/// Numbers that are not within the bounds of their key: place and message.
+/// Numbers that are not within the bounds of their key, and texts that are empty: place and message.
 pub(crate) fn out_of_bounds(node: &Node, keys: &'static [Key]) -> Vec<(Range<usize>, String)> {
     let mut out = Vec::new();
     bounds_of_table(node, keys, &mut out);
     out
+}
+
+/// Takes out what holds a value that no key may have, so that nothing else is told of it: limits and places of single joints, else
+/// the whole table. Kinematics stay, without which there is no machine to look at.
+pub(crate) fn without(node: &mut Node, bad: &[Range<usize>]) {
+    let holds = |n: &Node| bad.iter().any(|b| holds(n, b));
+    let Value::Table(root) = &mut node.value else { return };
+    root.retain(|e| e.key == "kinematics" || matches!(e.node.value, Value::List(_)) || e.key == "io" || !holds(&e.node));
+    for e in root.iter_mut().filter(|e| e.key != "kinematics") {
+        let items: Vec<&mut Node> = match &mut e.node.value {
+            Value::List(items) => items.iter_mut().collect(),
+            Value::Table(rows) if e.key == "io" => rows.iter_mut().map(|r| &mut r.node).collect(),
+            _ => continue,
+        };
+        for item in items {
+            if let Value::Table(keys) = &mut item.value {
+                keys.retain(|k| matches!(k.key.as_str(), "dh" | "origin" | "axis" | "number") || !holds(&k.node));
+            }
+        }
+    }
+}
+
+fn holds(node: &Node, place: &Range<usize>) -> bool {
+    let inside = |n: &Node| holds(n, place);
+    match &node.value {
+        Value::List(l) => l.iter().any(inside),
+        Value::Table(t) => t.iter().any(|e| inside(&e.node)),
+        _ => node.span == *place,
+    }
 }
 
 fn bounds_of_table(node: &Node, keys: &'static [Key], out: &mut Vec<(Range<usize>, String)>) {
@@ -497,6 +555,7 @@ fn bounds(node: &Node, key: &Key, out: &mut Vec<(Range<usize>, String)>) {
         Table(keys) | Part(keys) => bounds_of_table(node, keys, out),
         Tables(keys) => node.list().iter().for_each(|n| bounds_of_table(n, keys, out)),
         Map(keys) => node.entries().iter().for_each(|e| bounds_of_table(&e.node, keys, out)),
+        Text if node.text().is_some_and(|t| t.trim().is_empty()) => out.push((node.span.clone(), format!("`{name}` must not be empty"))),
         Text | Texts | Flag | Choice(_) | Open(_) => {}
     }
 }
@@ -599,7 +658,7 @@ fn property(out: &mut String, k: &Key, depth: usize) {
     let pad = "  ".repeat(depth);
     let list = |words: &[&str]| words.iter().map(|w| quoted(w)).collect::<Vec<_>>().join(", ");
     let _ = match k.kind {
-        Text => write!(out, "{pad}\"type\": \"string\""),
+        Text => write!(out, "{pad}\"type\": \"string\",\n{pad}\"pattern\": \"\\\\S\""),
         Texts => write!(out, "{pad}\"type\": \"array\",\n{pad}\"items\": {{ \"type\": \"string\" }}"),
         Type::Number(b) => write!(out, "{pad}\"type\": \"number\"{}", b.schema(&pad)),
         Whole(..) if k.name == "format" => write!(out, "{pad}\"const\": 1"),

@@ -129,13 +129,15 @@ impl Check {
     /// What a file that extends another must say itself: the other's format and name are not its own.
     fn own_keys(&mut self, root: &Node) {
         let Some(extends) = root.get("extends") else { return };
-        for key in ROOT.iter().filter(|k| matches!(k.name, "format" | "id") && root.get(k.name).is_none()) {
+        let said = |name: &str| root.get(name).is_some() || keys::misspelt(root, ROOT, name);
+        for key in ROOT.iter().filter(|k| matches!(k.name, "format" | "id") && !said(k.name)) {
             let message = format!("`{}` is missing in a machine file: {}", key.name, key.doc);
             self.fault(code::MACHINE_BAD_FILE, &extends.span, &[message]);
         }
         // Own numbers with the source of another's would be a false witness.
         for key in ["accuracy", "stiffness", "as_built"] {
-            if let Some(table) = root.get(key).filter(|t| t.get("source").is_none()) {
+            let said = |t: &Node| t.get("source").is_some() || keys::misspelt(t, keys::of_table(key), "source");
+            if let Some(table) = root.get(key).filter(|t| !said(t)) {
                 let message = format!("`source` is missing in `[{key}]`: the numbers are this file's, not those of the machine that it extends");
                 self.fault(code::MACHINE_BAD_FILE, &table.span, &[message]);
             }
@@ -159,24 +161,50 @@ impl Check {
         if base.get("extends").is_some() {
             self.extend(&mut base);
         }
+        self.joints_of_base(id, &base, root);
         let over = std::mem::replace(root, base);
         root.overlay(over);
     }
 
+    /// An arm has the joints that it has: one of another name in a file that extends it is a slip of the pen.
+    fn joints_of_base(&mut self, id: &str, base: &Node, over: &mut Node) {
+        let kind = base.get("kinematics").and_then(|k| k.string("kind"));
+        let fixed = KINDS.iter().any(|k| Some(k.name) == kind.as_deref() && !k.joints.is_empty());
+        if !fixed || over.get("kinematics").is_some_and(|k| k.get("kind").is_some()) {
+            return;
+        }
+        let list = |n: &Node| n.get("joint").map_or(Vec::new(), |j| j.list().to_vec());
+        let all: Vec<String> = list(base).iter().filter_map(|j| j.string("name")).collect();
+        let names: Vec<&str> = all.iter().map(String::as_str).collect();
+        for name in list(over).iter().filter_map(|j| j.get("name")) {
+            let text = name.text().unwrap_or_default();
+            if !text.trim().is_empty() && !names.contains(&text) {
+                let hint = suggestion(text, &names).map_or(format!("; its joints are {}", names.join(", ")), |s| format!("; did you mean `{s}`?"));
+                self.value(&name.span, format!("`{id}` has no joint `{text}`{hint}"));
+            }
+        }
+    }
+
     fn machine(&mut self, raw: &Node) -> Machine {
+        let id = raw.get("id");
+        if let Some(id) = id.filter(|id| !id.text().is_some_and(good_id)) {
+            self.value(&id.span, "an id is `maker/model` in lower-case letters, digits and `-`");
+        }
+        let mut pruned = raw.clone();
+        let bad = keys::out_of_bounds(raw, ROOT);
+        if !bad.is_empty() {
+            keys::without(&mut pruned, &bad.iter().map(|(place, _)| place.clone()).collect::<Vec<_>>());
+        }
+        for (place, message) in bad {
+            self.value(&place, message);
+        }
+        let raw = &pruned;
         if let Some(format) = raw.get("format")
             && format.number() != Some(1.0)
         {
             self.value(&format.span, format!("format {} is not known; this program reads 1", format.number().unwrap_or(0.0)));
         }
-        let id = raw.get("id");
-        if let Some(id) = id.filter(|id| !id.text().is_some_and(good_id)) {
-            self.value(&id.span, "an id is `maker/model` in lower-case letters, digits and `-`");
-        }
         let list = raw.get("joint").map_or(&[][..], Node::list);
-        for (place, message) in keys::out_of_bounds(raw, ROOT) {
-            self.value(&place, message);
-        }
         let joints: Vec<Joint> = list.iter().map(|j| self.joint(j)).collect();
         self.names(list);
         let chain = self.chain(raw, list, &joints);
@@ -311,12 +339,7 @@ impl Check {
     }
 
     fn joint(&mut self, j: &Node) -> Joint {
-        if let (Some(min), Some(max)) = (j.value_of("min"), j.get("max"))
-            && let Some(top) = max.number()
-            && min >= top
-        {
-            self.value(&max.span, format!("max {top} is not above min {min}"));
-        }
+        let inverted = self.inverted(j);
         let letter = j.get("word").and_then(|w| match w.text().unwrap_or_default().as_bytes() {
             [b @ b'A'..=b'Z'] => Some(*b as char),
             _ => {
@@ -330,12 +353,20 @@ impl Check {
             name: j.string("name").unwrap_or_default(),
             kind: if revolute { JointKind::Revolute } else { JointKind::Prismatic },
             word: letter,
-            min: unit("min"),
-            max: unit("max"),
+            min: unit("min").filter(|_| !inverted),
+            max: unit("max").filter(|_| !inverted),
             speed: unit("speed"),
             rapid: unit("rapid"),
             acceleration: unit("acceleration"),
         }
+    }
+
+    /// Whether the limits leave no room: that is told here, and nothing else of them.
+    fn inverted(&mut self, t: &Node) -> bool {
+        let (Some(min), Some(max)) = (t.value_of("min"), t.get("max")) else { return false };
+        let Some(top) = max.number().filter(|top| min >= *top) else { return false };
+        self.value(&max.span, format!("max {top} is not above min {min}"));
+        true
     }
 
     fn names(&mut self, list: &[Node]) {
@@ -750,13 +781,8 @@ impl Check {
         if joint == with {
             self.value(&c.span, "a joint can't be coupled with itself");
         }
-        if let (Some(min), Some(max)) = (c.value_of("min"), c.get("max"))
-            && let Some(top) = max.number()
-            && min >= top
-        {
-            self.value(&max.span, format!("max {top} is not above min {min}"));
-        }
-        let angle = |key: &str| c.value_of(key).map(f64::to_radians);
+        let inverted = self.inverted(c);
+        let angle = |key: &str| c.value_of(key).map(f64::to_radians).filter(|_| !inverted);
         Some(Coupling { joint, with, factor: c.value_of("factor")?, min: angle("min"), max: angle("max") })
     }
 }
@@ -868,7 +894,32 @@ mod tests {
         let all = |text: &str| parse(FileId(0), text).expect_err("faulty").iter().map(|d| d.message.clone()).collect::<Vec<_>>().join("; ");
         let cell = "format = 1\nid = \"shop/cell\"\nextends = \"abb/irb2400\"\n";
         assert!(all(&format!("{cell}[kinematics]\nkind = \"opv\"\n")).contains("did you mean \"opw\"?"));
-        assert!(all(&format!("{cell}[[joint]]\nname = \"J9\"\n")).contains("`type` is missing"));
+        assert_eq!(all(&format!("{cell}[[joint]]\nname = \"J9\"\n")), "`abb/irb2400` has no joint `J9`; did you mean `J1`?");
+        let mill = "format = 1\nid = \"shop/mill\"\nextends = \"generic/mill3\"\n";
+        assert!(all(&format!("{mill}[[joint]]\nname = \"A\"\n")).contains("`type` is missing"));
+        // One slip of the pen, one message: not also what it leaves missing or makes of other numbers.
+        let rail = "[[external]]\nname = \"E1\"\ntype = \"prismatic\"\ncarries = \"machine\"\nmin = 0\nmax = 10\nposition = 5\n";
+        let home = "[home]\njoints = [0, -20, 20, 0, 60, 0]\n[zone]\ndefault = 1\nmax = 2\n[spindle]\nmin_speed = 10\nmax_speed = 20\n";
+        let joint = "[[joint]]\nname = \"J1\"\nmin = -180\nmax = 180\n[stiffness]\nsource = \"x\"\nmodulus = 210000\n[[stiffness.member]]\njoint = \"J1\"\nname = \"n\"\nouter = 50\ninner = 20\nlength = 300\n";
+        let whole = format!("{cell}{home}{rail}[io.M3]\nsignal = \"do\"\nwait = \"di\"\nseconds = 1\n[io.G38]\nwait = \"di\"\nvalue = 1\n{joint}");
+        assert!(parse(FileId(0), &whole).is_ok());
+        let slips = [
+            ("format = 1", "formatx = 1", "formatx"), ("format = 1", "format = nan", "nan"), ("format = 1", "format = -1", "-1"),
+            ("id = ", "ID = ", "ID"), ("extends = ", "extendsx = ", "extendsx"), ("\"abb/irb2400\"", "5", "5"),
+            ("joints = [0,", "jointsx = [0,", "jointsx"), ("joints = [0,", "joints = [nan,", "nan"), ("default = 1", "default = inf", "inf"),
+            ("max = 2", "max = -2", "-2"), ("min_speed = 10", "min_speed = 1e300", "1e300"), ("max_speed = 20", "max_speed = 0", "0"),
+            ("name = \"E1\"", "name = \" \"", "\" \""), ("type = \"pris", "TYPE = \"pris", "TYPE"), ("carries = \"machine\"", "carriesx = \"machine\"", "carriesx"),
+            ("min = 0", "min = inf", "inf"), ("max = 10", "max = -10", "-10"), ("position = 5", "position = 1e300", "1e300"),
+            ("[io.M3]", "[[io.M3]]", "[[io.M3]]"), ("signal = \"do\"", "signal = \"\"", "\"\""), ("value = 1", "value = nan", "nan"),
+            ("name = \"J1\"\nmin", "name = \"J11\"\nmin", "\"J11\""), ("min = -180", "min = nan", "nan"), ("max = 180", "max = -180", "-180"),
+            ("source = \"x\"", "sourcex = \"x\"", "sourcex"), ("modulus = 210000", "modulus = 0", "0"), ("outer = 50", "outer = nan", "nan"), ("name = \"n\"", "namex = \"n\"", "namex"),
+        ];
+        for (good, bad, place) in slips {
+            let text = whole.replacen(good, bad, 1);
+            assert_ne!(text, whole, "{good}");
+            let found = faults(&text);
+            assert_eq!(found.iter().map(|f| f.1.as_str()).collect::<Vec<_>>(), [place], "{bad}: {}", all(&text));
+        }
         assert!(all(&format!("{cell}[coupling]\njoint = \"J33\"\n")).contains("did you mean `J3`?"));
         for word in ["M3x", "M77", "M0", "M48", "M66P", "M62P07", "M101P1", "M200", "G38.2"] {
             assert!(

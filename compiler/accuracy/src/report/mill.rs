@@ -26,6 +26,10 @@ pub fn report_of_words(
     }
     let Ok(Words::Joints(slides)) = Words::of(machine) else { return None };
     let settled = gr_robot::settled(program, machine, sources, tool);
+    // Planning tells where its coordinates can't be told.
+    if settled.as_ref().is_some_and(|s| s.finding(sources).is_some()) {
+        return None;
+    }
     let program = settled.as_ref().map_or(program, |s| &s.program);
     let kinematics = machine.kinematics();
     let mut mill = Mill { walk: Walk::new(machine, &*kinematics, operations, budget, material), slides, zero: None, first_zero: None };
