@@ -452,6 +452,32 @@ fn text_lines(bytes: &[u8]) -> Vec<String> {
     text(bytes).lines().map(str::to_string).collect()
 }
 
+/// A restart leads to where it begins, and by no place that nothing has named; in a job, in the setup it belongs to.
+#[test]
+fn a_robot_restarts_where_the_program_goes_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_string();
+    let program = "G21 G90 G54\nT1 M6\nM3 S8000\nG0 X10 Y10 Z40\nG1 Z-1 F300\nG1 X40 F1000\nG0 Z40\nG0 X20 Y20\nG1 Z-5 F100\nG0 Z60\nG0 X10 Y10\nG1 Z-2 F200\nX30\nG0 Z60\nM2\n";
+    std::fs::write(path("a.ngc"), program).unwrap();
+    std::fs::write(path("job.toml"), "[[setup]]\nname = \"top\"\nfrom_line = 1\n[[setup]]\nname = \"turned\"\nfrom_line = 11\nposition = [0, 50, 0]\n").unwrap();
+    let made = |machine: &str, target: &str, more: &[&str]| {
+        let source = path("a.ngc");
+        let o = run(&[&["build", &source, "--machine", machine, "--target", target, "--from-line", "9"], more].concat());
+        assert!(o.status.success() && !text(&o.stderr).contains("(line 0)"), "{}", text(&o.stderr));
+        text(&o.stdout)
+    };
+    let points = |more: &[&str]| -> Vec<String> {
+        let rapid = made(CELL, "rapid", more);
+        rapid.lines().filter_map(|l| l.trim().strip_prefix("MoveL [[").or(l.trim().strip_prefix("MoveJ [["))?.split(']').next().map(str::to_string)).collect()
+    };
+    let way = points(&[]);
+    assert_eq!(way[..2], ["20,20,110".to_string(), "20,20,60".into()], "{way:?}");
+    assert_eq!(points(&["--job", &path("job.toml")])[..2], way[..2]);
+    let mill = made("generic/mill3", "joint-gcode", &[]);
+    let moves: Vec<&str> = mill.lines().filter(|l| l.starts_with("G0 ")).collect();
+    assert_eq!(moves[..3], ["G0 X0 Y0 Z60", "G0 X20 Y20 Z60", "G0 X20 Y20 Z42"], "{mill}");
+}
+
 /// Part 1 of UFSC 2016 on the IRB 140, from the command line as the page says: the rows of table 5.3, and the printed points.
 #[test]
 fn ufsc2016_from_the_command_line() {

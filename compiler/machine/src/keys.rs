@@ -658,7 +658,7 @@ fn property(out: &mut String, k: &Key, depth: usize) {
     let pad = "  ".repeat(depth);
     let list = |words: &[&str]| words.iter().map(|w| quoted(w)).collect::<Vec<_>>().join(", ");
     let _ = match k.kind {
-        Text => write!(out, "{pad}\"type\": \"string\",\n{pad}\"pattern\": \"\\\\S\""),
+        Text => write!(out, "{pad}\"type\": \"string\",\n{pad}\"minLength\": 1"),
         Texts => write!(out, "{pad}\"type\": \"array\",\n{pad}\"items\": {{ \"type\": \"string\" }}"),
         Type::Number(b) => write!(out, "{pad}\"type\": \"number\"{}", b.schema(&pad)),
         Whole(..) if k.name == "format" => write!(out, "{pad}\"const\": 1"),

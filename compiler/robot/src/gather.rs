@@ -16,7 +16,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::PI;
 
 use crate::cell::Cells;
-use crate::settle::main_line;
+use crate::settle::{leads_to, main_line};
 use crate::turns::Turns;
 use crate::{Action, Curves, Options, Step, Tool, WorkFrame, Zone};
 
@@ -232,6 +232,7 @@ impl<'a> Gather<'a> {
             by_direction: false,
         };
         let control = machine.kinematics().control();
+        let (mill, planar) = (machine.kind == Kind::Mill, matches!(machine.chain, Chain::Planar3r(_)));
         Gather {
             machine,
             options,
@@ -240,15 +241,15 @@ impl<'a> Gather<'a> {
             cells: Cells::new(machine, options.own_words),
             turns: Turns::new(machine),
             control,
-            planar: matches!(machine.chain, Chain::Planar3r(_)),
-            // A mill's axes stand where they stood; what a program leaves out stays.
-            seen: [machine.kind == Kind::Mill; 3],
+            planar,
+            // A mill's axes stand where they stood; what a program leaves out stays. A planar arm has no Z to be said.
+            seen: [mill, mill, mill || planar],
             waiting: false,
             frame: None,
             tool: None,
             at: nose_at_home(machine),
             at_change: None,
-            starts: machine.kind == Kind::Mill,
+            starts: mill,
             exchanged: false,
             rapids: false,
             probed: None,
@@ -286,7 +287,7 @@ impl<'a> Gather<'a> {
             if self.ended || self.findings.list.full() {
                 break;
             }
-            self.source = view.source;
+            self.source = leads_to(program, view.source);
             // An error of its own; where the tool is afterwards nobody knows.
             self.rapids |= matches!(view.op, Op::RigidTap { .. });
             if !self.options.setups.is_empty() {

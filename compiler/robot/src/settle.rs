@@ -4,6 +4,7 @@
 //! the machine file gives the part. Arms stand nowhere by themselves, and have places of the machine only where their file says where
 //! the zero point of G53 is: what they don't have is told.
 
+use gr_backends::from_line::INSERTED;
 use gr_backends::sources::{Words as Letters, is_hidden};
 use gr_ir::{ArcPlane, Axes, Builder, Marker, Op, Pose, Program, Source, Sources, State, View, plane_axes};
 use gr_machine::math::{Frame, V3, add, dot, rot_z, rotate, solve, sub};
@@ -74,7 +75,12 @@ impl Coordinates {
         if !view.op.moves() && !view.op.cuts() {
             return self.by;
         }
-        let letters = if self.planned { None } else { Letters::at(sources, view.source.file, view.source.line) };
+        let letters = match view.source.line {
+            _ if self.planned => None,
+            // The way to a restart begins anywhere: it names what it changes.
+            INSERTED => Some(Letters::default()),
+            line => Letters::at(sources, view.source.file, line),
+        };
         let Some(letters) = letters else {
             self.by = [By::Work; 3];
             self.last = Brought { work: [true; 3], ..Brought::default() };
@@ -276,8 +282,15 @@ pub(crate) fn setup_at(setups: &[Setup], workingstep: Option<&str>, line: impl F
     })
 }
 
+/// Where an operation comes from; the way to a restart belongs to what it leads to.
+pub(crate) fn leads_to(program: &Program, source: Source) -> Source {
+    let begins = || program.steps().map(|s| s.source).find(|s| s.line != INSERTED);
+    if source.line == INSERTED { begins().unwrap_or(source) } else { source }
+}
+
 /// The line of the main program that asked for an operation, itself or through calls.
 pub(crate) fn main_line(program: &Program, source: Source) -> u32 {
+    let source = leads_to(program, source);
     let outermost = program.call_stack(source).filter(|f| f.pass == 0).last();
     outermost.map_or(source.line, |f| f.line)
 }
