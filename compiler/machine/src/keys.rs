@@ -490,21 +490,22 @@ pub(crate) fn out_of_bounds(node: &Node, keys: &'static [Key]) -> Vec<(Range<usi
 }
 
 /// Takes out what holds a value that no key may have, so that nothing else is told of it: limits and places of single joints, else
-/// the whole table. Kinematics stay, without which there is no machine to look at.
+/// the whole table or row. Kinematics stay, without which there is no machine to look at.
 pub(crate) fn without(node: &mut Node, bad: &[Range<usize>]) {
     let holds = |n: &Node| bad.iter().any(|b| holds(n, b));
     let Value::Table(root) = &mut node.value else { return };
     root.retain(|e| e.key == "kinematics" || matches!(e.node.value, Value::List(_)) || e.key == "io" || !holds(&e.node));
-    for e in root.iter_mut().filter(|e| e.key != "kinematics") {
-        let items: Vec<&mut Node> = match &mut e.node.value {
-            Value::List(items) => items.iter_mut().collect(),
-            Value::Table(rows) if e.key == "io" => rows.iter_mut().map(|r| &mut r.node).collect(),
-            _ => continue,
-        };
-        for item in items {
-            if let Value::Table(keys) = &mut item.value {
-                keys.retain(|k| matches!(k.key.as_str(), "dh" | "origin" | "axis" | "number") || !holds(&k.node));
+    for e in root.iter_mut() {
+        match &mut e.node.value {
+            Value::Table(rows) if e.key == "io" => rows.retain(|r| !holds(&r.node)),
+            Value::List(items) => {
+                for item in items {
+                    if let Value::Table(keys) = &mut item.value {
+                        keys.retain(|k| matches!(k.key.as_str(), "dh" | "origin" | "axis" | "number") || !holds(&k.node));
+                    }
+                }
             }
+            _ => {}
         }
     }
 }

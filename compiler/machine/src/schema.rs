@@ -178,7 +178,7 @@ impl Check {
         let names: Vec<&str> = all.iter().map(String::as_str).collect();
         for name in list(over).iter().filter_map(|j| j.get("name")) {
             let text = name.text().unwrap_or_default();
-            if !text.trim().is_empty() && !names.contains(&text) {
+            if !names.contains(&text) {
                 let hint = suggestion(text, &names).map_or(format!("; its joints are {}", names.join(", ")), |s| format!("; did you mean `{s}`?"));
                 self.value(&name.span, format!("`{id}` has no joint `{text}`{hint}"));
             }
@@ -186,10 +186,6 @@ impl Check {
     }
 
     fn machine(&mut self, raw: &Node) -> Machine {
-        let id = raw.get("id");
-        if let Some(id) = id.filter(|id| !id.text().is_some_and(good_id)) {
-            self.value(&id.span, "an id is `maker/model` in lower-case letters, digits and `-`");
-        }
         let mut pruned = raw.clone();
         let bad = keys::out_of_bounds(raw, ROOT);
         if !bad.is_empty() {
@@ -203,6 +199,10 @@ impl Check {
             && format.number() != Some(1.0)
         {
             self.value(&format.span, format!("format {} is not known; this program reads 1", format.number().unwrap_or(0.0)));
+        }
+        let id = raw.get("id");
+        if let Some(id) = id.filter(|id| !id.text().is_some_and(good_id)) {
+            self.value(&id.span, "an id is `maker/model` in lower-case letters, digits and `-`");
         }
         let list = raw.get("joint").map_or(&[][..], Node::list);
         let joints: Vec<Joint> = list.iter().map(|j| self.joint(j)).collect();
@@ -911,6 +911,7 @@ mod tests {
             ("name = \"E1\"", "name = \" \"", "\" \""), ("type = \"pris", "TYPE = \"pris", "TYPE"), ("carries = \"machine\"", "carriesx = \"machine\"", "carriesx"),
             ("min = 0", "min = inf", "inf"), ("max = 10", "max = -10", "-10"), ("position = 5", "position = 1e300", "1e300"),
             ("[io.M3]", "[[io.M3]]", "[[io.M3]]"), ("signal = \"do\"", "signal = \"\"", "\"\""), ("value = 1", "value = nan", "nan"),
+            ("wait = \"di\"\nvalue", "wait = \" \"\nvalue", "\" \""), ("\"shop/cell\"", "\"\"", "\"\""),
             ("name = \"J1\"\nmin", "name = \"J11\"\nmin", "\"J11\""), ("min = -180", "min = nan", "nan"), ("max = 180", "max = -180", "-180"),
             ("source = \"x\"", "sourcex = \"x\"", "sourcex"), ("modulus = 210000", "modulus = 0", "0"), ("outer = 50", "outer = nan", "nan"), ("name = \"n\"", "namex = \"n\"", "namex"),
         ];
