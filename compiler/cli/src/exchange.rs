@@ -118,7 +118,9 @@ fn add(found: &mut Vec<Diagnostic>, more: Vec<Diagnostic>, levels: &Levels) {
     let (errors, rest) = std::mem::take(found).into_iter().partition::<Vec<_>, _>(|d| d.severity == Severity::Error);
     let more: Vec<Diagnostic> =
         more.into_iter().filter(|d| !(d.code == code::PLAN_SPINDLE_SIGN && sign(d, code::STEP_SPINDLE_SIGN, &errors))).collect();
-    let kept_back = |d: &Diagnostic| d.code == code::STEP_SPINDLE_SIGN && sign(d, code::PLAN_SPINDLE_SIGN, &more);
+    // A broken rule of geometry that the planner cannot do without is its error.
+    let geometry = |d: &Diagnostic| d.code == code::STEP_RESOURCE_RULE && sign(d, code::PLAN_BAD_SIZE, &more);
+    let kept_back = |d: &Diagnostic| d.code == code::STEP_SPINDLE_SIGN && sign(d, code::PLAN_SPINDLE_SIGN, &more) || geometry(d);
     found.extend(rest.into_iter().filter(|d| !kept_back(d)));
     found.extend(errors);
     found.extend(more.into_iter().filter(|d| !(orphans && d.code == code::PLAN_ORPHAN_STEP)));

@@ -33,7 +33,7 @@ pub(crate) fn drill(e: &mut Emit<'_>, step: &Workingstep, d: &Drilling, feature:
     if keyword == "THREAD_DRILLING" {
         return crate::mill::thread::drill(e, step, d, feature, security);
     }
-    if !suits(e, step, feature) {
+    if !suits(e, step, d, feature) || keyword == "TAPPING" && !crate::mill::thread::suits(e, step, feature) {
         return;
     }
     let Some(depth) = depth(e, step, d, feature) else { return };
@@ -70,12 +70,20 @@ impl Job<'_> {
 }
 
 /// Whether the tool does this kind of work at all.
-fn suits(e: &mut Emit<'_>, step: &Workingstep, feature: &Feature) -> bool {
+fn suits(e: &mut Emit<'_>, step: &Workingstep, d: &Drilling, feature: &Feature) -> bool {
     let (o, tool) = (&step.operation, &step.operation.tool);
     let is = |kinds: &[&str]| kinds.iter().any(|k| tool.kind.contains(k));
     let taps = tool.kind.contains("TAP") && !tool.kind.contains("TAPERED_END") && !tool.kind.contains("TAPERED_REAMER");
     let drills = matches!(o.keyword.as_str(), "DRILLING" | "MULTISTEP_DRILLING" | "CENTER_DRILLING");
-    let why = if o.keyword == "TAPPING" && !taps && !is(&["USER"]) {
+    let cone = (o.keyword == "COUNTER_SINKING").then(|| other_cone(tool, feature)).flatten();
+    let mut at = step.origin;
+    let why = if let Some((words, false)) = cone {
+        at = e.attribute(tool.origin, &TIP);
+        format!("{words}: it would cut into its wall")
+    } else if tool.no_retract && (!d.stop_at_bottom || d.test_cut.is_some()) && o.keyword != "BACK_BORING" {
+        at = e.attribute(tool.origin, &["its_tool_body.retract_movement_forbidden", "retract_movement_forbidden"]);
+        "its tool may not be drawn back while it turns, and the operation does not stop the spindle at the bottom".to_string()
+    } else if o.keyword == "TAPPING" && !taps && !is(&["USER"]) {
         format!("a {} cuts no thread", tool.kind)
     } else if drills && (taps || tool.is_disc() || is(&["DOVETAIL", "THREAD_MILL", "BORING"])) {
         format!("a {} does not drill", tool.kind)
@@ -85,8 +93,30 @@ fn suits(e: &mut Emit<'_>, step: &Workingstep, feature: &Feature) -> bool {
         }
         return true;
     };
-    e.say(code::PLAN_CANNOT_CUT, step.origin, &[&format!("#{} {}", feature.origin.id, feature.keyword), &why]);
+    e.say(code::PLAN_CANNOT_CUT, at, &[&format!("#{} {}", feature.origin.id, feature.keyword), &why]);
     false
+}
+
+/// Where tools have the angle of their tip.
+const TIP: [&str; 2] = ["its_tool_body.dimension.tool_tip_half_angle", "point_angle"];
+
+/// A cone that is not that of the tool: what they are, and whether the tool leaves stock in it, not too little.
+fn other_cone(tool: &Tool, feature: &Feature) -> Option<(String, bool)> {
+    let Shape::Hole { diameter, final_diameter: Some(low), .. } = feature.shape else { return None };
+    let (deep, angle) = (feature.depth, tool.tip_angle?);
+    if !(low < diameter && deep > 0.0) {
+        return None;
+    }
+    // As wide at the mouth as the cone, it is this wide at the cone's foot.
+    let foot = diameter - 2.0 * deep * libm::tan(angle);
+    let slack = 2.0 * feature.tolerance.unwrap_or(0.0).max(0.05);
+    let short = gr_step::short;
+    if tool.diameter < diameter - slack {
+        return Some((format!("its cone is {} mm wide at its mouth, the tool {} mm", short(diameter), short(tool.diameter)), true));
+    }
+    let own = libm::atan2((diameter - low) / 2.0, deep).to_degrees();
+    let words = format!("its cone goes from {} to {} mm over {} mm, {} degrees to its axis, that of the tool {}", short(diameter), short(low), short(deep), short(own), short(angle.to_degrees()));
+    ((foot - low).abs() > slack).then_some((words, foot < low))
 }
 
 fn depth(e: &mut Emit<'_>, step: &Workingstep, d: &Drilling, feature: &Feature) -> Option<f64> {
@@ -99,8 +129,12 @@ fn depth(e: &mut Emit<'_>, step: &Workingstep, d: &Drilling, feature: &Feature) 
     // Counted to the tip, as files have it.
     let given = d.depth.or(match step.operation.keyword.as_str() {
         "CENTER_DRILLING" => None,
-        "COUNTER_SINKING" => hole.and_then(|(w, _)| Some(w / 2.0 / libm::tan(tool.tip_angle?))),
-        "REAMING" | "BORING" | "TAPPING" | "BACK_BORING" => Some(feature.depth),
+        "COUNTER_SINKING" => hole.and_then(|(w, _)| tool.sinks(w)),
+        "TAPPING" => Some(match feature.shape {
+            Shape::Thread { start, length, .. } if length > 0.0 => (start + length).min(feature.depth),
+            _ => feature.depth,
+        }),
+        "REAMING" | "BORING" | "BACK_BORING" => Some(feature.depth),
         _ => Some(match hole {
             Some((_, HoleBottom::Through)) => {
                 feature.depth + tip.unwrap_or(0.0) + step.operation.overcut.unwrap_or(BREAK_THROUGH)
@@ -224,9 +258,8 @@ fn beyond(e: &mut Emit<'_>, step: &Workingstep, feature: &Feature, depth: f64) {
     let deepest = match &feature.shape {
         // The point of a countersink is in the hole below its cone.
         Shape::Hole { diameter, final_diameter: Some(low), .. } if o.keyword == "COUNTER_SINKING" && tool.tip_angle.is_some() => {
-            let half = tool.tip_angle.unwrap_or_default();
             let wide = if low < diameter { *diameter } else { *low };
-            (wide / 2.0 / libm::tan(half)).max(feature.depth)
+            tool.sinks(wide).unwrap_or(0.0).max(feature.depth)
         }
         Shape::Hole { bottom: HoleBottom::Through, .. } => feature.depth + point + o.overcut.unwrap_or(0.0).max(BREAK_THROUGH),
         Shape::Hole { diameter, bottom: HoleBottom::Conical(angle, _), .. } => feature.depth + diameter / 2.0 / libm::tan(crate::mill::area::half_angle(*angle)).max(1e-3),
@@ -238,8 +271,7 @@ fn beyond(e: &mut Emit<'_>, step: &Workingstep, feature: &Feature, depth: f64) {
         e.say(code::PLAN_BEYOND_FEATURE, o.origin, &[&what, &of, &format!("{:.4} mm deep, {:.4} mm deeper than it", depth, depth - deepest)]);
     }
     let opens = matches!(o.keyword.as_str(), "CENTER_DRILLING" | "COUNTER_SINKING");
-    if let (Shape::Hole { diameter, final_diameter, .. }, Some(angle), true) = (&feature.shape, tool.tip_angle, opens) {
-        let wide = tool.diameter.min(2.0 * depth * libm::tan(angle));
+    if let (Shape::Hole { diameter, final_diameter, .. }, Some(wide), true) = (&feature.shape, tool.opens(depth), opens) {
         let most = final_diameter.map_or(*diameter, |f| f.max(*diameter));
         if wide.is_finite() && wide > most + 2.0 * slack {
             e.say(code::PLAN_BEYOND_FEATURE, o.origin, &[&what, &of, &format!("it opens a hole of {most:.4} mm to {wide:.4} mm")]);
@@ -258,6 +290,7 @@ pub(crate) fn leftovers(e: &mut Emit<'_>, steps: &[(&Workingstep, &Feature)]) {
     let drills = |s: &Workingstep| matches!(s.operation.kind, OperationKind::Drill(_)) && s.operation.toolpaths.is_empty();
     if steps.iter().all(|(s, _)| drills(s)) {
         narrow_sink(e, steps);
+        wide_sink(e, steps);
         short_of_bottom(e, steps);
         left_on_walls(e, steps);
     }
@@ -269,18 +302,35 @@ fn narrow_sink(e: &mut Emit<'_>, steps: &[(&Workingstep, &Feature)]) {
     let Shape::Hole { diameter, final_diameter: Some(_), .. } = &feature.shape else { return };
     let slack = feature.tolerance.unwrap_or(0.0).max(0.05);
     let sinks = steps.iter().filter_map(|(s, _)| match &s.operation.kind {
-        OperationKind::Drill(d) => Some((&s.operation, d, d.depth?, libm::tan(s.operation.tool.tip_angle?))),
+        OperationKind::Drill(d) => Some((&s.operation, d, d.depth?, s.operation.tool.opens(d.depth?)?)),
         _ => None,
     });
-    let wide = |depth: f64, tan: f64, o: &Operation| o.tool.diameter.min(2.0 * depth * tan);
-    let widest = sinks.max_by(|a, b| wide(a.2, a.3, a.0).total_cmp(&wide(b.2, b.3, b.0)));
-    let Some((o, d, depth, tan)) = widest.filter(|(o, _, depth, tan)| wide(*depth, *tan, o) < diameter - 2.0 * slack) else { return };
+    let widest = sinks.max_by(|a, b| a.3.total_cmp(&b.3));
+    let Some((o, d, depth, wide)) = widest.filter(|(.., wide)| *wide < diameter - 2.0 * slack) else { return };
     let short = gr_step::short;
     let (what, of) = (format!("#{} {}", o.origin.id, o.keyword), format!("#{} {}", feature.origin.id, feature.keyword));
-    let deep = format!("{} mm deep with its tip, where it opens a cone of {} mm", short(depth), short(wide(depth, tan, o)));
+    let deep = format!("{} mm deep with its tip, where it opens a cone of {} mm", short(depth), short(wide));
     let cone = format!("a cone of {} mm that is {}", short(*diameter), short(feature.depth));
-    let wanted = short((diameter / 2.0 / tan * 1e4).ceil() / 1e4);
+    let wanted = short((o.tool.sinks(*diameter).unwrap_or(depth) * 1e4).ceil() / 1e4);
     e.say(code::PLAN_SHORT_OF_BOTTOM, Origin { span: d.depth_span, ..o.origin }, &[&what, &deep, &of, &cone, &wanted]);
+}
+
+/// A cone that is cut by countersinks with a blunter one alone.
+fn wide_sink(e: &mut Emit<'_>, steps: &[(&Workingstep, &Feature)]) {
+    let mut all = steps.iter().map(|(s, f)| (s, f, Some(other_cone(&s.operation.tool, f)).filter(|_| s.operation.keyword == "COUNTER_SINKING").flatten()));
+    // With a depth of its own it is told by that how wide the cone gets.
+    let told = |s: &Workingstep, f: &Feature| {
+        let narrow = matches!(f.shape, Shape::Hole { diameter, .. } if s.operation.tool.diameter < diameter);
+        narrow && matches!(&s.operation.kind, OperationKind::Drill(d) if d.depth.is_some())
+    };
+    if !all.clone().all(|(s, f, cone)| matches!(cone, Some((_, true))) && !told(s, f)) {
+        return;
+    }
+    if let Some((s, f, Some((words, _)))) = all.next_back() {
+        let (tool, of) = (&s.operation.tool, format!("#{} {}", f.origin.id, f.keyword));
+        let at = e.attribute(tool.origin, &TIP);
+        e.say(code::PLAN_UNREACHABLE_CORNER, at, &[&format!("T{}", tool.number), &format!("{:.4}", tool.diameter / 2.0), &of, &words]);
+    }
 }
 
 /// The operation that gets nearest to the bottom of a hole, where none of those that make it as wide as it becomes gets there.
@@ -455,10 +505,20 @@ fn tap(e: &mut Emit<'_>, job: &Job<'_>) {
         Shape::Thread { pitch, .. } => *pitch,
         _ => None,
     };
+    if let Shape::Thread { start, .. } = job.step.feature.shape {
+        crate::mill::thread::from_the_top(e, job.step, &job.step.feature, start);
+    }
     let pitch = job.step.operation.tool.pitch.or(thread).unwrap_or(job.feed * 60.0 / speed);
+    let fed = pitch * speed / 60.0;
+    if (fed - job.feed).abs() > 0.01 * fed {
+        let at = e.attribute(t.origin, &["feedrate", "feedrate_per_tooth"]);
+        let show = |f: f64| gr_step::short(f * 60.0);
+        let why = format!("a tap goes in step with its spindle: {} mm a turn at {} rpm are {} mm/min, not {}", gr_step::short(pitch), gr_step::short(speed), show(fed), show(job.feed));
+        e.say(code::PLAN_NO_EFFECT, at, &["the feed", &format!("#{} MILLING_TECHNOLOGY", t.origin.id), &why]);
+    }
     if job.d.floating_chuck {
         let way = if t.clockwise { (Turn::Cw, Turn::Ccw) } else { (Turn::Ccw, Turn::Cw) };
-        e.feed(pitch * speed / 60.0);
+        e.feed(fed);
         // Feed and speed belong together here: nobody may change one of them.
         let locks = (t.lock_feed, t.lock_spindle);
         e.locks(true, true);

@@ -20,6 +20,8 @@ const CHORD_ERROR: f64 = 0.01;
 pub(crate) struct Emit<'a> {
     pub b: Builder,
     pub lines: &'a LineIndex,
+    /// The file, for the places of attributes.
+    model: &'a gr_step::Model<'a>,
     pub file: FileId,
     pub out: Vec<Diagnostic>,
     /// Places and words of what was told, so that it is told once.
@@ -51,11 +53,12 @@ pub(crate) struct Emit<'a> {
 }
 
 impl<'a> Emit<'a> {
-    pub fn new(lines: &'a LineIndex, file: FileId, axes: bool) -> Emit<'a> {
+    pub fn new(lines: &'a LineIndex, model: &'a gr_step::Model<'a>, file: FileId, axes: bool) -> Emit<'a> {
         let source = Source { file, ..Source::default() };
         Emit {
             b: Builder::new(),
             lines,
+            model,
             file,
             out: Vec::new(),
             said: std::collections::BTreeSet::new(),
@@ -89,6 +92,17 @@ impl<'a> Emit<'a> {
         if self.said.insert((origin.span.start, d.message.clone())) {
             self.out.push(d);
         }
+    }
+    /// The first of these attributes of an instance that is given, for a message about it; each a way by its references, as
+    /// `its_tool_body.hand_of_cut`. Without one of them the statement.
+    pub fn attribute(&self, origin: Origin, ways: &[&str]) -> Origin {
+        let find = |way: &&str| {
+            let (to, name) = way.rsplit_once('.').unwrap_or(("", way));
+            let start = self.model.get(origin.id);
+            let node = to.split('.').filter(|s| !s.is_empty()).try_fold(start?, |n, step| n.node(step))?;
+            node.attr(name).and(node.written(name)).map(|v| v.span())
+        };
+        Origin { span: ways.iter().find_map(find).unwrap_or(origin.span), ..origin }
     }
     /// An overlap of more than the whole tool: what only the file's writer knows is no path.
     pub fn overlap(&mut self, span: Span, overlap: f64, diameter: f64) {

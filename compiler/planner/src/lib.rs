@@ -23,11 +23,14 @@ pub use process::{Overlap, Process, Tool, Units};
 /// Reads the process of a file. Faults of syntax and schema are not told here.
 pub fn process(text: &[u8], file: FileId, units: Option<Units>) -> (Option<Process>, Vec<Tool>, Vec<Diagnostic>) {
     let exchange = gr_p21::parse(text);
-    let model = gr_step::Model::new(text, &exchange);
-    if gr_step::dialect(&model) == gr_step::Dialect::Ap238 {
-        return ap238::read(&model, file);
+    of_model(&gr_step::Model::new(text, &exchange), file, units)
+}
+
+fn of_model<'m>(model: &'m gr_step::Model<'m>, file: FileId, units: Option<Units>) -> (Option<Process>, Vec<Tool>, Vec<Diagnostic>) {
+    if gr_step::dialect(model) == gr_step::Dialect::Ap238 {
+        return ap238::read(model, file);
     }
-    read::read(&model, file, units)
+    read::read(model, file, units)
 }
 
 /// The tools as LinuxCNC's tool table, in mm: number, pocket, length, diameter, and what the tool is.

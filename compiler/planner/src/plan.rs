@@ -75,7 +75,9 @@ pub struct Planned {
 
 /// Plans a file. Faults of syntax and schema are not told here; with an error there is no program.
 pub fn plan(text: &[u8], file: FileId, options: &Options) -> (Option<Planned>, Vec<Diagnostic>) {
-    let (process, mut tools, mut out) = crate::process(text, file, options.units);
+    let exchange = gr_p21::parse(text);
+    let model = gr_step::Model::new(text, &exchange);
+    let (process, mut tools, mut out) = crate::of_model(&model, file, options.units);
     let Some(mut process) = process else { return (None, out) };
     load_all(&mut process.elements, &options.tools);
     tools.iter_mut().for_each(|t| load(t, &options.tools));
@@ -85,7 +87,7 @@ pub fn plan(text: &[u8], file: FileId, options: &Options) -> (Option<Planned>, V
         s.feature.copies.iter().any(|f| !f.upright()) || s.operation.toolpaths.iter().any(axis)
     });
     let mut p = Planner {
-        e: Emit::new(&lines, file, tilted),
+        e: Emit::new(&lines, &model, file, tilted),
         security: 0.0,
         setup: None,
         setups: Vec::new(),
@@ -121,6 +123,16 @@ pub fn plan(text: &[u8], file: FileId, options: &Options) -> (Option<Planned>, V
         }
     }
     holes.values().for_each(|steps| drill::leftovers(&mut p.e, steps));
+    for s in process.steps().into_iter().filter(|s| p.tells.contains(&s.origin.id)) {
+        let Shape::Slot { section: Section::Tee { .. }, .. } = s.feature.shape else { continue };
+        let own = |t: &&Workingstep| t.feature.origin.id == s.feature.origin.id;
+        if process.steps().into_iter().filter(own).all(|t| t.operation.toolpaths.is_empty() && t.operation.tool.kind != "T_SLOT_MILL") {
+            let tool = &s.operation.tool;
+            let (name, of) = (format!("T{}", tool.number), format!("#{} {}", s.feature.origin.id, s.feature.keyword));
+            let why = "its bar, no workingstep has a T_SLOT_MILL";
+            p.e.say(code::PLAN_UNREACHABLE_CORNER, s.operation.origin, &[&name, &format!("{:.4}", tool.diameter / 2.0), &of, why]);
+        }
+    }
     for s in process.steps() {
         let Shape::Compound(all) = &s.feature.shape else { continue };
         for f in all.iter().filter(|f| !holes.contains_key(&f.origin.id)) {
@@ -137,10 +149,8 @@ pub fn plan(text: &[u8], file: FileId, options: &Options) -> (Option<Planned>, V
 }
 
 fn tolerance(process: &Process, options: &Options) -> f64 {
-    // Some programs write micrometres: half a millimetre is no tolerance of a milled part.
-    let of = |t: f64| if t > 0.5 { t / 1000.0 } else { t };
-    let written = process.workpieces.iter().filter_map(|w| w.tolerance).map(of).find(|t| *t > 0.0);
-    options.tolerance.or(written).unwrap_or(0.05).clamp(0.001, 0.5)
+    let written = process.workpieces.iter().filter_map(|w| w.tolerance).find(|t| *t > 0.0);
+    options.tolerance.unwrap_or_else(|| kept_tolerance(written.unwrap_or(0.0))).clamp(0.001, 0.5)
 }
 
 /// Of each feature, the workingstep that leaves least: least allowance, then the smallest tool, then the last.
@@ -327,11 +337,13 @@ impl Planner<'_> {
         let technology = if lathe { "TURNING_TECHNOLOGY" } else { "MILLING_TECHNOLOGY" };
         let moving = |t: &Toolpath| !t.rapid && matches!(t.path, PathKind::Location { .. } | PathKind::Axes(_));
         let fed = |t: &Toolpath| t.technology.unwrap_or(o.technology).feed.is_some();
-        if o.technology.feed.is_none() && (o.toolpaths.is_empty() || o.toolpaths.iter().any(|t| moving(t) && !fed(t))) {
+        // What is given and no good has had its message.
+        let [feed, cut, _, tooth] = o.technology.written;
+        if o.technology.feed.is_none() && feed.or(tooth).is_none_or(|f| f > 0.0) && (o.toolpaths.is_empty() || o.toolpaths.iter().any(|t| moving(t) && !fed(t))) {
             let why = "the feed follows from a feed, or from a feed per tooth with a spindle speed";
             self.e.say(code::PLAN_MISSING_VALUE, o.technology.origin, &[technology, "feedrate", why]);
         }
-        if o.technology.surface.is_none() && o.technology.speed.is_none_or(|s| s == 0.0 && o.toolpaths.is_empty()) {
+        if cut.is_none_or(|c| c > 0.0) && o.technology.surface.is_none() && o.technology.speed.is_none_or(|s| s == 0.0 && o.toolpaths.is_empty()) {
             self.e.say(code::PLAN_MISSING_VALUE, o.technology.origin, &[technology, if lathe { "spindle_speed" } else { "spindle" }, "nothing is cut with a spindle that stands"]);
         }
         if o.technology.contact_feed && o.toolpaths.is_empty() {

@@ -73,6 +73,13 @@ pub struct Workpiece {
     pub block: Option<(Frame, [f64; 3])>,
 }
 
+/// The tolerance that is kept for a global tolerance as written, mm.
+pub fn kept_tolerance(written: f64) -> f64 {
+    // Some programs write micrometres: a millimetre is no tolerance of a milled part.
+    let t = if written >= 1.0 { written / 1000.0 } else { written };
+    if t > 0.0 { t.clamp(0.001, 0.5) } else { 0.05 }
+}
+
 /// One thing to execute.
 #[derive(Clone, PartialEq, Debug)]
 pub enum Element {
@@ -335,8 +342,12 @@ pub enum Shape {
         right: bool,
         /// Inside.
         inner: bool,
+        /// How far below its placement it begins.
+        start: f64,
         /// Length.
         length: f64,
+        /// Diameter of the hole that an inner one is cut in: of the hole it is applied to, else its minor diameter.
+        bore: Option<f64>,
     },
     /// Elements of a compound feature.
     Compound(Vec<Feature>),
@@ -475,8 +486,12 @@ pub enum Section {
         bar_width: f64,
         /// Of the lower part.
         bar_depth: f64,
-        /// It has chamfers or a radius as well.
-        dressed: bool,
+        /// Of the corners of the lower part.
+        radius: f64,
+        /// Chamfers at the open end, and between the two parts: their widths, 0 where there is none, and angles, rad.
+        chamfer: [[f64; 2]; 2],
+        /// The profile.
+        origin: Origin,
     },
     /// Part of a circle.
     Circular {
@@ -546,6 +561,14 @@ pub struct Tool {
     pub right_handed: Option<bool>,
     /// Pitch of a tap or a thread mill.
     pub pitch: Option<f64>,
+    /// Size of the thread that it cuts, where it says one besides its diameter.
+    pub thread_size: Option<f64>,
+    /// Diameter of the flat at the tip of a countersink.
+    pub nose: f64,
+    /// Height of a disc.
+    pub thickness: Option<f64>,
+    /// It must not be drawn back turning.
+    pub no_retract: bool,
     /// Where its edge points when the spindle is oriented.
     pub orientation: Option<[f64; 3]>,
     /// Diameter of what holds it, for going through a hole sideways.
@@ -565,6 +588,18 @@ impl Tool {
     /// It cuts below what it passes, or its shape is not known.
     pub fn undercuts(&self) -> bool {
         self.is_one_of(&["T_SLOT_MILL", "WOODRUFF", "DOVETAIL", "BORING", "SIDE_MILL", "THREAD_MILL", "USER"])
+    }
+    /// How wide a hole the cone of a tool opens whose tip is so deep, mm.
+    pub fn opens(&self, depth: f64) -> Option<f64> {
+        Some(self.diameter.min(self.nose + 2.0 * depth * libm::tan(self.tip_angle?)))
+    }
+    /// How deep its tip is where its cone is so wide, mm.
+    pub fn sinks(&self, width: f64) -> Option<f64> {
+        Some((width - self.nose) / 2.0 / libm::tan(self.tip_angle?))
+    }
+    /// Length of its cutting edge along its axis: of a disc its height.
+    pub fn edge(&self) -> Option<f64> {
+        self.thickness.filter(|_| self.is_one_of(&["T_SLOT_MILL", "WOODRUFF", "SIDE_MILL"])).or(self.cutting_length)
     }
     /// It goes into the side of a slot.
     pub fn is_disc(&self) -> bool {

@@ -116,6 +116,10 @@ impl<'m> Reader<'m> {
         }
     }
     pub fn missing(&mut self, node: Node<'_>, attribute: &str, why: &str) {
+        // What is given and could not be read has had its message where it is wrong.
+        if node.node(attribute).is_some() && self.failed() {
+            return;
+        }
         self.say_at(code::PLAN_MISSING_VALUE, node, attribute, &[&title(node), attribute, why]);
     }
     pub fn not_lowered(&mut self, node: Node<'_>, why: &str) {
@@ -215,6 +219,14 @@ impl<'m> Reader<'m> {
             Some((frame, [b.real("x")?, b.real("y")?, b.real("z")?]))
         });
         let stated = w.node("its_material");
+        if let Some(t) = w.length("global_tolerance")
+            && self.in_range(w, "global_tolerance", t, 0.0, "zero or more").is_some()
+            && t < 1.0
+            && kept_tolerance(t) != t
+        {
+            let why = format!("{} mm is none that a path keeps: {} mm is kept", t, kept_tolerance(t));
+            self.no_effect(w, "global_tolerance", &why);
+        }
         let material = stated.map_or(String::new(), |m| m.string("standard_identifier").into_owned());
         let material_at = stated.map(origin);
         Workpiece { origin: origin(w), name: w.string("its_id").into_owned(), material, material_at, tolerance: w.length("global_tolerance"), block }

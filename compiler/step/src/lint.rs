@@ -97,6 +97,16 @@ impl Graph {
     }
 }
 
+/// The largest that an angle of this name may be, rad: slopes and half angles go up to a quarter of a turn.
+fn most(node: Node<'_>, name: &str) -> f64 {
+    match name {
+        "angle" if node.is_a("approach_retract_strategy") || node.is_a("angle_taper") => PI / 2.0,
+        "slope" | "taper_angle" | "tool_tip_half_angle" | "tool_circumference_angle" => PI / 2.0,
+        "profile_angle" | "tip_angle" | "point_angle" | "included_angle" => PI,
+        _ => 2.0 * PI,
+    }
+}
+
 /// A number without needless digits.
 pub fn short(v: f64) -> String {
     let s = format!("{v:.4}");
@@ -288,7 +298,7 @@ impl<'m> Lints<'m, '_> {
     fn angle(&mut self, node: Node<'m>, name: &str, v: Val<'m>, number: f64) {
         let text: String = v.text().chars().filter(|c| *c > ' ').collect();
         let decimals = text.split_once('.').map_or(0, |(_, d)| d.bytes().filter(u8::is_ascii_digit).count());
-        if number.abs() > 0.001 && number.abs() <= 2.0 * PI && decimals >= 5 {
+        if number.abs() > 0.001 && number.abs() <= most(node, name) && decimals >= 5 {
             let args = vec![name.into(), text, short(number.to_degrees())];
             self.once(code::STEP_RADIANS, node, v.span(), args);
         }

@@ -136,6 +136,10 @@ pub static RULES: &[Rule] = &[
     resource("axis2_placement_3d", "WR4", "axis and ref_direction are not parallel", |n| {
         let (Some(a), Some(b)) = (n.node("axis"), n.node("ref_direction")) else { return Some(true) };
         let (a, b) = (vector(a)?, vector(b)?);
+        // A direction of no length breaks its own rule.
+        if [a, b].contains(&[0.0; 3]) {
+            return None;
+        }
         let cross = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
         Some(cross.iter().any(|c| c.abs() > 1e-12))
     }),

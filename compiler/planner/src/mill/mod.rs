@@ -81,6 +81,9 @@ pub(crate) fn mill(e: &mut Emit<'_>, step: &Workingstep, m: &Milling, feature: &
         let (what, why) = (format!("#{} {}", feature.origin.id, feature.keyword), format!("a {} does not mill it", tool.kind));
         return e.say(code::PLAN_CANNOT_CUT, step.origin, &[&what, &why]);
     }
+    if !slot::suits(e, step, feature) {
+        return;
+    }
     let Some(job) = job(e, step, m, feature, given) else { return };
     let planned = match &feature.shape {
         Shape::Face { .. } => job.face(e),
@@ -167,9 +170,14 @@ fn job<'a>(e: &mut Emit<'_>, step: &'a Workingstep, m: &'a Milling, feature: &'a
         e.say(code::PLAN_TOO_MUCH, o.origin, &[&o.keyword, &MOST_LEVELS.to_string(), "levels"]);
         return None;
     }
-    if let Some(l) = o.tool.cutting_length.filter(|l| bottom > *l + 1e-6) {
+    // A disc cuts with its height at a time, and gets as deep as it reaches; in a T-slot its levels are no higher than it.
+    let disc = o.tool.is_disc();
+    let tee = disc && matches!(feature.shape, Shape::Slot { section: Section::Tee { .. }, .. });
+    let once = o.tool.edge().filter(|_| disc && !tee).map(|l| (axial.min(bottom), l));
+    let reach = o.tool.cutting_length.filter(|l| !disc || o.tool.thickness.is_some_and(|t| *l > t)).map(|l| (bottom, l));
+    if let Some((cut, l)) = once.into_iter().chain(reach).find(|(cut, l)| *cut > *l + 1e-6) {
         let name = format!("T{} '{}'", o.tool.number, o.tool.name);
-        e.say(code::PLAN_DEEPER_THAN_EDGE, o.origin, &[&o.keyword, &bottom.to_string(), &name, &l.to_string()]);
+        e.say(code::PLAN_DEEPER_THAN_EDGE, o.origin, &[&o.keyword, &cut.to_string(), &name, &l.to_string()]);
     }
     let by = stepover(e, step, m, given.overlap)?;
     let top = feature.frame.origin[2];

@@ -13,6 +13,17 @@ use crate::process::*;
 /// More levels than this are a mistake.
 const MOST: usize = 5_000;
 
+/// Whether a T-slot cutter is low enough for the bar it is to cut.
+pub(super) fn suits(e: &mut Emit<'_>, step: &Workingstep, feature: &Feature) -> bool {
+    let tool = &step.operation.tool;
+    let Shape::Slot { section: Section::Tee { bar_depth, .. }, .. } = &feature.shape else { return true };
+    let Some(edge) = tool.edge().filter(|l| tool.kind == "T_SLOT_MILL" && *l > bar_depth + 1e-6) else { return true };
+    let ways = ["its_tool_body.cutting_thickness", "cutting_width", "its_tool_body.dimension.cutting_edge_length", "maximum_depth_of_cut"];
+    let why = format!("its bar is {} mm high, the disc of its tool {} mm", gr_step::short(*bar_depth), gr_step::short(edge));
+    e.say(code::PLAN_CANNOT_CUT, e.attribute(tool.origin, &ways), &[&format!("#{} {}", feature.origin.id, feature.keyword), &why]);
+    false
+}
+
 impl Job<'_> {
     pub(super) fn slot(&self, e: &mut Emit<'_>, travel: &Travel, section: &Section, ends: &[SlotEnd]) -> Done<Moves> {
         let line = match travel {
@@ -36,11 +47,16 @@ impl Job<'_> {
             let ways: Vec<(P2, P2)> = both.into_iter().enumerate().filter(|(i, _)| open(*i)).map(|(_, way)| way).collect();
             self.open_ends(e, &ways);
         }
-        if let Section::Tee { width, bar_width, bar_depth, dressed } = section {
-            if *dressed {
-                return Err("a T-slot with chamfers or radii".into());
-            }
+        if let Section::Tee { width, bar_width, bar_depth, radius, chamfer, origin } = section {
+            self.chamfers(e, *chamfer, *origin);
             if self.step.operation.tool.kind == "T_SLOT_MILL" {
+                self.corners_of_bar(e, *radius, *origin);
+                self.no_pattern(e);
+                if let Some(s) = self.m.strategy.as_ref().filter(|s| s.climb.is_some()) {
+                    let of = format!("#{} {}", s.origin.id, s.keyword);
+                    let at = e.attribute(s.origin, &["cutmode", "spiral_cutmode"]);
+                    e.say(code::PLAN_NO_EFFECT, at, &["the cut mode", &of, "a disc in its slot cuts on both sides"]);
+                }
                 return self.tee(&line, ends, *width, *bar_width, *bar_depth);
             }
         }
@@ -92,12 +108,45 @@ impl Job<'_> {
         Ok(moves)
     }
 
+    /// Chamfers of a T-slot, which none of its tools makes.
+    fn chamfers(&self, e: &mut Emit<'_>, chamfer: [[f64; 2]; 2], profile: Origin) {
+        if !self.tells {
+            return;
+        }
+        let places = [("first_offset", "at its open end"), ("second_offset", "between its neck and its bar")];
+        for ([width, lean], (attribute, place)) in chamfer.into_iter().zip(places).filter(|c| c.0[0] > 0.0) {
+            let text = format!("the chamfers {place}, {} mm wide at {} degrees, are not cut", gr_step::short(width), gr_step::short(lean.to_degrees()));
+            let tool = format!("T{}", self.step.operation.tool.number);
+            e.say(code::PLAN_UNREACHABLE_CORNER, e.attribute(profile, &[attribute]), &[&tool, &format!("{:.4}", self.radius), &self.name(), &text]);
+        }
+    }
+
+    /// The bar of a T-slot has the corners that its cutter has.
+    fn corners_of_bar(&self, e: &mut Emit<'_>, radius: f64, profile: Origin) {
+        if (radius - self.edge).abs() <= self.tolerance {
+            return;
+        }
+        let at = e.attribute(profile, &["radius"]);
+        let short = gr_step::short;
+        let text = format!("the corners of its bar have a radius of {} mm, the edge of the tool {} mm", short(radius), short(self.edge));
+        let o = &self.step.operation;
+        if self.edge > radius {
+            e.say(code::PLAN_UNREACHABLE_CORNER, at, &[&format!("T{}", o.tool.number), &format!("{:.4}", self.radius), &self.name(), &text]);
+        } else {
+            e.say(code::PLAN_BEYOND_FEATURE, at, &[&format!("#{} {}", o.origin.id, o.keyword), &self.name(), &text]);
+        }
+    }
+
     /// Where all strokes go along the course, a strategy has no say in it.
     fn no_pattern(&self, e: &mut Emit<'_>) {
-        let Some(s) = self.m.strategy.as_ref().filter(|s| s.keyword != "CONTOUR_PARALLEL") else { return };
+        let Some(s) = self.m.strategy.as_ref() else { return };
         let of = format!("#{} {}", s.origin.id, s.keyword);
         let why = "all strokes in such a slot follow its course";
-        e.say(gr_text::code::PLAN_NO_EFFECT, s.origin, &["the pattern", &of, why]);
+        if s.keyword != "CONTOUR_PARALLEL" {
+            e.say(code::PLAN_NO_EFFECT, s.origin, &["the pattern", &of, why]);
+        } else if s.ccw.is_some() {
+            e.say(code::PLAN_NO_EFFECT, e.attribute(s.origin, &["rotation_direction"]), &["rotation_direction", &of, why]);
+        }
     }
 
     /// How far past the end of the course the tool reaches on the arc of a Woodruff end, its tip at a depth. The arc
@@ -401,10 +450,7 @@ impl Job<'_> {
         if neck >= 2.0 * self.radius {
             return Err(format!("a T-slot cutter of {} mm, no wider than its neck", 2.0 * self.radius));
         }
-        let edge = self.step.operation.tool.cutting_length.unwrap_or(height);
-        if edge > height + 1e-6 {
-            return Err(format!("its bar is {height} mm high, the tool's edge {edge} mm"));
-        }
+        let edge = self.step.operation.tool.edge().unwrap_or(height);
         let mut middle = self.ended(line, ends, false)?;
         let back = !open(0) || !open(1);
         if !open(0) {

@@ -171,14 +171,15 @@ impl<'m> Reader<'m> {
     fn goes_through(&mut self, node: Node<'m>, setup: Option<&Setup>, copies: &[Frame], depth: f64) {
         let Some([low, _]) = self.stock(setup).filter(|_| self.model.all("setup").count() <= 1) else { return };
         // An element of a compound feature opens into one that goes deeper.
-        let ends = |n: Node<'m>| {
+        let parent = self.parents.get(&node.id()).copied().filter(|p| p.is_a("compound_feature"));
+        let mut ends = |n: Node<'m>| {
             let at = n.node("feature_placement")?.node("location")?;
             let floor = n.node("depth")?.node("position")?.node("location")?;
             Some(self.point(at)?[2] + self.point(floor)?[2])
         };
         let own = ends(node);
-        let deeper = |n: &Node<'m>| n.id() != node.id() && ends(*n).zip(own).is_some_and(|(a, b)| a < b - 1e-6);
-        if self.parents.get(&node.id()).is_some_and(|p| p.is_a("compound_feature") && p.nodes("elements").iter().any(deeper)) {
+        let mut deeper = |n: &Node<'m>| n.id() != node.id() && ends(*n).zip(own).is_some_and(|(a, b)| a < b - 1e-6);
+        if parent.is_some_and(|p| p.nodes("elements").iter().any(&mut deeper)) {
             return;
         }
         let ends = copies.iter().filter(|c| c.upright()).map(|c| c.point([0.0, 0.0, -depth])[2]);
@@ -389,7 +390,10 @@ impl<'m> Reader<'m> {
             "SLOT" => {
                 let path = self.need(node, "course_of_travel")?;
                 let section = self.need(node, "swept_shape")?;
-                let (path, section) = (self.travel(path)?, self.section(section)?);
+                let (path, profile, section) = (self.travel(path)?, section, self.section(section)?);
+                if let Section::Circular { radius, sweep } = section {
+                    self.arc_fits(node, profile, operation, radius, sweep)?;
+                }
                 let ends = self.slot_ends(node)?;
                 Shape::Slot { path, section, ends }
             }
@@ -413,6 +417,9 @@ impl<'m> Reader<'m> {
             }
             "ROUND_HOLE" => self.hole(node, operation)?,
             "GENERAL_OUTSIDE_PROFILE" => {
+                if let Some(way) = node.node("profile_swept_shape") {
+                    self.swept_down(node, way, operation)?;
+                }
                 let boundary = self.need(node, "feature_boundary")?;
                 let boundary = if boundary.is_a("closed_profile") {
                     self.closed_contour(boundary, placement)?
@@ -428,15 +435,18 @@ impl<'m> Reader<'m> {
             _ if node.is_a("turning_feature") => Shape::Toolpath,
             "CATALOGUE_THREAD" | "DEFINED_THREAD" => {
                 let major = self.positive(node, "major_diameter", "the size of the thread")?;
-                let hand = node.node("thread_hand").map_or(String::new(), |h| h.string("descriptive_string").to_lowercase());
-                let length = node.node("partial_profile").and_then(|p| p.real("effective_length")).unwrap_or(0.0);
+                let right = self.thread_hand(node)?;
                 let pitch = match node.node("number_of_threads") {
-                    Some(n) => self.pitch(n)?,
+                    Some(n) => Some(self.pitch(n)?),
                     None => None,
                 };
                 let inner = node.attr("inner_or_outer_thread").and_then(|v| v.boolean()).unwrap_or(true);
-                self.thread_fits(node, major, inner);
-                Shape::Thread { major, pitch, right: !hand.contains("left"), inner, length }
+                let (start, length) = self.thread_reach(node, placement)?;
+                let holes = node.nodes("applied_shape").into_iter().filter_map(|h| h.length("diameter")).reduce(f64::min);
+                let bore = holes.or(node.real("minor_diameter").filter(|d| *d > 0.0)).filter(|_| inner);
+                self.unused_of_thread(node, holes.is_some() || !inner);
+                self.thread_fits(node, major, inner, (start, length));
+                Shape::Thread { major, pitch, right, inner, start, length, bore }
             }
             _ if node.is_a("compound_feature") => {
                 let mut elements = Vec::new();
@@ -456,8 +466,64 @@ impl<'m> Reader<'m> {
         })
     }
 
+    /// Whether a thread is right-handed. The standard has it as words.
+    fn thread_hand(&mut self, node: Node<'m>) -> Option<bool> {
+        let Some(hand) = node.node("thread_hand") else {
+            self.missing(node, "thread_hand", "a thread is right-handed or left-handed");
+            return None;
+        };
+        let text = hand.string("descriptive_string").into_owned();
+        let words = text.to_lowercase();
+        let is = |name: &str, short: [&str; 2]| words.contains(name) || short.contains(&words.trim());
+        match (is("right", ["r", "rh"]), is("left", ["l", "lh"])) {
+            (true, false) => Some(true),
+            (false, true) => Some(false),
+            _ => {
+                let must = "'right' or 'left', the hand of the thread";
+                self.say_at(code::PLAN_BAD_SIZE, hand, "descriptive_string", &[&title(hand), "descriptive_string", &format!("'{text}'"), must]);
+                None
+            }
+        }
+    }
+
+    /// How far below its placement a thread begins, and how long it is; 0: as its depth says.
+    fn thread_reach(&mut self, node: Node<'m>, placement: &Frame) -> Option<(f64, f64)> {
+        let Some(area) = node.node("partial_profile") else { return Some((0.0, 0.0)) };
+        let length = match area.real("effective_length") {
+            Some(l) => self.in_range(area, "effective_length", l, f64::MIN_POSITIVE, "above zero")?,
+            None => 0.0,
+        };
+        self.unused(area, "maximum_length", "its effective_length says how long it is");
+        let frame = self.profile_frame(area, placement)?;
+        let aside = libm::hypot(frame.origin[0], frame.origin[1]);
+        if aside > 1e-9 || frame.z[2] < 1.0 - 1e-9 {
+            self.no_effect(area, "placement", "a thread lies on the axis of what it is cut on; only how far below its placement counts");
+        }
+        let start = -frame.origin[2] + 0.0;
+        if start < 0.0 {
+            let given = format!("{} mm above the thread", gr_step::short(-start));
+            self.say_at(code::PLAN_BAD_SIZE, area, "placement", &[&title(area), "placement", &given, "at or below the placement of the thread"]);
+            return None;
+        }
+        Some((start, length))
+    }
+
+    /// What of a thread no path depends on. `hole`: another shape says how wide the hole before it is, or there is none.
+    fn unused_of_thread(&mut self, node: Node<'m>, hole: bool) {
+        let flank = "the edges of its tool have the form of its flanks";
+        for a in ["form", "pitch_diameter", "crest"] {
+            self.unused(node, a, flank);
+        }
+        for a in ["fit_class", "qualifier"] {
+            self.unused(node, a, "it is cut to its nominal size");
+        }
+        if hole {
+            self.unused(node, "minor_diameter", "what it is cut on says how wide that is");
+        }
+    }
+
     /// A thread that what it is cut on contradicts: an inner one in a hole as wide as it, a longer one than it is deep.
-    fn thread_fits(&mut self, node: Node<'m>, major: f64, inner: bool) {
+    fn thread_fits(&mut self, node: Node<'m>, major: f64, inner: bool, (start, length): (f64, f64)) {
         let of = title(node);
         for on in node.nodes("applied_shape") {
             let wide = on.length("diameter").filter(|d| inner && *d >= major - 1e-9);
@@ -472,12 +538,35 @@ impl<'m> Reader<'m> {
                 self.say_at(code::PLAN_BEYOND_FEATURE, node, "depth", &[&of, &format!("#{} {}", on.id(), on.keyword()), &why]);
             }
         }
-        let area = node.node("partial_profile");
+        let Some(area) = node.node("partial_profile") else { return };
         let own = node.node("depth").and_then(|d| self.plane(d)).map_or(0.0, |p| -p.point[2]);
-        if let Some((a, l)) = area.and_then(|a| Some((a, a.real("effective_length")?))).filter(|(_, l)| own > 0.0 && *l > own + 1e-9) {
-            let why = format!("it is {l} mm, the thread only {own} mm deep: that counts");
-            self.no_effect(a, "effective_length", &why);
+        if own > 0.0 && start + length > own + 1e-9 {
+            let end = if start > 0.0 { format!("it ends {} mm below the top", gr_step::short(start + length)) } else { format!("it is {length} mm") };
+            self.no_effect(area, "effective_length", &format!("{end}, the thread only {own} mm deep: that counts"));
         }
+    }
+
+    /// The way along which an outside profile is swept: down its axis, as far as its depth.
+    fn swept_down(&mut self, node: Node<'m>, way: Node<'m>, operation: u64) -> Option<()> {
+        self.unplaced(way, "the depth of the feature says where it ends");
+        let frame = match way.node("placement") {
+            Some(p) => self.placement(p)?,
+            None => Frame::default(),
+        };
+        if let Some(d) = way.node("its_direction") {
+            let d = frame.vector(self.direction(d)?);
+            if d[2].abs() < 1.0 - 1e-6 {
+                let at = format!("; its direction ({}) leans, and only walls along the axis of the feature are cut", d.map(gr_step::short).join(", "));
+                self.say_at(code::PLAN_NOT_LOWERED, way, "its_direction", &[&title(way), &at]);
+                return None;
+            }
+        }
+        let depth = self.depth(node, operation)?;
+        if let Some(l) = way.length("distance").filter(|l| (l - depth).abs() > 1e-6) {
+            let why = format!("it is {} mm, the depth of the feature {} mm: that counts", gr_step::short(l), gr_step::short(depth));
+            self.no_effect(way, "distance", &why);
+        }
+        Some(())
     }
 
     fn need(&mut self, node: Node<'m>, attribute: &str) -> Option<Node<'m>> {
@@ -575,6 +664,7 @@ impl<'m> Reader<'m> {
         let profile = self.need(node, "removal_boundary")?;
         self.in_millimetres(profile, "profile_length");
         let width = self.positive(profile, "profile_length", "it says how wide the face is")?;
+        self.unplaced(profile, "a face begins at its own placement");
         let placed = profile.node("placement").and_then(|p| self.placement(p)).map(|f| [f.x[0], f.x[1]]);
         let square = [direction[1].abs(), direction[0].abs()];
         let across = placed.filter(|p| (p[0] * direction[0] + p[1] * direction[1]).abs() < 1e-6 && libm::hypot(p[0], p[1]) > 0.5);
@@ -598,10 +688,10 @@ impl<'m> Reader<'m> {
     }
 
     /// Pitch of a thread from its number of threads, mm: per inch, unless its unit says otherwise.
-    fn pitch(&mut self, node: Node<'m>) -> Option<Option<f64>> {
-        let Some(v) = node.real("its_parameter_value").filter(|v| *v > 0.0 && v.is_finite()) else { return Some(None) };
+    fn pitch(&mut self, node: Node<'m>) -> Option<f64> {
+        let v = self.positive(node, "its_parameter_value", "it says how steep the thread is")?;
         let unit: String = node.string("its_parameter_unit").to_lowercase().split_whitespace().collect();
-        Some(Some(match unit.as_str() {
+        Some(match unit.as_str() {
             "" | "1/in" | "1/inch" | "/in" | "/inch" | "in-1" | "in^-1" | "tpi" | "perinch" | "threadsperinch" => 25.4 / v,
             "1/mm" | "/mm" | "mm-1" | "mm^-1" | "permm" => 1.0 / v,
             "mm" => v,
@@ -611,7 +701,7 @@ impl<'m> Reader<'m> {
                 self.say_at(code::PLAN_BAD_SIZE, node, "its_parameter_unit", &[&super::title(node), "its_parameter_unit", &given, "'1/in', '1/mm', or 'mm' for a pitch"]);
                 return None;
             }
-        }))
+        })
     }
 
     fn hole(&mut self, node: Node<'m>, operation: u64) -> Option<Shape> {
@@ -665,6 +755,32 @@ impl<'m> Reader<'m> {
             self.say_at(code::PLAN_BAD_SIZE, bottom, attribute, &[&title(bottom), attribute, &gr_step::short(radius), must]);
         }
         fits.then_some(())
+    }
+
+    /// An arc as the section of a slot ends at its top or above it, and does not close in on the way up.
+    fn arc_fits(&mut self, slot: Node<'m>, profile: Node<'m>, operation: u64, radius: f64, sweep: f64) -> Option<()> {
+        let depth = self.depth(slot, operation)?;
+        let half = sweep / 2.0;
+        let high = radius * (1.0 - libm::cos(half));
+        let say = |r: &mut Self, must: &str| {
+            let written = gr_step::short(profile.real("sweep_angle").unwrap_or(0.0));
+            r.say_at(code::PLAN_BAD_SIZE, profile, "sweep_angle", &[&title(profile), "sweep_angle", &written, must]);
+            None
+        };
+        let turn = std::f64::consts::PI;
+        if !(half > 0.0 && half < turn) {
+            return say(self, "above 0 and below 360 degrees");
+        }
+        // The section is cut to the width of its arc; as far up as it leans outwards, that is the slot's.
+        if half > turn / 2.0 + 1e-9 && depth > radius + 1e-6 {
+            return say(self, &format!("180 degrees at most in a slot {} mm deep: the walls of this one lean inwards", gr_step::short(depth)));
+        }
+        let slack = tolerance(slot).0.unwrap_or(0.0).max(0.01);
+        if high < depth - slack {
+            let words = format!("such that the arc is as high as the slot is deep: it is {} mm high, the slot {} mm deep", gr_step::short(high), gr_step::short(depth));
+            return say(self, &words);
+        }
+        Some(())
     }
 
     fn slot_ends(&mut self, node: Node<'m>) -> Option<Vec<SlotEnd>> {
@@ -753,12 +869,24 @@ impl<'m> Reader<'m> {
                 angle: angle(self, "profile_angle"),
                 tilt: angle(self, "tilt_angle"),
             },
-            "TEE_PROFILE" => Section::Tee {
-                width: self.positive(node, "width", "a slot has a width")?,
-                bar_width: self.positive(node, "cross_bar_width", "a T-slot has one")?,
-                bar_depth: self.positive(node, "cross_bar_depth", "a T-slot has one")?,
-                dressed: ["first_offset", "second_offset", "radius"].iter().any(|a| node.length(a).is_some_and(|v| v > 0.0)),
-            },
+            "TEE_PROFILE" => {
+                let mut chamfer = [[0.0; 2]; 2];
+                for ([width, lean], [angle, offset]) in chamfer.iter_mut().zip([["first_angle", "first_offset"], ["second_angle", "second_offset"]]) {
+                    *width = self.in_range(node, offset, node.length(offset).unwrap_or(0.0), 0.0, "at or above zero")?;
+                    *lean = node.real(angle).map_or(0.0, |a| self.angle(a));
+                    if *width == 0.0 && node.real(angle).is_some_and(|a| a != 0.0) {
+                        self.no_effect(node, angle, &format!("it is the angle of a chamfer, and {offset} is 0: there is none"));
+                    }
+                }
+                Section::Tee {
+                    width: self.positive(node, "width", "a slot has a width")?,
+                    bar_width: self.positive(node, "cross_bar_width", "a T-slot has one")?,
+                    bar_depth: self.positive(node, "cross_bar_depth", "a T-slot has one")?,
+                    radius: self.in_range(node, "radius", node.length("radius").unwrap_or(0.0), 0.0, "at or above zero")?,
+                    chamfer,
+                    origin: origin(node),
+                }
+            }
             "PARTIAL_CIRCULAR_PROFILE" => Section::Circular {
                 radius: self.positive(node, "radius", "a circle has one")?,
                 sweep: angle(self, "sweep_angle"),

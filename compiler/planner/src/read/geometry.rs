@@ -2,7 +2,9 @@
 
 use gr_step::{Node, Val};
 
-use super::Reader;
+use gr_text::code;
+
+use super::{Reader, title};
 use crate::frame::{Frame, norm, sub, unit};
 use crate::process::*;
 
@@ -12,29 +14,34 @@ const OFF_CIRCLE: f64 = 2e-3;
 const DEEPEST: usize = 32;
 
 impl<'m> Reader<'m> {
-    pub fn point(&self, node: Node<'m>) -> Option<[f64; 3]> {
-        let all: Vec<f64> = node.attr("coordinates")?.items().map(|v| v.real()).collect::<Option<_>>()?;
-        let p = [*all.first()?, all.get(1).copied().unwrap_or(0.0), all.get(2).copied().unwrap_or(0.0)];
-        p.iter().all(|c| c.is_finite() && c.abs() < 1e7).then_some(p)
+    pub fn point(&mut self, node: Node<'m>) -> Option<[f64; 3]> {
+        let p = triple(node, "coordinates")?;
+        if p.iter().any(|c| !(c.abs() < 1e7)) {
+            self.say_at(code::PLAN_BAD_SIZE, node, "coordinates", &[&title(node), "coordinates", &listed(p), "numbers that a machine can have"]);
+            return None;
+        }
+        Some(p)
     }
-    pub fn direction(&self, node: Node<'m>) -> Option<[f64; 3]> {
-        let all: Vec<f64> = node.attr("direction_ratios")?.items().map(|v| v.real()).collect::<Option<_>>()?;
-        unit([*all.first()?, all.get(1).copied().unwrap_or(0.0), all.get(2).copied().unwrap_or(0.0)])
+    pub fn direction(&mut self, node: Node<'m>) -> Option<[f64; 3]> {
+        let p = triple(node, "direction_ratios")?;
+        let found = unit(p);
+        if found.is_none() {
+            self.say(code::PLAN_BAD_SIZE, node, &[&title(node), "direction_ratios", &listed(p), "a direction: not all of them zero"]);
+        }
+        found
     }
     /// An AXIS2_PLACEMENT_3D. Directions that are not given are Z and X.
     pub fn placement(&mut self, node: Node<'m>) -> Option<Frame> {
-        let origin = node.node("location").and_then(|p| self.point(p));
-        let axis = node.node("axis").map_or(Some([0.0, 0.0, 1.0]), |d| self.direction(d));
-        let frame = match (origin, axis) {
-            (Some(o), Some(z)) => {
-                let given = node.node("ref_direction").map(|d| self.direction(d));
-                let usual = if z[0].abs() < 0.9 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] };
-                given.unwrap_or(Some(usual)).and_then(|x| Frame::new(o, z, x))
-            }
-            _ => None,
+        let Some(origin) = node.node("location").and_then(|p| self.point(p)) else {
+            self.missing(node, "location", "a placement needs a point");
+            return None;
         };
+        let z = node.node("axis").map_or(Some([0.0, 0.0, 1.0]), |d| self.direction(d))?;
+        let usual = if z[0].abs() < 0.9 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] };
+        let x = node.node("ref_direction").map_or(Some(usual), |d| self.direction(d))?;
+        let frame = Frame::new(origin, z, x);
         if frame.is_none() {
-            self.missing(node, "location", "a placement needs a point and two directions that are not parallel");
+            self.say(code::PLAN_BAD_SIZE, node, &[&title(node), "ref_direction", "parallel to its axis", "another direction than the axis"]);
         }
         frame
     }
@@ -155,7 +162,7 @@ impl<'m> Reader<'m> {
         }
     }
 
-    fn trim_point(&self, t: Val<'m>) -> Option<[f64; 3]> {
+    fn trim_point(&mut self, t: Val<'m>) -> Option<[f64; 3]> {
         t.items().filter_map(|v| v.node()).find_map(|n| self.point(n))
     }
 
@@ -215,6 +222,16 @@ impl<'m> Reader<'m> {
         }
         Some(Contour { points: out, closed })
     }
+}
+
+/// Two or three numbers; what is not written is 0.
+fn triple(node: Node<'_>, attribute: &str) -> Option<[f64; 3]> {
+    let all: Vec<f64> = node.attr(attribute)?.items().map(|v| v.real()).collect::<Option<_>>()?;
+    Some([*all.first()?, all.get(1).copied().unwrap_or(0.0), all.get(2).copied().unwrap_or(0.0)])
+}
+
+fn listed(p: [f64; 3]) -> String {
+    format!("({})", p.map(gr_step::short).join(", "))
 }
 
 fn trim_parameter(t: Val<'_>) -> Option<f64> {

@@ -103,7 +103,7 @@ impl<'m> Reader<'m> {
     }
 
     /// A tool direction that says nothing but the axis of the feature.
-    fn along_feature(&self, direction: Node<'m>) -> bool {
+    fn along_feature(&mut self, direction: Node<'m>) -> bool {
         match direction.keyword() {
             "TWO_AXES" | "THREE_AXES" => true,
             "THREE_AXES_TILTED_TOOL" => {
@@ -351,19 +351,18 @@ impl<'m> Reader<'m> {
         let length = edges.first().and_then(|e| e.real("tool_offset_length").or_else(|| e.real("tool_functional_length")));
         let hand = body.attr("hand_of_cut").and_then(|v| v.choice());
         let tip = dimension.and_then(|d| d.real("tool_tip_half_angle")).or_else(|| node.real("point_angle").map(|a| a / 2.0));
+        let taper = self.taper(body, dimension)?;
+        // Not given, or above zero.
+        let positive = |r: &mut Self, n: Node<'m>, a: &str| n.real(a).map_or(Some(None), |v| r.in_range(n, a, v, f64::MIN_POSITIVE, "above zero").map(Some));
         let mut tool = Tool {
             origin: origin(node),
             name: node.string("its_id").into_owned(),
             kind: body.keyword().to_string(),
             diameter,
             tip_angle: tip.filter(|a| *a != 0.0).map(|a| self.angle(a)),
-            cutting_length: dimension.and_then(|d| d.real("cutting_edge_length")).or_else(|| node.real("maximum_depth_of_cut")).filter(|l| *l > 0.0),
+            cutting_length: dimension.and_then(|d| d.real("cutting_edge_length")).or_else(|| [node.real("maximum_depth_of_cut"), node.real("maximum_usable_length")].into_iter().flatten().reduce(f64::min)).filter(|l| *l > 0.0),
             edge_radius: of.real("edge_radius").filter(|r| r.is_finite() && *r > 0.0).unwrap_or(0.0),
-            taper: body
-                .real("taper_angle")
-                .or_else(|| dimension.and_then(|d| d.real("tool_circumference_angle")))
-                .filter(|_| body.keyword().starts_with("TAPERED"))
-                .map_or(0.0, |a| self.angle(a)),
+            taper,
             length: length.or_else(|| node.real("overall_assembly_length")).filter(|l| l.is_finite()),
             teeth: body.attr("number_of_teeth").or_else(|| body.attr("number_of_effective_teeth")).and_then(|v| v.integer()).and_then(|n| u32::try_from(n).ok()),
             right_handed: hand.as_deref().and_then(|h| match h {
@@ -371,7 +370,14 @@ impl<'m> Reader<'m> {
                 "LEFT" => Some(false),
                 _ => None,
             }),
-            pitch: node.real("thread_pitch").filter(|p| *p > 0.0),
+            pitch: positive(self, node, "thread_pitch")?,
+            thread_size: positive(self, node, "thread_size")?,
+            nose: if body.keyword().contains("COUNTERS") { node.real("minimum_cutting_diameter").filter(|d| *d > 0.0 && *d < diameter).unwrap_or(0.0) } else { 0.0 },
+            thickness: match ["cutting_thickness", "cutting_width", "cutter_width"].into_iter().find(|a| body.attr(a).is_some()) {
+                Some(a) => positive(self, body, a)?,
+                None => None,
+            },
+            no_retract: body.attr("retract_movement_forbidden").and_then(|v| v.boolean()) == Some(true),
             orientation: node.node("direction_for_spindle_orientation").and_then(|d| self.direction(d)),
             bar: node.real("tool_holder_diameter_for_spindle_orientation").filter(|d| *d > 0.0),
             number: 0,
@@ -390,12 +396,57 @@ impl<'m> Reader<'m> {
         Some(tool)
     }
 
+    /// Half the angle of the side of a tapered tool, rad: from 0, a cylinder, to below a quarter of a turn.
+    fn taper(&mut self, body: Node<'m>, dimension: Option<Node<'m>>) -> Option<f64> {
+        let side = dimension.filter(|d| d.real("tool_circumference_angle").is_some()).map(|d| (d, "tool_circumference_angle"));
+        let own = Some((body, "taper_angle")).filter(|_| body.real("taper_angle").is_some());
+        if !body.keyword().starts_with("TAPERED") {
+            if own.is_some_and(|(n, a)| n.real(a) != Some(0.0)) {
+                self.unused(body, "taper_angle", "its side is taken as a cylinder");
+            }
+            return Some(0.0);
+        }
+        let Some((node, name)) = own.or(side) else { return Some(0.0) };
+        if own.is_some()
+            && let Some((d, a)) = side.filter(|(d, a)| d.real(a) != node.real(name))
+        {
+            self.unused(d, a, "its taper_angle counts");
+        }
+        let written = node.real(name).unwrap_or(0.0);
+        let angle = self.angle(written);
+        if !(0.0..std::f64::consts::FRAC_PI_2).contains(&angle) {
+            let must = "0 to below a quarter of a turn: tools that grow wider towards the spindle";
+            self.say_at(code::PLAN_BAD_SIZE, node, name, &[&super::title(node), name, &written.to_string(), must]);
+            return None;
+        }
+        Some(angle)
+    }
+
     /// Attributes of tools that no path depends on.
     fn unused_of_tool(&mut self, node: Node<'m>, body: Node<'m>, dimension: Option<Node<'m>>, tool: &Tool) {
         self.unused(body, "pilot_length", "depths count to the tip");
+        self.unused(body, "drill_length", "its depth of cut counts to the tip");
+        self.unused(body, "countersink_radius", "its cone is taken as straight");
+        self.unused(body, "included_angle", "a dovetail mill follows explicit tool paths alone");
+        for a in ["thread_form_type", "taper_thread_count"] {
+            self.unused(body, a, "its thread is its own");
+        }
+        if tool.kind.contains("TAPERED_TAP") && tool.taper != 0.0 {
+            self.unused(body, "taper_angle", "it goes to its depth whatever its shape");
+        }
         self.unused_flag(body, "coolant_through_tool", "the machine functions of the operation switch coolant");
         if tool.length != node.real("overall_assembly_length") {
             self.unused(node, "overall_assembly_length", "the length of its cutting edge counts");
+        }
+        if tool.edge_radius > 0.0 && !tool.mills() && !tool.is_disc() {
+            self.unused(dimension.unwrap_or(node), "edge_radius", "what it makes has its diameter, and its depth counts to the tip");
+        }
+        if tool.edge() == tool.thickness
+            && let Some(t) = tool.thickness
+            && tool.cutting_length.is_some_and(|l| l < t - 1e-9)
+        {
+            let (of, name) = dimension.filter(|d| d.real("cutting_edge_length").is_some()).map_or((node, "maximum_depth_of_cut"), |d| (d, "cutting_edge_length"));
+            self.no_effect(of, name, &format!("the disc of the tool is {} mm high", gr_step::short(t)));
         }
         let Some(d) = dimension else { return };
         if !tool.is_pointed() && tool.tip_angle.is_some() {
@@ -418,7 +469,7 @@ impl<'m> Reader<'m> {
         let same = |t: &Tool| {
             t.name == tool.name && t.kind == tool.kind && t.diameter == tool.diameter && t.edge_radius == tool.edge_radius
                 && t.tip_angle == tool.tip_angle && t.cutting_length == tool.cutting_length && t.length == tool.length
-                && t.taper == tool.taper && t.pitch == tool.pitch
+                && t.taper == tool.taper && t.pitch == tool.pitch && t.thickness == tool.thickness && t.nose == tool.nose
         };
         match self.tools.iter().find(|t| same(t)) {
             Some(known) => tool.number = known.number,
@@ -471,6 +522,11 @@ impl<'m> Reader<'m> {
             if let Some(v) = v {
                 self.in_range(node, a, v, f64::MIN_POSITIVE, "above zero");
             }
+        }
+        // A tooth that takes more is no tooth of a mill: microns, or a feed per minute.
+        if let Some(t) = tooth.filter(|t| iso && *t > THICKEST) {
+            let must = format!("millimetres, {THICKEST} at most");
+            self.say_at(code::PLAN_BAD_SIZE, node, "feedrate_per_tooth", &[&super::title(node), "feedrate_per_tooth", &gr_step::short(t), &must]);
         }
         let by_sign = spindle.is_none_or(|s| s <= 0.0);
         let clockwise = tool.right_handed.unwrap_or(by_sign);
