@@ -204,21 +204,11 @@ mod tests {
 
     fn tool(kind: &str, diameter: f64, edge_radius: f64) -> Tool {
         Tool {
-            origin: Default::default(),
-            name: String::new(),
             kind: kind.into(),
             diameter,
-            tip_angle: None,
-            cutting_length: None,
             edge_radius,
-            taper: 0.0,
-            length: None,
-            teeth: None,
-            right_handed: None,
-            pitch: None,
-            orientation: None,
-            bar: None,
             number: 1,
+            ..Default::default()
         }
     }
 

@@ -370,3 +370,16 @@ fn gcode_files_of_unknown_controls() {
     f.put("both.gcode", "(made for grbl)\no<hole> sub\no<hole> endsub\nM2\n");
     assert_eq!(code(&f.run(&["check", "both.gcode"])), 1);
 }
+
+/// A direction of no length is one error where it stands; what is placed by it has none.
+#[test]
+fn one_bad_direction_is_one_message() {
+    let f = Folder::new();
+    let text = std::fs::read_to_string(golden("unb2013/fig4-45_slot-square-u.p21")).unwrap();
+    let broken = text.replace("#13=DIRECTION('',(0.0,0.0,1.0))", "#13=DIRECTION('',(0.0,0.0,0.0))");
+    assert_ne!(text, broken);
+    f.put("part.p21", broken);
+    let said = err(&f.run(&["build", "part.p21", "--step-units", "step-modeler", "--message-format", "short"]));
+    let errors: Vec<&str> = said.lines().filter(|l| ["E0413", "E0443", "E0481"].iter().any(|c| l.contains(c))).collect();
+    assert!(errors.len() == 1 && errors[0].contains("E0443") && errors[0].contains("direction_ratios of #13"), "{said}");
+}

@@ -122,6 +122,19 @@ fn a_disc_is_no_higher_than_the_bar_of_its_slot() {
     assert!(out[0].message.contains("at its open end, 0.5 mm wide at 45 degrees") && out[1].message.contains("between its neck and its bar, 0.75 mm"), "{out:#?}");
 }
 
+#[test]
+fn a_side_mill_is_as_high_as_it_is_wide() {
+    let with = |wide: &str| {
+        let text = slot("$", "$", 5.0, 12.0, "OPEN_SLOT_END_TYPE()").part.text();
+        let body = text.lines().find(|l| l.contains("=ENDMILL(")).unwrap_or_default().to_string();
+        let side = body.replace("=ENDMILL(", "=SIDE_MILL(").replace(");", &format!(",{wide});"));
+        planned(&text.replace(&body, &side).replace(",$,80.,", ",$,$,")).1
+    };
+    assert!(with("5.").is_empty(), "{:#?}", with("5."));
+    let said = with("3.");
+    assert!(said.len() == 1 && said[0].code.def().code == "E0440" && said[0].message.contains("is 3 mm long"), "{said:#?}");
+}
+
 /// The reference to the radius of [`tee_of`].
 fn corner(radius: f64) -> String {
     let text = tee_of("T_SLOT_MILL", 4.0, [radius, 0.0, 0.0]).text();

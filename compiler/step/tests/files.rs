@@ -321,3 +321,16 @@ fn a_check_can_be_cut_short() {
         assert_eq!(run(times), None, "{times}");
     }
 }
+
+/// An angle in radians is one that may be meant: a plunge of 241 degrees is none.
+#[test]
+fn an_angle_in_radians_could_be_meant() {
+    let told = |instance: &str| {
+        let text = format!("ISO-10303-21;\nHEADER;\nFILE_DESCRIPTION((''),'2;1');\nFILE_NAME('','2026-01-01T00:00:00',(''),(''),'','','');\nFILE_SCHEMA(('MACHINING_SCHEMA'));\nENDSEC;\nDATA;\n#1={instance};\nENDSEC;\nEND-ISO-10303-21;\n");
+        diagnostics(&text).iter().any(|d| d.code == code::STEP_RADIANS)
+    };
+    assert!(!told("PLUNGE_RAMP($,4.213461147531602)") && told("PLUNGE_RAMP($,0.213461147531602)"));
+    assert!(!told("AP_RETRACT_ANGLE($,5.241234567,3.)") && !told("PLUNGE_HELIX($,2.,1.6123456)"));
+    assert!(!told("MILLING_TOOL_DIMENSION(20.,2.5235987755982988,$,70.,$,$,$)") && told("MILLING_TOOL_DIMENSION(20.,0.5235987755982988,$,70.,$,$,$)"));
+    assert!(told("CONICAL_HOLE_BOTTOM(2.0943951023931953,$)") && !told("CONICAL_HOLE_BOTTOM(4.71238898038469,$)"));
+}

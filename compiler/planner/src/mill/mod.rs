@@ -174,7 +174,8 @@ fn job<'a>(e: &mut Emit<'_>, step: &'a Workingstep, m: &'a Milling, feature: &'a
     let disc = o.tool.is_disc();
     let tee = disc && matches!(feature.shape, Shape::Slot { section: Section::Tee { .. }, .. });
     let once = o.tool.edge().filter(|_| disc && !tee).map(|l| (axial.min(bottom), l));
-    let reach = o.tool.cutting_length.filter(|l| !disc || o.tool.thickness.is_some_and(|t| *l > t)).map(|l| (bottom, l));
+    let long = if disc { o.tool.cutting_length.filter(|l| o.tool.thickness.is_some_and(|t| *l > t)) } else { o.tool.edge() };
+    let reach = long.map(|l| (bottom, l));
     if let Some((cut, l)) = once.into_iter().chain(reach).find(|(cut, l)| *cut > *l + 1e-6) {
         let name = format!("T{} '{}'", o.tool.number, o.tool.name);
         e.say(code::PLAN_DEEPER_THAN_EDGE, o.origin, &[&o.keyword, &cut.to_string(), &name, &l.to_string()]);
