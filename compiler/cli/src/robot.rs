@@ -95,7 +95,7 @@ fn take_job_of(motion: &mut Motion, path: &Path, machine: &Machine) -> Result<()
     let line = |at: u32| text.get(..at as usize).map_or(0, |t| t.matches('\n').count()) as u32;
     let setup = |c: gr_machine::Clamping| gr_robot::Setup {
         place: gr_ir::Source { file, line: line(c.from_line.map_or(c.place.start, |(_, span)| span.start)), ..gr_ir::Source::default() },
-        part: machine.cell.carried(machine.cell.table.then(&c.part(&machine.cell.part))),
+        part: c.part(&machine.cell.part).map(|part| machine.cell.carried(machine.cell.table.then(&part))),
         name: c.name,
         from_line: c.from_line.map(|(l, _)| l - 1),
         workingsteps: c.workingsteps.into_iter().map(|(w, _)| w).collect(),

@@ -25,13 +25,14 @@ pub struct Clamping {
 }
 
 impl Clamping {
-    /// The part on the table. What the setup leaves out is as the machine file has it.
-    pub fn part(&self, file: &Frame) -> Frame {
+    /// The part on the table; none when the setup says no place, so that all is as the machine file has it. Of a place the
+    /// part that the setup leaves out is as the file has it.
+    pub fn part(&self, file: &Frame) -> Option<Frame> {
         let [position, rotation] = self.says;
-        Frame {
+        (position || rotation).then_some(Frame {
             position: if position { self.part.position } else { file.position },
             turn: if rotation { self.part.turn } else { file.turn },
-        }
+        })
     }
 }
 
@@ -123,7 +124,7 @@ mod tests {
         assert_eq!(job[1].part.position, [0.0, 50.0, 0.0]);
         // A setup without a place leaves the part where the machine file has it.
         let file = Frame { position: [1.0, 2.0, 3.0], ..Frame::default() };
-        assert_eq!((job[0].part(&file), job[1].part(&file).position), (file, [0.0, 50.0, 0.0]));
+        assert_eq!((job[0].part(&file), job[1].part(&file).map(|p| p.position)), (None, Some([0.0, 50.0, 0.0])));
         assert_eq!(job[2].workingsteps.len(), 2);
     }
 

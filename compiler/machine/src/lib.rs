@@ -245,6 +245,13 @@ impl Machine {
     pub fn is_upright(&self) -> bool {
         self.kind != Kind::Robot || self.kinematics().control() == Control::Position
     }
+    /// Why A B C say nothing on a robot whose file gives them no meaning.
+    pub fn no_rotary_words(&self) -> &'static str {
+        match self.orientation {
+            Some(Orientation::Fixed) => "its machine file keeps the tool's direction (`orientation = \"fixed\"`)",
+            _ => "its machine file does not say what the word means",
+        }
+    }
     /// The tool point on the flange of a tool of which only the length is known.
     pub fn tool_of_length(&self, length: f64) -> crate::math::Frame {
         let nose = self.cell.tool_frame(u32::MAX);

@@ -231,7 +231,8 @@ impl Chooser<'_> {
                     };
                     if let Some(why) = why {
                         t.alive = false;
-                        fault = furthest(fault, place(i, b, path.position(b), m.source, why));
+                        let position = if why == Why::Jump { self.jumps_at(t, &path, &mount, a, b) } else { path.position(b) };
+                        fault = furthest(fault, place(i, b, position, m.source, why));
                     }
                 }
             }
@@ -261,6 +262,20 @@ impl Chooser<'_> {
         }
         t.close = t.close.min(self.solver.closeness(&q).0);
         self.outside(t, &q)
+    }
+
+    /// Where between two looks a track has to jump.
+    fn jumps_at(&self, t: &Track, path: &Path, mount: &Mount, a: f64, b: f64) -> [f64; 3] {
+        const HALVINGS: u32 = 24;
+        let follow = Follow { solver: self.solver, limits: self.limits, path, mount };
+        let (mut good, mut bad) = (a, b);
+        let mut all = Branches::NONE;
+        for _ in 0..HALVINGS {
+            let middle = (good + bad) / 2.0;
+            let goes = self.solver.all(&mount.flange(&path.at(middle)), &mut all).is_ok() && follow.step(&all, (&t.now, t.now_in), (a, middle)).is_ok();
+            *(if goes { &mut good } else { &mut bad }) = middle;
+        }
+        path.position(bad)
     }
 
     fn outside(&self, t: &Track, q: &Joints) -> Option<Why> {

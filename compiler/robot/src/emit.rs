@@ -45,6 +45,14 @@ struct Here {
     branch: u8,
 }
 
+/// Where a walk ends: whether anything moved, the last joint values, and the tool and frame in force.
+struct Ends {
+    moved: bool,
+    last: Joints,
+    tool: Option<u16>,
+    frame: Option<u16>,
+}
+
 impl<'a> Emit<'a> {
     pub fn new(machine: &'a Machine, solver: &'a Solver, limits: &'a Limits, rapid_speeds: &'a Joints, name: &'a str) -> Emit<'a> {
         let mut speeds = [f64::INFINITY; MAX_JOINTS];
@@ -67,16 +75,48 @@ impl<'a> Emit<'a> {
         }
     }
 
+    /// Only looks at the joints' speeds in the chains that are given; what is between them can't be done.
+    pub fn look_at_speeds(mut self, g: &mut Gathered, list: &[Chain], nodes: &[Node], home: &Joints, findings: &mut Findings<'_>) {
+        self.moves(g, list, nodes, home, findings);
+    }
+
     pub fn run(mut self, g: &mut Gathered, list: &[Chain], nodes: &[Node], home: &Joints, findings: &mut Findings<'_>) -> (RobotProgram, Summary) {
+        self.summary.wait_seconds = g.wait_seconds;
+        let Ends { moved, last, tool, frame } = self.moves(g, list, nodes, home, findings);
+        let at_home = self.home_target(g, home, frame, tool);
+        // A milling program says itself where the machine goes in the end.
+        if moved && self.machine.kind != gr_machine::Kind::Mill {
+            let to = self.keep(at_home);
+            let speed = self.machine.cell.joint_share();
+            self.summary.rapid_seconds += self.joint_time(&last, home, speed);
+            self.steps.push(Step { action: Action::Joint { to, speed, zone: Zone::Stop }, source: None });
+        }
+        self.steps.push(Step { action: Action::End, source: None });
+        self.near_singular(findings);
+        let program = RobotProgram {
+            name: self.name.to_string(),
+            machine: self.machine.clone(),
+            tools: g.tools.clone(),
+            frames: g.frames.clone(),
+            targets: self.targets,
+            home: at_home,
+            steps: self.steps,
+            curves: std::mem::take(&mut g.curves),
+        };
+        if let Some([cut, rapid]) = crate::setpoints::paced(&program) {
+            (self.summary.cut_seconds, self.summary.rapid_seconds, self.summary.accelerates) = (cut, rapid, true);
+        }
+        (program, self.summary)
+    }
+
+    fn moves(&mut self, g: &mut Gathered, list: &[Chain], nodes: &[Node], home: &Joints, findings: &mut Findings<'_>) -> Ends {
         let items = std::mem::take(&mut g.items);
         self.probe = crate::gather::probing::input(&items, self.machine).unwrap_or_default();
         self.steps.reserve(items.len() + 2);
         self.targets.reserve(items.len() + 2);
-        self.summary.wait_seconds = g.wait_seconds;
-        let tools = g.tools.clone();
         let mut here: Option<Here> = None;
         let mut chain = 0;
-        let mut node: Option<&Node> = None;
+        let mut node: Option<(&Node, Chain)> = None;
         let mut last = *home;
         // What is in force at the end: the way home is told in it.
         let (mut tool, mut frame) = (None, None);
@@ -92,38 +132,19 @@ impl<'a> Emit<'a> {
                 }
                 Item::Move(m) => {
                     if list.get(chain).is_some_and(|c| c.first == i) {
-                        node = nodes.get(chain);
+                        node = nodes.get(chain).map(|n| (n, list[chain]));
                         chain += 1;
                     }
-                    let Some(node) = node else { continue };
+                    // Where a chain can't be done nobody knows where the machine is.
+                    let Some((node, _)) = node.filter(|(_, c)| i <= c.last) else {
+                        here = None;
+                        continue;
+                    };
                     self.mv(g, &m, node, &mut here, &mut last, findings);
                 }
             }
         }
-        let at_home = self.home_target(g, home, frame, tool);
-        // A milling program says itself where the machine goes in the end.
-        if here.is_some() && self.machine.kind != gr_machine::Kind::Mill {
-            let to = self.keep(at_home);
-            let speed = self.machine.cell.joint_share();
-            self.summary.rapid_seconds += self.joint_time(&last, home, speed);
-            self.steps.push(Step { action: Action::Joint { to, speed, zone: Zone::Stop }, source: None });
-        }
-        self.steps.push(Step { action: Action::End, source: None });
-        self.near_singular(findings);
-        let program = RobotProgram {
-            name: self.name.to_string(),
-            machine: self.machine.clone(),
-            tools,
-            frames: g.frames.clone(),
-            targets: self.targets,
-            home: at_home,
-            steps: self.steps,
-            curves: std::mem::take(&mut g.curves),
-        };
-        if let Some([cut, rapid]) = crate::setpoints::paced(&program) {
-            (self.summary.cut_seconds, self.summary.rapid_seconds, self.summary.accelerates) = (cut, rapid, true);
-        }
-        (program, self.summary)
+        Ends { moved: here.is_some(), last, tool, frame }
     }
 
     fn keep(&mut self, target: Target) -> u32 {
@@ -162,7 +183,12 @@ impl<'a> Emit<'a> {
             self.look(&joints, m.source);
             return;
         }
-        let Some(h) = here else { return };
+        let Some(h) = here else {
+            // The rest of a chain, behind what can't be done: it is looked at from its first place on.
+            let at = Frame { turn: g.turns[m.turn as usize], position: m.position };
+            (*here, *last) = (Some(Here { at, by: *m, joints: node.start, branch: node.branch }), node.start);
+            return;
+        };
         h.at = handed_on(g, h.at, &h.by, m, node.spin);
         let ((joints, branch), via) = self.follow(g, m, node, h, findings);
         let to = self.keep(self.target(m.position, &turn, &joints, branch));

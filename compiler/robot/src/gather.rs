@@ -131,6 +131,16 @@ impl<'a> Findings<'a> {
             self.say(code, source, args);
         }
     }
+    /// An empty list about the same sources, that says nothing more with this code about these lines, each a file and a line.
+    pub fn apart(&self, code: Code, lines: impl Iterator<Item = (u32, u32)>) -> Findings<'a> {
+        Findings { seen: lines.map(|(file, line)| (code, file, line)).collect(), ..Findings::new(self.sources) }
+    }
+    /// Errors that were found apart.
+    pub fn adopt_errors(&mut self, mut other: Findings<'_>) {
+        for found in other.take().into_iter().filter(|d| d.severity == Severity::Error) {
+            self.list.add(found);
+        }
+    }
     pub fn bad(&self) -> bool {
         self.list.failed()
     }
@@ -194,9 +204,10 @@ pub(crate) struct Gather<'a> {
     /// The line of the main program that led here.
     main_line: u32,
     /// Clampings after the first, and setups that were begun.
-    first_setup: Option<usize>,
     clampings: Vec<Clamped>,
     begun: BTreeSet<usize>,
+    /// Frames of the machine file that do not count in a setup, because it has a place of its own.
+    overruled: BTreeMap<usize, BTreeSet<&'static str>>,
     /// The part was clamped anew: the tool comes from above again.
     anew: bool,
     /// What is gathered now is a cut.
@@ -213,7 +224,9 @@ pub(crate) struct Gather<'a> {
     /// Switches of the panel that the program has set.
     switches: BTreeMap<&'static str, bool>,
     /// Frames and tools by what they are.
-    frame_numbers: BTreeMap<(&'static str, [u64; 12]), u16>,
+    frame_numbers: BTreeMap<(&'static str, [[u64; 12]; 2]), u16>,
+    /// What each is placed by.
+    frame_places: Vec<Frame>,
     /// Frames of each name.
     named: BTreeMap<&'static str, u32>,
     tool_numbers: BTreeMap<(u32, String, [u64; 12]), u16>,
@@ -262,9 +275,9 @@ impl<'a> Gather<'a> {
             source: Source::default(),
             clamped: None,
             main_line: 0,
-            first_setup: None,
             clampings: Vec::new(),
             begun: BTreeSet::new(),
+            overruled: BTreeMap::new(),
             anew: false,
             cutting: false,
             cycle: None,
@@ -274,6 +287,7 @@ impl<'a> Gather<'a> {
             stores: None,
             switches: BTreeMap::new(),
             frame_numbers: BTreeMap::new(),
+            frame_places: Vec::new(),
             named: BTreeMap::new(),
             tool_numbers: BTreeMap::new(),
         }
@@ -434,11 +448,16 @@ impl<'a> Gather<'a> {
         if setup != self.clamped {
             self.clamp(setup);
         }
-        let placement = setup.map(|i| &self.options.setups[i]);
+        let placement = setup.and_then(|i| self.options.setups[i].part);
         let places = |n: &str| self.machine.cell.frames.get(n);
         let any = (1..=9).find(|n| places(work_name(*n)).is_some());
         let placed = match (places(name), any, placement) {
-            (_, _, Some(p)) => p.part,
+            (row, _, Some(part)) => {
+                if let (Some(_), Some(setup)) = (row, setup) {
+                    self.overruled.entry(setup).or_default().insert(name);
+                }
+                part
+            }
             (Some(frame), _, _) => self.machine.cell.carried(*frame),
             (None, Some(n), _) => {
                 self.findings.say(code::ROBOT_UNKNOWN_FRAME, Some(self.source), &[name.into(), work_name(n).into()]);
@@ -454,7 +473,7 @@ impl<'a> Gather<'a> {
         let frame = placed
             .then(&Frame { turn: rot_z(state.rotation), position: [o[0], o[1], o[2]] })
             .then(&Frame::shift([l[0], l[1], l[2]]));
-        let key = (name, bits(&frame));
+        let key = (name, [bits(&frame), bits(&placed)]);
         let index = match self.frame_numbers.get(&key) {
             Some(index) => *index,
             None => {
@@ -466,6 +485,7 @@ impl<'a> Gather<'a> {
                 *more += 1;
                 let name = if *more == 1 { name.to_string() } else { format!("{name}_{more}") };
                 self.out.frames.push(WorkFrame { name, frame });
+                self.frame_places.push(placed);
                 self.frame_numbers.insert(key, index);
                 index
             }
@@ -554,11 +574,12 @@ impl<'a> Gather<'a> {
         self.out.by_direction |= pose.tool_axis.is_some();
         match self.turns.of(pose, state) {
             Ok(turn) => Some(turn),
-            Err(Some(word)) => {
-                self.findings.say(code::ROBOT_ROTARY_WORDS, Some(self.source), &[word.into()]);
+            Err(unread) => {
+                if let Some((code, args)) = unread.told(self.machine) {
+                    self.findings.once_each(code, Some(self.source), &args);
+                }
                 None
             }
-            Err(None) => None,
         }
     }
 
@@ -771,8 +792,8 @@ impl<'a> Gather<'a> {
     }
 
     fn go_to(&mut self, start: &Pose, end: &Pose, state: &State) {
-        let (Some(frame), Some(tool)) = (self.work(state), self.tool(state)) else { return };
-        let Some(turn) = self.turn(end, state) else { return };
+        // What is not known of one says nothing of the others: all are asked.
+        let (Some(frame), Some(tool), Some(turn)) = (self.work(state), self.tool(state), self.turn(end, state)) else { return };
         let turn = self.turn_index(turn);
         if !self.leaves_probed(start, end) {
             return;
@@ -883,8 +904,8 @@ impl<'a> Gather<'a> {
         self.cutting = true;
         let places = (self.work(state), self.tool(state));
         self.cutting = false;
-        let (Some(frame), Some(tool)) = places else { return };
-        let (Some(from), Some(to)) = (self.turn(view.start, state), self.turn(view.end, state)) else { return };
+        let turns = (self.turn(view.start, state), self.turn(view.end, state));
+        let ((Some(frame), Some(tool)), (Some(from), Some(to))) = (places, turns) else { return };
         if !self.leaves_probed(view.start, view.end) {
             return;
         }

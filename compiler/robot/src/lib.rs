@@ -53,4 +53,4 @@ pub use options::{Options, Planned, Setup, Singularity, Summary};
 pub use plan::plan;
 pub use program::{Action, Curves, MAX_JOINTS, RobotProgram, Step, Target, Tool, Word, WorkFrame, Zone};
 pub use settle::{Brought, By, Coordinates, Settled, settled};
-pub use turns::Turns;
+pub use turns::{Turns, Unread};

@@ -34,8 +34,8 @@ pub struct Setup {
     pub from_line: Option<u32>,
     /// For these workingsteps, wherever they stand.
     pub workingsteps: Vec<String>,
-    /// The part's frame in the base.
-    pub part: Frame,
+    /// The part's frame in the base, which then holds for every work offset; none = as the machine file has it.
+    pub part: Option<Frame>,
     /// Where the job file says so.
     pub place: Source,
 }

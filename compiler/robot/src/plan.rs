@@ -77,21 +77,22 @@ impl Planner<'_> {
     fn run(&mut self) -> Result<Planned, Vec<Diagnostic>> {
         let home = self.home();
         self.drop_unreachable();
-        let mut chosen = Vec::new();
-        let mut list = Vec::new();
-        if let Some(home) = home {
-            list = self.nodes(&home, &mut chosen);
-            if !self.findings.bad() {
-                chosen = vec![self.chooser(list.len(), None).cheapest(&chosen, &home)];
-            }
+        // A mill goes on from home; an arm's moves are looked at from any place.
+        let Some(start) = home.or((self.machine.kind == Kind::Robot).then_some([0.0; MAX_JOINTS])) else { return Err(self.findings.take()) };
+        let (list, nodes): (Vec<Chain>, Vec<Vec<Node>>) = self.nodes(&start).into_iter().unzip();
+        let nodes = self.chooser(list.len(), None).cheapest(&nodes, &start);
+        let emit = Emit::new(self.machine, &self.solver, &self.limits, &self.speeds, &self.options.name);
+        if self.findings.bad() {
+            // Nothing is made, but what can be done is looked at for joints that are too fast.
+            let mut more = self.findings.apart(code::ROBOT_JOINT_SPEED, self.told.iter().copied().flatten());
+            emit.look_at_speeds(&mut self.g, &list, &nodes, &start, &mut more);
+            self.findings.adopt_errors(more);
+            return Err(self.findings.take());
         }
-        let (Some(home), false) = (home, self.findings.bad()) else { return Err(self.findings.take()) };
-        let nodes: Vec<Node> = chosen.into_iter().next().unwrap_or_default();
-        let emitted = Emit::new(self.machine, &self.solver, &self.limits, &self.speeds, &self.options.name).run(&mut self.g, &list, &nodes, &home, &mut self.findings);
+        let (program, summary) = emit.run(&mut self.g, &list, &nodes, &start, &mut self.findings);
         if self.findings.bad() {
             return Err(self.findings.take());
         }
-        let (program, summary) = emitted;
         Ok(Planned { program, warnings: self.findings.take(), summary })
     }
 
@@ -175,8 +176,9 @@ impl Planner<'_> {
         }
     }
 
-    /// Nodes of all chains; a chain without any is a finding, or is divided where that was asked for.
-    fn nodes(&mut self, home: &Joints, out: &mut Vec<Vec<Node>>) -> Vec<Chain> {
+    /// All chains with their nodes; a chain without any is a finding instead, or is divided where that was asked for.
+    fn nodes(&mut self, home: &Joints) -> Vec<(Chain, Vec<Node>)> {
+        let mut out: Vec<(Chain, Vec<Node>)> = Vec::new();
         let mut list = chains(&self.g.items);
         let (mut k, mut count) = (0, list.len());
         while k < list.len() {
@@ -186,12 +188,15 @@ impl Planner<'_> {
             let found = self.chooser(count, stands).nodes(chain);
             match found {
                 Ok(nodes) => {
-                    out.push(nodes);
+                    out.push((chain, nodes));
                     k += 1;
                 }
                 Err(fault) => {
                     if self.without_ours(chain, &fault) || self.divided(chain, &fault) {
-                        list = chains(&self.g.items);
+                        // What was looked at stays; of a chain that was begun behind a fault only the rest.
+                        let first = (chain.first..self.g.items.len()).find(|i| matches!(self.g.items[*i], Item::Move(_))).unwrap_or(chain.first);
+                        list.truncate(k);
+                        list.extend(chains(&self.g.items).into_iter().filter(|c| c.last >= first).map(|c| Chain { first: c.first.max(first), ..c }));
                         count = list.len();
                         continue;
                     }
@@ -208,7 +213,7 @@ impl Planner<'_> {
                 }
             }
         }
-        list
+        out
     }
 
     fn full(&self) -> bool {

@@ -260,7 +260,7 @@ pub(crate) fn settled_arm(
         let by = coordinates.step(program, &view, sources);
         any |= by.contains(&By::Machine);
         // Also where nothing moves: the tool stays at a place of the machine when the program's coordinates change.
-        let part = setup_at(setups, workingstep, || main_line(program, view.source)).map(|i| setups[i].part);
+        let part = setup_at(setups, workingstep, || main_line(program, view.source)).and_then(|i| setups[i].part);
         out.push_to(
             view.op,
             &Pose { axes: settle.axes(&view.end.axes, by, view.state, part).unwrap_or(view.end.axes), ..*view.end },

@@ -4,7 +4,30 @@
 use gr_ir::{Pose, State};
 use gr_machine::math::{M3, dot, euler, norm, product, rot_x, rot_z, scale, sub};
 use gr_machine::{Chain, Control, Kind, Machine, Orientation};
+use gr_text::{Code, code};
 use std::f64::consts::PI;
+
+/// Why a tool's direction isn't known.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub enum Unread {
+    /// The machine file doesn't say what this rotary word means, or says that there is none.
+    Word(&'static str),
+    /// The machine that the words are meant for, by its id, has no such axis.
+    NoAxis(&'static str, String),
+    /// The machine turns the tool as its place asks for; that is told elsewhere.
+    Nowhere,
+}
+
+impl Unread {
+    /// What is said about it.
+    pub(crate) fn told(self, machine: &Machine) -> Option<(Code, Vec<String>)> {
+        match self {
+            Unread::Word(word) => Some((code::ROBOT_ROTARY_WORDS, vec![word.into(), machine.no_rotary_words().into()])),
+            Unread::NoAxis(word, source) => Some((code::MACHINE_NO_AXIS, vec![word.into(), source])),
+            Unread::Nowhere => None,
+        }
+    }
+}
 
 /// What a machine makes of rotary words.
 pub struct Turns<'a> {
@@ -33,15 +56,15 @@ impl<'a> Turns<'a> {
         if down { rot_x(PI) } else { euler([0.0; 3]) }
     }
 
-    /// How the tool is turned in the work frame; else the rotary word that the machine file doesn't read, where it is for one.
+    /// How the tool is turned in the work frame; else why nobody knows.
     /// G10 R and its like turn the coordinates of X and Y, not the tool.
-    pub fn of(&self, pose: &Pose, state: &State) -> Result<M3, Option<&'static str>> {
+    pub fn of(&self, pose: &Pose, state: &State) -> Result<M3, Unread> {
         let turn = self.unrotated(pose, state)?;
         let turned = state.rotation != 0.0 && pose.tool_axis.is_none();
         Ok(if turned { product(&rot_z(-state.rotation), &turn) } else { turn })
     }
 
-    fn unrotated(&self, pose: &Pose, state: &State) -> Result<M3, Option<&'static str>> {
+    fn unrotated(&self, pose: &Pose, state: &State) -> Result<M3, Unread> {
         let up = self.machine.kind == Kind::Robot;
         if let Some(axis) = pose.tool_axis {
             return Ok(along(if up { scale(axis, -1.0) } else { axis }, pose.spin.unwrap_or(0.0)));
@@ -49,19 +72,24 @@ impl<'a> Turns<'a> {
         let words = rotary(pose, state);
         let some = (0..3).find(|i| words[*i] != 0.0);
         match (&self.machine.orientation, some) {
-            (_, Some(_)) if self.control == Control::Position => Err(None),
+            (_, Some(_)) if self.control == Control::Position => Err(Unread::Nowhere),
             (Some(Orientation::AbcEulerXyz), _) => Ok(product(&euler(words), &self.still())),
             (_, None) if self.source.is_none() => Ok(self.still()),
             (Some(Orientation::SourceMachine(_)), _) | (None, _) if self.source.is_some() => {
-                let (machine, at) = self.source.as_ref().ok_or(None)?;
+                let (machine, at) = self.source.as_ref().ok_or(Unread::Nowhere)?;
+                let letters = rotary_letters(machine, *at);
+                // On a mill itself that is told of its axes.
+                if let Some(i) = (0..3).find(|i| up && words[*i] != 0.0 && !letters.contains(i)) {
+                    return Err(Unread::NoAxis(["A", "B", "C"][i], machine.id.clone()));
+                }
                 let mut joints = vec![0.0; machine.joints.len()];
-                for (slot, word) in at.iter().zip(rotary_letters(machine, *at)) {
+                for (slot, word) in at.iter().zip(letters) {
                     joints[*slot] = words[word];
                 }
-                let turn = machine.kinematics().forward_frame(&joints).map_err(|_| None)?.turn;
+                let turn = machine.kinematics().forward_frame(&joints).map_err(|_| Unread::Nowhere)?.turn;
                 Ok(if up { product(&turn, &rot_x(PI)) } else { turn })
             }
-            (_, Some(i)) => Err(Some(["A", "B", "C"][i])),
+            (_, Some(i)) => Err(Unread::Word(["A", "B", "C"][i])),
             _ => Ok(self.still()),
         }
     }

@@ -606,7 +606,7 @@ fn places_of_the_machine_in_a_job() {
         name: "one".into(),
         from_line: Some(0),
         workingsteps: Vec::new(),
-        part,
+        part: Some(part),
         place: gr_ir::Source::default(),
     };
     let texts = Texts::new([(FileId(0), text)]);
@@ -630,7 +630,7 @@ fn the_spindle_stands_while_the_part_is_clamped() {
             name: name.into(),
             from_line: Some(line),
             workingsteps: Vec::new(),
-            part: cell().cell.part_in_base(),
+            part: Some(cell().cell.part_in_base()),
             place: gr_ir::Source::default(),
         };
         let options = Options { setups: vec![setup("one", 0), setup("two", 8)], ..Options::default() };
@@ -747,4 +747,76 @@ fn accelerations_count() {
     let tight = part.replace("G64 P2", "G61");
     let stops = planned(&tight, &with(&all(100.0))).unwrap().summary.cut_seconds;
     assert!(soft.0 < stops - 0.1, "{} {stops}", soft.0);
+}
+
+/// A setup without a place leaves the machine file's frames in force; one with a place overrules them, and says so.
+#[test]
+fn frames_of_the_machine_in_a_job() {
+    let file = include_str!("../../../docs/examples/irb2400-cell.toml").to_string();
+    let vices = "\n[[frame]]\nname = \"G54\"\nposition = [955, -155, 455]\n[[frame]]\nname = \"G55\"\nposition = [940, -40, 470]\n";
+    let cell = gr_machine::parse(FileId(0), &(file + vices)).expect("a good cell");
+    let text = "G21 G90 G54\nT1 M6\nG43 H1\nG0 X10 Y10 Z20\nG1 Z0 F600\nG0 Z20\nG55 G0 X10 Y10 Z20\nG1 Z0\nG0 Z20\nM30\n";
+    let made = |text: &str, part: Option<[f64; 3]>| {
+        let setup = gr_robot::Setup {
+            name: "only".into(),
+            from_line: Some(0),
+            workingsteps: Vec::new(),
+            part: part.map(gr_machine::math::Frame::shift),
+            place: gr_ir::Source::default(),
+        };
+        plan(&motion(text), &cell, &Texts::new([(FileId(0), text)]), &Options { setups: vec![setup], ..Options::default() })
+    };
+    let places = |p: &Planned| p.program.frames.iter().map(|f| (f.name.clone(), f.frame.position)).collect::<Vec<_>>();
+    let p = made(text, None).unwrap_or_else(|e| panic!("{}", messages(&e, text)));
+    assert_eq!(places(&p), [("G54".into(), [955.0, -155.0, 455.0]), ("G55".into(), [940.0, -40.0, 470.0])]);
+    assert_eq!(messages(&p.warnings, text), "");
+    // Two vices at one place.
+    let e = made(text, Some([920.0, -100.0, 480.0])).expect_err("two frames fall together");
+    assert_eq!(messages(&e, text), "E0560 line 1: setup `only` places the part itself: the machine file's place for G54, G55 does not count in it, so they would all be at one place\n");
+    assert_eq!(e[0].severity, gr_text::Severity::Error);
+    let one = text.replace("G55 ", "");
+    let p = made(&one, Some([920.0, -100.0, 480.0])).unwrap_or_else(|e| panic!("{}", messages(&e, &one)));
+    assert_eq!(places(&p), [("G54".into(), [920.0, -100.0, 480.0])]);
+    assert_eq!(messages(&p.warnings, &one), "E0560 line 1: setup `only` places the part itself: the machine file's place for G54 does not count in it\n");
+}
+
+/// Rotary words are those of the machine that the program was written for: what it has no axis for is an error, as on itself.
+#[test]
+fn rotary_words_that_nobody_reads() {
+    let file = include_str!("../../../docs/examples/irb2400-cell.toml");
+    let cell = |orientation: &str| {
+        let text = format!("orientation = \"{orientation}\"\n{file}");
+        gr_machine::parse(FileId(0), &text).unwrap_or_else(|e| panic!("{}", messages(&e, &text)))
+    };
+    let text = "G21 G90\nT1 M6\nG43 H1\nG0 X100 Y100 Z60\nG0 A10 C20\nG1 Z40 F600\nG1 X120 A-15 C60\nG0 Z60\nM30\n";
+    let no_axis = "E0553 line 5: generic/mill5-cb-head has no A axis: this move of A can't be made\n";
+    assert_eq!(faults(text, &cell("source-machine:generic/mill5-cb-head")), no_axis);
+    assert_eq!(faults(&text.replace('A', "B"), &cell("source-machine:generic/mill5-cb-head")).lines().next(), Some("planned"));
+    let fixed = "E0509 line 5: the robot can't follow the rotary word A: its machine file keeps the tool's direction (`orientation = \"fixed\"`)\n";
+    assert_eq!(faults(text, &cell("fixed")), fixed);
+    // A tool that isn't there hides nothing of it.
+    let both = text.replace("T1", "T7").replace("G43 H1\n", "");
+    let said = faults(&both, &cell("fixed"));
+    assert!(said.contains("E0521 line 3: ") && said.contains(&fixed.replace("line 5", "line 4")), "{said}");
+}
+
+/// A joint that is too fast is told beside moves that can't be done.
+#[test]
+fn speeds_are_looked_at_beside_other_errors() {
+    let text = "G21 G90\nT1 M6\nG43 H1\nG0 X0 Y0 Z20\nG1 Z0 F600\nG1 X2500 F1000\nG0 Z20\nG0 X0 Y0\nG1 Z0 F600\nG1 X300 F200000\nG0 Z20\nM30\n";
+    let said = faults(text, &cell());
+    let codes: Vec<&str> = said.lines().filter_map(|l| l.split(':').next()).collect();
+    assert_eq!(codes, ["E0530 line 6", "E0508 line 10"], "{said}");
+    let alone = faults(&text.replace("X2500", "X250"), &cell());
+    assert!(alone.contains(said.lines().last().unwrap()), "{alone}");
+}
+
+/// A jump is told where it is, not at the next look.
+#[test]
+fn a_jump_is_told_at_its_place() {
+    let more = "\n[[tool]]\nnumber = 1\nname = \"t\"\nposition = [0, 0, 100]\n[[joint]]\nname = \"J2\"\nmin = -180\nmax = 180\n[[joint]]\nname = \"J3\"\nmin = -180\nmax = 180\n[[joint]]\nname = \"J5\"\nmin = -200\nmax = 200\n";
+    let file = format!("format = 1\nid = \"t/over\"\nextends = \"abb/irb2400\"\n[frames.part]\nposition = [0, 0, 1500]\n{more}");
+    let machine = gr_machine::parse(FileId(0), &file).unwrap_or_else(|e| panic!("{}", messages(&e, &file)));
+    let said = faults("G21 G90\nT1 M6\nG0 X-300 Y0 Z20\nG1 Z0 F600\nG1 X300\nG0 Z20\nM2\n", &machine);
+    assert!(said.starts_with("E0520 line 5: ") && said.contains("X 0.000 Y 0.000 Z 0.000"), "{said}");
 }

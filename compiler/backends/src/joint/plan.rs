@@ -215,7 +215,7 @@ impl Plan<'_> {
         let turns = (3..6).find(|i| start.axes[*i] != end.axes[*i]);
         match (turns, &self.machine.orientation) {
             (Some(i), None | Some(Orientation::Fixed)) if self.machine.kind == gr_machine::Kind::Robot => {
-                self.fault(code::ROBOT_ROTARY_WORDS, source, &[["A", "B", "C"][i - 3].into()]);
+                self.fault(code::ROBOT_ROTARY_WORDS, source, &[["A", "B", "C"][i - 3].into(), self.machine.no_rotary_words().into()]);
                 true
             }
             _ => false,

@@ -38,8 +38,9 @@ impl Gather<'_> {
         let state = view.state;
         self.seen = [true; 3];
         self.waiting = false;
-        let (Some(frame), Some(tool)) = (self.work(state), self.tool(state)) else { return };
-        let (Some(from), Some(to)) = (self.turn(view.start, state), self.turn(view.end, state)) else { return };
+        let places = (self.work(state), self.tool(state));
+        let turns = (self.turn(view.start, state), self.turn(view.end, state));
+        let ((Some(frame), Some(tool)), (Some(from), Some(to))) = (places, turns) else { return };
         if norm(rotation_vector(&product(&transpose(&from), &to))) > 1e-12 {
             return self.cannot("a probe move in which the tool turns");
         }

@@ -3,7 +3,7 @@
 //! height above the work.
 
 use gr_machine::Kind;
-use gr_machine::math::{Frame, dot, norm, rotate, scale, sub};
+use gr_machine::math::{dot, norm, rotate, scale, sub, transpose};
 use gr_text::code;
 
 use super::{Clamped, Gather, Item, Move};
@@ -30,7 +30,6 @@ impl Gather<'_> {
         self.clamped = setup;
         self.begun.extend(setup);
         if first {
-            self.first_setup = setup;
             return;
         }
         let begun = Clamped { item: self.out.items.len(), setup, source: self.source, cutting: self.cutting };
@@ -58,33 +57,29 @@ impl Gather<'_> {
         }
     }
 
-    /// Where and how high the tool point of a move is in the part: the height is measured along the tool.
-    fn height(&self, part: &Frame, m: &Move) -> ([f64; 3], f64) {
+    /// Which way is up for the tool in the part, and how high the tool point of a move is: the height is measured along the tool.
+    fn height(&self, m: &Move) -> ([f64; 3], f64) {
+        let part = &self.frame_places[usize::from(m.frame)];
         let frame = part.inverse().then(&self.out.frames[usize::from(m.frame)].frame);
         let axis = rotate(&frame.turn, self.out.turns[m.turn as usize].map(|row| row[2]));
         let up = scale(axis, if self.machine.kind == Kind::Robot { -1.0 } else { 1.0 });
         (up, dot(up, frame.apply(m.position)))
     }
 
-    fn part(&self, setup: Option<usize>) -> Frame {
-        setup.map_or_else(|| self.machine.cell.part_in_base(), |i| self.options.setups[i].part)
-    }
-
     /// The highest ends of cuts, by the side they are made from. A way straight up is no cut.
     fn tops(&self) -> Vec<([f64; 3], f64)> {
         let mut tops: Vec<([f64; 3], f64)> = Vec::new();
         let mut due = self.clampings.iter().peekable();
-        let mut part = self.part(self.first_setup);
         let mut before: Option<[f64; 3]> = None;
         for (i, item) in self.out.items.iter().enumerate() {
-            while let Some(c) = due.next_if(|c| c.item <= i) {
-                part = self.part(c.setup);
+            if due.next_if(|c| c.item <= i).is_some() {
                 before = None;
             }
             let Item::Move(m) = item else { continue };
-            let (up, top) = self.height(&part, m);
-            let place = part.inverse().apply(self.base(m.frame, m.position, m.turn).position);
-            let way = before.replace(place).map(|b| sub(place, b));
+            let (up, top) = self.height(m);
+            let place = self.base(m.frame, m.position, m.turn).position;
+            let part = &self.frame_places[usize::from(m.frame)];
+            let way = before.replace(place).map(|b| rotate(&transpose(&part.turn), sub(place, b)));
             let rises = way.is_some_and(|w| norm(w) > 0.0 && dot(w, up) >= norm(w) * (1.0 - 1e-9));
             if m.rapid || rises {
                 continue;
@@ -97,6 +92,22 @@ impl Gather<'_> {
         tops
     }
 
+    /// A setup with a place of its own overrules the frames of the machine file. Several of them that were apart then fall together,
+    /// and what is done in all but one would be done in the wrong place.
+    fn frames_overruled(&mut self) {
+        for (setup, names) in std::mem::take(&mut self.overruled) {
+            let s = &self.options.setups[setup];
+            let mut places = names.iter().filter_map(|n| self.machine.cell.frames.get(*n));
+            let first = places.next();
+            let list = names.iter().copied().collect::<Vec<_>>().join(", ");
+            if places.any(|p| Some(p) != first) {
+                self.findings.fail(code::JOB_FRAME_OVERRULED, s.place, &[s.name.clone(), list, ", so they would all be at one place".into()]);
+            } else {
+                self.findings.say(code::JOB_FRAME_OVERRULED, Some(s.place), &[s.name.clone(), list, String::new()]);
+            }
+        }
+    }
+
     /// Every setup must be begun, and from a safe place.
     pub(super) fn setups_begin_safely(&mut self) {
         for (i, s) in self.options.setups.iter().enumerate() {
@@ -105,6 +116,7 @@ impl Gather<'_> {
                 self.findings.say(code::JOB_BAD_VALUE, Some(s.place), &[what]);
             }
         }
+        self.frames_overruled();
         if self.clampings.is_empty() {
             return;
         }
@@ -115,7 +127,7 @@ impl Gather<'_> {
             let after = self.out.items[c.item..].iter().skip_while(|i| !matches!(i, Item::Do(s) if matches!(s.action, Action::Pause { .. })));
             let Some(m) = after.filter_map(own).next() else { continue };
             let name = self.setup_name(c.setup);
-            let (up, height) = self.height(&self.part(c.setup), &m);
+            let (up, height) = self.height(&m);
             let top = tops.iter().filter(|(u, _)| norm(sub(*u, up)) < 1e-3).map(|(_, t)| *t).reduce(f64::max);
             let last = self.out.items[..c.item].iter().rev().filter_map(own).next();
             let why = match top {
