@@ -178,6 +178,9 @@ pub fn assembled(args: &SetupArgs, lints: &LintArgs, from: &Path, sources: &mut 
     reader.blamed = None;
     if let Some(machine) = &machine {
         limits(machine, &mut setup);
+        if tools.is_none() {
+            machine_tools(machine, &mut setup);
+        }
     }
     reader.remaps(&setup);
     if machine.as_ref().is_some_and(|m| m.kind == gr_machine::Kind::Robot) {
@@ -233,6 +236,21 @@ fn limits(machine: &gr_machine::Machine, setup: &mut Setup) {
                 }
             }
         }
+    }
+}
+
+/// Without a tool table a mill has the tools of its machine file; of others nothing is known. On a robot the tool's point is no
+/// matter of G43.
+fn machine_tools(machine: &gr_machine::Machine, setup: &mut Setup) {
+    if machine.kind != gr_machine::Kind::Mill {
+        return;
+    }
+    let scale = if setup.machine_units == Units::Inch { 25.4 } else { 1.0 };
+    for row in setup.tools.rows.iter_mut().filter(|r| r.number > 0) {
+        let Some(tool) = machine.cell.tools.get(&row.number.unsigned_abs()) else { continue };
+        row.offset[2] = machine.tool_length(tool) / scale;
+        row.diameter = tool.diameter.unwrap_or(0.0) / scale;
+        row.comment = tool.name.as_str().into();
     }
 }
 

@@ -207,10 +207,9 @@ fn with_data(id: &str, more: &str, [x, y, z]: [f64; 3]) -> String {
             format!("[[stiffness.member]]\njoint = \"{}\"\nname = \"drive\"\nstiffness = {k:.1}\n", j.name)
         })
         .collect();
-    let length = if base.is_upright() { -80 } else { 80 };
     format!(
         "format = 1\nid = \"test/kind\"\nextends = \"{id}\"\n{more}[frames.part]\nposition = [{x}, {y}, {z}]\n\
-         [[tool]]\nnumber = 1\nname = \"mill\"\nposition = [0, 0, {length}]\n\
+         [[tool]]\nnumber = 1\nname = \"mill\"\nposition = [0, 0, 80]\n\
          [accuracy]\nsource = \"made up for this test\"\njoints = [{}]\ngrade = 7\n[stiffness]\nsource = \"made up for this test\"\n{springs}",
         errors.join(", ")
     )
@@ -1110,7 +1109,7 @@ fn turning_has_no_law() {
 #[test]
 fn diameters_of_the_machine_file() {
     let folder = tempfile::tempdir().unwrap();
-    let tools = "[[tool]]\nnumber = 1\nname = \"mill\"\nposition = [0, 0, -60]\ndiameter = 10\n[[tool]]\nnumber = 2\nname = \"small\"\nposition = [0, 0, -60]\ndiameter = 6\n";
+    let tools = "[[tool]]\nnumber = 1\nname = \"mill\"\nposition = [0, 0, 60]\ndiameter = 10\n[[tool]]\nnumber = 2\nname = \"small\"\nposition = [0, 0, 60]\ndiameter = 6\n";
     std::fs::write(folder.path().join("m.toml"), format!("{}{tools}", springs())).unwrap();
     std::fs::write(folder.path().join("p.ngc"), "G21 G90 G94 F600\nT1 M6\nS3000 M3\nG0 X0 Y0 Z0\nG1 X40\nM5\nT2 M6\nS3000 M3\nG1 X0\nM5\nM2\n").unwrap();
     let cut = ["accuracy", "p.ngc", "--machine=m.toml", "--material=6061", "--teeth=2", "--depth=2", "--width=3", "--format=json", "-q"];

@@ -590,3 +590,34 @@ fn files_are_named_as_their_programs() {
     let (good, files, told) = build(&["a b.ngc", "a_b.ngc"], "krl");
     assert!(!good && files.is_empty() && told.contains("E0639"), "{files:?} {told}");
 }
+
+/// A tool of a mill has its length in the machine file as in a tool table: out of the spindle, and without a table too.
+#[test]
+fn a_tool_of_a_mill_hangs_down() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str, text: &str| {
+        let path = folder.path().join(name);
+        std::fs::write(&path, text).unwrap();
+        path.to_str().unwrap().to_string()
+    };
+    let part = file("p.ngc", "G21 G90 G54\nT1 M6 G43 H1\nS1000 M3\nG0 X0 Y0 Z20\nG1 Z0 F100\nX10\nM5\nM2\n");
+    let cut = |position: &str, table: Option<&str>| {
+        let mill = file("m.toml", &format!("format = 1\nid = \"t/m\"\nextends = \"generic/mill3\"\n[frames.table]\nposition = [0, 0, -200]\n[[tool]]\nnumber = 1\nname = \"ball\"\nposition = {position}\n"));
+        let table = table.map(|row| file("t.tbl", row));
+        let mut args = vec!["build", &part, "--machine", &mill, "--target", "joint-gcode", "--message-format", "short"];
+        args.extend(table.iter().flat_map(|t| ["-t", t.as_str()]));
+        let made = run(&args);
+        let (said, program) = (text(&made.stderr), text(&made.stdout));
+        let z = program.lines().find(|l| l.starts_with("G1 X10")).and_then(|l| l.split('Z').nth(1)).and_then(|l| l.split(' ').next()).and_then(|z| z.parse::<f64>().ok());
+        (z, said.lines().filter(|l| l.contains("[E0")).map(|l| l.split_once("[E0").map_or("", |(_, rest)| rest).to_string()).collect::<Vec<_>>())
+    };
+    let long = "[0, 0, 60]";
+    assert_eq!(cut(long, None), (Some(-140.0), vec![]));
+    assert_eq!(cut(long, Some("T1 P1 Z60 D6\n")), (Some(-140.0), vec![]));
+    let (z, said) = cut(long, Some("T1 P1 Z50 D6\n"));
+    assert!(z == Some(-140.0) && said.len() == 1 && said[0].contains("makes tool 1 50.000 mm long, the machine file 60.000 mm; the machine file holds"), "{z:?} {said:?}");
+    let (z, said) = cut(long, Some("T1 P1 D6\n"));
+    assert!(z == Some(-200.0) && said.len() == 1 && said[0].contains("makes tool 1 0.000 mm long, the machine file 60.000 mm; the offset holds"), "{z:?} {said:?}");
+    let (z, said) = cut("[0, 0, -60]", None);
+    assert!(z.is_none() && said.len() == 1 && said[0].contains("a tool of 60 mm has 60"), "{z:?} {said:?}");
+}

@@ -54,7 +54,8 @@ pub struct Cell {
 pub struct ToolData {
     /// Its name on the controller.
     pub name: String,
-    /// Its point and direction in the spindle, or on the flange where there is no spindle.
+    /// Its point and direction in the spindle, or on the flange where there is no spindle. Z of both points away from the part on
+    /// machines that are upright ([`crate::Machine::is_upright`]): there a tool of length 60 has −60.
     pub frame: Frame,
     /// Diameter, mm.
     pub diameter: Option<f64>,
@@ -218,7 +219,8 @@ impl Cell {
         self.tools.get(&number).map_or(nose, |t| nose.then(&t.frame))
     }
 
-    pub(crate) fn describe(&self, joints: &[Joint]) -> String {
+    /// For people, as in a file; on upright machines Z of tools is put the other way, see [`ToolData::frame`].
+    pub(crate) fn describe(&self, joints: &[Joint], upright: bool) -> String {
         let mut out = String::new();
         let frame = |f: &Frame| {
             let p = crate::Pose::from_frame(f);
@@ -242,7 +244,9 @@ impl Cell {
             out += &format!("spindle at {}, {} to {} rev/min{switch}\n", frame(&s.frame), turns(s.speed.0), turns(s.speed.1));
         }
         for (number, t) in &self.tools {
-            out += &format!("tool {number} {}: point at {}\n", t.name, frame(&t.frame));
+            let [x, y, z] = t.frame.position;
+            let told = Frame { position: [x, y, if upright { -z + 0.0 } else { z }], ..t.frame };
+            out += &format!("tool {number} {}: point at {}\n", t.name, frame(&told));
         }
         for e in &self.external {
             let limit = |v: Option<f64>| v.map_or("no limit".into(), |v| e.joint.show(v));

@@ -263,7 +263,7 @@ static CUTTING: &[Key] = &[key("axial_depth", ABOVE, "Greatest axial depth of a 
 static TOOL: &[Key] = &[
     must("number", Whole(0, MOST_COUNTED), "T number."),
     must("name", Text, "Name on the controller."),
-    key("position", Numbers(3), "Tool point on the spindle nose or flange, mm."),
+    key("position", Numbers(3), "Tool point on the spindle nose or flange, mm. Z counts out of it on every machine: a tool of 60 mm has `[0, 0, 60]`."),
     key("rotation", Numbers(3), "Turns of the tool, degrees."),
     key("diameter", ABOVE, "mm."),
     key("mass", ABOVE, "kg."),

@@ -245,6 +245,10 @@ impl Machine {
     pub fn is_upright(&self) -> bool {
         self.kind != Kind::Robot || self.kinematics().control() == Control::Position
     }
+    /// How far the point of a tool of its file stands out of the spindle, mm.
+    pub fn tool_length(&self, tool: &ToolData) -> f64 {
+        if self.is_upright() { -tool.frame.position[2] } else { tool.frame.position[2] }
+    }
     /// Why A B C say nothing on a robot whose file gives them no meaning.
     pub fn no_rotary_words(&self) -> &'static str {
         match self.orientation {
@@ -380,7 +384,7 @@ impl Machine {
         if !names.is_empty() {
             out += &format!("geometry: {}\n", names.join(" "));
         }
-        out + &self.cell.describe(&self.joints)
+        out + &self.cell.describe(&self.joints, self.is_upright())
     }
 }
 

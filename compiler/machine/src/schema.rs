@@ -264,8 +264,28 @@ impl Check {
             default_start(&mut machine);
         }
         self.quality(raw, &mut machine);
+        self.tools_hang_down(raw, &mut machine);
         self.cell_fits(raw, &machine);
         machine
+    }
+
+    /// In files Z of a tool counts out of the spindle on every machine. Where the spindle's own Z points away from the part it is put
+    /// the other way.
+    fn tools_hang_down(&mut self, raw: &Node, machine: &mut Machine) {
+        if !machine.is_upright() {
+            return;
+        }
+        for t in raw.get("tool").map_or(&[][..], Node::list) {
+            if let (Some(place), Some([_, _, z])) = (t.get("position"), t.array::<3>("position"))
+                && z < 0.0
+            {
+                let what = format!("the point of this tool is inside of the spindle: on every machine Z counts from the nose to the tool's point; a tool of {0} mm has {0}", -z);
+                self.value(&place.span, what);
+            }
+        }
+        for tool in machine.cell.tools.values_mut() {
+            tool.frame.position[2] = -tool.frame.position[2] + 0.0;
+        }
     }
 
     /// What the cell says has a meaning for the kind of machine and its coupled joints.

@@ -12,14 +12,13 @@ use crate::gather::{Findings, Gathered, Item, Move, Way};
 use crate::path::{Mount, Path, handed_on};
 use crate::plan::spun;
 use crate::solver::{Branches, Joints, Limits, Solver, whole_turns_off};
-use crate::program::{ON_THE_SPOT, turned_on_the_spot};
+use crate::program::{ON_THE_SPOT, joint_seconds, turned_on_the_spot};
 use crate::{Action, MAX_JOINTS, RobotProgram, Step, Summary, Target, Zone};
 
 pub(crate) struct Emit<'a> {
     machine: &'a Machine,
     solver: &'a Solver,
     limits: &'a Limits,
-    rapid_speeds: &'a Joints,
     /// Greatest speeds at feed; infinite where not known.
     speeds: Joints,
     name: &'a str,
@@ -54,7 +53,7 @@ struct Ends {
 }
 
 impl<'a> Emit<'a> {
-    pub fn new(machine: &'a Machine, solver: &'a Solver, limits: &'a Limits, rapid_speeds: &'a Joints, name: &'a str) -> Emit<'a> {
+    pub fn new(machine: &'a Machine, solver: &'a Solver, limits: &'a Limits, name: &'a str) -> Emit<'a> {
         let mut speeds = [f64::INFINITY; MAX_JOINTS];
         for (slot, j) in speeds.iter_mut().zip(&machine.joints) {
             *slot = j.speed.unwrap_or(f64::INFINITY);
@@ -64,7 +63,6 @@ impl<'a> Emit<'a> {
             machine,
             solver,
             limits,
-            rapid_speeds,
             speeds,
             name,
             targets: Vec::new(),
@@ -294,7 +292,7 @@ impl<'a> Emit<'a> {
     }
 
     fn joint_time(&self, a: &Joints, b: &Joints, share: f64) -> f64 {
-        (0..self.solver.count).map(|i| (a[i] - b[i]).abs() / (self.rapid_speeds[i] * share)).fold(0.0, f64::max)
+        joint_seconds(self.machine, a, b, share)
     }
 
     /// How deep the tool sags below both ends of a joint move.

@@ -15,6 +15,8 @@ use gr_text::{Code, Diagnostic, Severity, code};
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::PI;
 
+use gr_backends::sources::Words as Letters;
+
 use crate::cell::Cells;
 use crate::settle::{leads_to, main_line};
 use crate::turns::Turns;
@@ -357,8 +359,22 @@ impl<'a> Gather<'a> {
         }
     }
 
+    /// A mill's control has the spindle's nose where G43 finds no length, whatever the machine file has of the tool.
+    fn no_length(&mut self, view: &View<'_, '_>) {
+        if self.machine.kind != Kind::Mill || view.state.tool_offset[2] != 0.0 {
+            return;
+        }
+        let number = u32::try_from(view.state.tool).unwrap_or(0);
+        let file = self.machine.cell.tools.get(&number).map_or(0.0, |t| self.machine.tool_length(t));
+        if file.abs() > 1e-3 && Letters::at(self.findings.sources, view.source.file, view.source.line).is_some_and(|l| l.g(430)) {
+            let args = [number.to_string(), "0.000".into(), format!("{file:.3}"), "the offset holds, as on the control".into()];
+            self.findings.once_each(code::ROBOT_TOOL_LENGTH, Some(self.source), &args);
+        }
+    }
+
     /// The machine stands still, the program's coordinates change. Where the tool stands is known, or it is said anew.
     fn tool_offset(&mut self, view: &View<'_, '_>) {
+        self.no_length(view);
         let same = |i: usize| view.start.axes[i] == view.end.axes[i];
         if let Some(probed) = &mut self.probed {
             (0..3).for_each(|i| probed.loose[i] |= !same(i));
@@ -511,10 +527,9 @@ impl<'a> Gather<'a> {
         let nose = self.machine.cell.tool_frame(u32::MAX);
         let (name, frame, mass) = match known {
             Some(t) => {
-                // Along the spindle from its nose, on upright machines too.
-                let table = if self.machine.is_upright() { -t.frame.position[2] } else { t.frame.position[2] };
-                if length != 0.0 && (length - table).abs() > 1e-3 {
-                    let args = [number.to_string(), format!("{length:.3}"), format!("{table:.3}")];
+                let file = self.machine.tool_length(t);
+                if length != 0.0 && (length - file).abs() > 1e-3 {
+                    let args = [number.to_string(), format!("{length:.3}"), format!("{file:.3}"), "the machine file holds".into()];
                     self.findings.once_each(code::ROBOT_TOOL_LENGTH, Some(self.source), &args);
                 }
                 (t.name.clone(), nose.then(&t.frame), t.mass)

@@ -51,6 +51,6 @@ pub mod words;
 
 pub use options::{Options, Planned, Setup, Singularity, Summary};
 pub use plan::plan;
-pub use program::{Action, Curves, MAX_JOINTS, RobotProgram, Step, Target, Tool, Word, WorkFrame, Zone};
+pub use program::{Action, Curves, MAX_JOINTS, RobotProgram, Step, Target, Tool, Word, WorkFrame, Zone, joint_seconds};
 pub use settle::{Brought, By, Coordinates, Settled, settled};
 pub use turns::{Turns, Unread};

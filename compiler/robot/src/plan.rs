@@ -81,7 +81,7 @@ impl Planner<'_> {
         let Some(start) = home.or((self.machine.kind == Kind::Robot).then_some([0.0; MAX_JOINTS])) else { return Err(self.findings.take()) };
         let (list, nodes): (Vec<Chain>, Vec<Vec<Node>>) = self.nodes(&start).into_iter().unzip();
         let nodes = self.chooser(list.len(), None).cheapest(&nodes, &start);
-        let emit = Emit::new(self.machine, &self.solver, &self.limits, &self.speeds, &self.options.name);
+        let emit = Emit::new(self.machine, &self.solver, &self.limits, &self.options.name);
         if self.findings.bad() {
             // Nothing is made, but what can be done is looked at for joints that are too fast.
             let mut more = self.findings.apart(code::ROBOT_JOINT_SPEED, self.told.iter().copied().flatten());

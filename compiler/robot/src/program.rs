@@ -267,6 +267,12 @@ pub(crate) fn turned_on_the_spot(machine: &Machine, from: &[f64; MAX_JOINTS], to
     libm::sqrt(turns.map(|(_, (a, b))| (a - b) * (a - b)).sum())
 }
 
+/// How long a joint move takes at a share of the joints' greatest speeds, accelerations not counted, s.
+pub fn joint_seconds(machine: &Machine, from: &[f64; MAX_JOINTS], to: &[f64; MAX_JOINTS], share: f64) -> f64 {
+    let each = machine.joints.iter().zip(from.iter().zip(to)).map(|(j, (a, b))| (a - b).abs() / (j.top_rapid() * share));
+    each.fold(0.0, f64::max)
+}
+
 /// The motion of one machine.
 #[derive(Clone, PartialEq, Debug)]
 pub struct RobotProgram {

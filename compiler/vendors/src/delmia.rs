@@ -22,6 +22,7 @@ static TRAITS: Traits = Traits {
     title: "DELMIA XML",
     arms: Arms::Any,
     world: World::Foot,
+    external: true,
     arcs: true,
     trailing: false,
     unverified: "the schema of the upload is not public; joint targets are as the V5 help describes them",

@@ -17,6 +17,7 @@ static TRAITS: Traits = Traits {
     title: "DENSO PAC",
     arms: Arms::Any,
     world: World::Foot,
+    external: false,
     arcs: true,
     trailing: true,
     unverified: "speeds in mm/s by MPS, and joint values in straight moves",

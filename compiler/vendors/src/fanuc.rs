@@ -19,7 +19,7 @@ use std::fmt::Write;
 
 pub(crate) struct Fanuc;
 
-static TRAITS: Traits = Traits { title: "FANUC TP", arms: Arms::Spherical, world: World::Shoulder, arcs: true, trailing: false, unverified: "" };
+static TRAITS: Traits = Traits { title: "FANUC TP", arms: Arms::Spherical, world: World::Shoulder, external: true, arcs: true, trailing: false, unverified: "" };
 
 const LINES: u64 = 9999;
 /// The position registers that carry frames to the controller.

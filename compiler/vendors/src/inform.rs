@@ -15,7 +15,7 @@ use std::fmt::Write;
 
 pub(crate) struct Inform;
 
-static TRAITS: Traits = Traits { title: "Yaskawa INFORM", arms: Arms::Spherical, world: World::Shoulder, arcs: true, trailing: false, unverified: "" };
+static TRAITS: Traits = Traits { title: "Yaskawa INFORM", arms: Arms::Spherical, world: World::Shoulder, external: false, arcs: true, trailing: false, unverified: "" };
 
 const LINES: u64 = 2000;
 

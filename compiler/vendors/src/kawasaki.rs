@@ -18,6 +18,7 @@ static TRAITS: Traits = Traits {
     title: "Kawasaki AS",
     arms: Arms::Spherical,
     world: World::Foot,
+    external: false,
     arcs: true,
     trailing: true,
     unverified: "joint values and transformations within the move instructions",

@@ -16,7 +16,7 @@ use gr_robot::{RobotProgram, Target};
 
 pub(crate) struct Krl;
 
-static TRAITS: Traits = Traits { title: "KUKA KRL", arms: Arms::Spherical, world: World::Foot, arcs: true, trailing: true, unverified: "" };
+static TRAITS: Traits = Traits { title: "KUKA KRL", arms: Arms::Spherical, world: World::Foot, external: true, arcs: true, trailing: true, unverified: "" };
 
 const RESERVED: &[&str] = &[
     "AND", "ANIN", "ANOUT", "B_AND", "B_EXOR", "B_NOT", "B_OR", "BOOL", "BRAKE", "CASE", "CAST_FROM", "CAST_TO", "CHANNEL", "CHAR",

@@ -20,6 +20,7 @@ static TRAITS: Traits = Traits {
     title: "MELFA-BASIC",
     arms: Arms::Any,
     world: World::Foot,
+    external: false,
     arcs: true,
     trailing: true,
     unverified: "the structure flags of positions",

@@ -17,6 +17,7 @@ static TRAITS: Traits = Traits {
     title: "Nachi robot language",
     arms: Arms::Spherical,
     world: World::Foot,
+    external: false,
     arcs: true,
     trailing: false,
     unverified: "the move instruction's mechanism and pose fields, and the numbers of functions",

@@ -19,6 +19,7 @@ static TRAITS: Traits = Traits {
     title: "Comau PDL2",
     arms: Arms::Any,
     world: World::Foot,
+    external: true,
     arcs: true,
     trailing: true,
     unverified: "the configuration text of positions, and that straight moves don't heed it",

@@ -20,7 +20,7 @@ use std::sync::LazyLock;
 
 pub(crate) struct Rapid;
 
-static TRAITS: Traits = Traits { title: "ABB RAPID", arms: Arms::Spherical, world: World::Foot, arcs: true, trailing: true, unverified: "" };
+static TRAITS: Traits = Traits { title: "ABB RAPID", arms: Arms::Spherical, world: World::Foot, external: true, arcs: true, trailing: true, unverified: "" };
 
 /// Names that RAPID has itself: reserved words, instructions, functions, data types and data.
 static RESERVED: LazyLock<Vec<&str>> = LazyLock::new(|| {
@@ -272,11 +272,11 @@ impl Body for Writer {
                 let text = cx.ascii(text);
                 self.line(&format!("! {number}: {text}"));
             }
-            Op::Home(t) => self.home(cx, t, 1.0),
+            Op::Home(t) => self.home(cx, t, None),
             // Back to the joints themselves: as a pose they could be reached with other turns.
-            Op::Joint { to, share, zone: None } if to.joints == cx.program.home.joints => self.home(cx, to, share),
+            Op::Joint { to, share, zone: None } if to.joints == cx.program.home.joints => self.home(cx, to, Some(share)),
             Op::Joint { to, share, zone } => {
-                let (speed, zone) = (self.joint_speed(cx, share), self.zone(zone));
+                let (speed, zone) = (self.joint_speed(cx, to, share), self.zone(zone));
                 self.motion(cx, "MoveJ", &[to], &speed, &zone);
             }
             Op::Linear { to, speed, zone } => {
@@ -350,8 +350,12 @@ impl Writer {
         self.parts.end_line();
     }
 
-    fn home(&mut self, cx: &Cx, t: &Target, share: f64) {
-        let speed = self.joint_speed(cx, share);
+    /// At a share of the joint speeds; none = from nobody knows where.
+    fn home(&mut self, cx: &Cx, t: &Target, share: Option<f64>) {
+        let speed = match share {
+            Some(share) => self.joint_speed(cx, t, share),
+            None => self.calm(cx),
+        };
         let mut text = format!("    MoveAbsJ [{},", list(&cx.degrees(t), 5));
         external(&mut text, cx, t);
         self.parts.text.push_str(&text);
@@ -359,10 +363,19 @@ impl Writer {
         self.finish(cx, &speed, "fine");
     }
 
-    /// Joint moves are told a speed of the tool too; a full one is that of the fastest predefined data.
-    fn joint_speed(&mut self, cx: &Cx, share: f64) -> String {
-        let full = cx.machine.cell.rapid_speed.unwrap_or(1000.0);
-        self.speed((full * share).max(0.1), (500.0 * share).max(0.1), "J")
+    /// Joint moves, too, are told a speed of the tool point: the one with which it makes its way in the time that the joints take at
+    /// their share. The turn of the tool never slows it down.
+    fn joint_speed(&mut self, cx: &Cx, to: &Target, share: f64) -> String {
+        let calm = self.calm(cx);
+        match cx.joint_way(to, share) {
+            Some((way, seconds)) => format!("{calm}\\V:={}", single((way / seconds).max(0.1))),
+            None => calm,
+        }
+    }
+
+    /// The speed of a joint move whose way isn't known: that of rapids in a line.
+    fn calm(&mut self, cx: &Cx) -> String {
+        self.speed(cx.machine.cell.line_rapid(), 1000.0, "J")
     }
 }
 

@@ -18,6 +18,7 @@ static TRAITS: Traits = Traits {
     title: "Epson SPEL+",
     arms: Arms::Any,
     world: World::Foot,
+    external: false,
     arcs: true,
     trailing: true,
     unverified: "points written within moves, without flags of the arm",

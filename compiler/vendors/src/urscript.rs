@@ -18,7 +18,7 @@ use std::fmt::Write;
 pub(crate) struct UrScript;
 
 static TRAITS: Traits =
-    Traits { title: "URScript", arms: Arms::Six, world: World::Foot, arcs: true, trailing: true, unverified: "" };
+    Traits { title: "URScript", arms: Arms::Six, world: World::Foot, external: false, arcs: true, trailing: true, unverified: "" };
 
 const RESERVED: &[&str] = &[
     "AND", "BREAK", "CONTINUE", "DEF", "ELIF", "ELSE", "END", "FALSE", "FOR", "GLOBAL", "HALT", "IF", "IN", "LOCAL", "NOT", "OR", "PASS",
@@ -156,11 +156,14 @@ impl Writer {
         let joints: Vec<String> = to.joints[..6].iter().map(|v| num(*v, 6)).collect();
         let near = format!("[{}]", joints.join(","));
         let target = if pose { format!("get_inverse_kin({},{near})", point(cx, to)) } else { near };
-        let fastest = cx.machine.joints.iter().filter_map(|j| j.rapid.or(j.speed)).fold(f64::INFINITY, f64::min);
-        let fastest = if fastest.is_finite() { fastest } else { 1.05 };
+        // The speed of the joint that goes furthest.
+        let furthest = |before: &Target| (0..6).map(|i| (to.joints[i] - before.joints[i]).abs()).fold(0.0, f64::max);
+        let way = cx.before.as_ref().map(furthest).zip(cx.joint_way(to, share));
+        let slowest = || cx.machine.joints.iter().map(gr_machine::Joint::top_rapid).fold(f64::INFINITY, f64::min) * share;
+        let v = way.map_or_else(slowest, |(furthest, (_, seconds))| furthest / seconds);
         let a = cx.machine.joints.iter().filter_map(|j| j.acceleration).fold(f64::INFINITY, f64::min);
         let a = if a.is_finite() { a } else { 1.4 };
-        self.line(cx, &format!("movej({target},a={},v={},t=0,r=0)", single(a), single(fastest * share)));
+        self.line(cx, &format!("movej({target},a={},v={},t=0,r=0)", single(a), single(v)));
     }
 }
 

@@ -16,7 +16,7 @@ use std::fmt::Write;
 
 pub(crate) struct Val3;
 
-static TRAITS: Traits = Traits { title: "Stäubli VAL3", arms: Arms::Spherical, world: World::Shoulder, arcs: true, trailing: true, unverified: "" };
+static TRAITS: Traits = Traits { title: "Stäubli VAL3", arms: Arms::Spherical, world: World::Shoulder, external: true, arcs: true, trailing: true, unverified: "" };
 
 const RESERVED: &[&str] = &[
     "AND", "BEGIN", "BOOL", "BREAK", "CALL", "CASE", "CONFIG", "DEFAULT", "DO", "ELSE", "ELSEIF", "END", "ENDFOR", "ENDIF", "ENDSWITCH",

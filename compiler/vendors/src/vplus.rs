@@ -20,6 +20,7 @@ static TRAITS: Traits = Traits {
     title: "Adept V+",
     arms: Arms::Any,
     world: World::Foot,
+    external: false,
     arcs: false,
     trailing: true,
     unverified: "zero and sense of the arm's joints as the controller counts them",

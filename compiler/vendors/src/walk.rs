@@ -86,6 +86,8 @@ pub(crate) struct Traits {
     pub arms: Arms,
     /// Zero point of work frames.
     pub world: World,
+    /// Targets, or joint positions, have the values of external axes; otherwise these are left where they stand.
+    pub external: bool,
     /// Arcs through a point.
     pub arcs: bool,
     /// Source lines are remarked behind moves; otherwise in lines of their own.
@@ -219,6 +221,7 @@ impl<'p> Cx<'p> {
     fn run(&mut self, body: &mut dyn Body) {
         let program = self.program;
         self.rails(body);
+        self.stand_still(body);
         body.op(self, Op::Home(&program.home));
         self.before = Some(program.home);
         self.before = self.moved_before();
@@ -263,6 +266,39 @@ impl<'p> Cx<'p> {
             };
             body.op(self, Op::Comment(&text));
         }
+    }
+
+    /// Where external axes have to stand that the language has no word for.
+    fn stand_still(&mut self, body: &mut dyn Body) {
+        for e in self.machine.cell.external.iter().filter(|_| !self.traits.external) {
+            let (name, place) = (&e.joint.name, e.joint.show(e.position));
+            self.say(code::VENDOR_EXTERNAL_STANDS, &[name.clone(), place.clone(), self.traits.title.into()]);
+            let carried = if e.carries_machine { "robot" } else { "part" };
+            body.op(self, Op::Comment(&format!("{name} carries the {carried}: it must stand at {place} before the start, the program does not move it")));
+        }
+    }
+
+    /// How far the tool point goes in a joint move from where it is, mm, and how long the joints take at a share of their greatest
+    /// speeds, s. None where it isn't known where they are, and where nothing moves.
+    pub fn joint_way(&self, to: &Target, share: f64) -> Option<(f64, f64)> {
+        // Finer than that the way grows by less than a thousandth.
+        const PIECES: i32 = 32;
+        let from = &self.before?.joints;
+        let seconds = gr_robot::joint_seconds(self.machine, from, &to.joints, share);
+        let tool = self.program.tools.get(self.tool).map(|t| t.frame).unwrap_or_default();
+        let n = self.machine.joints.len().min(MAX_JOINTS);
+        let place = |k: i32| {
+            let at = f64::from(k) / f64::from(PIECES);
+            let joints: [f64; MAX_JOINTS] = std::array::from_fn(|i| from[i] + (to.joints[i] - from[i]) * at);
+            Some(self.kinematics.forward_frame(joints.get(..n)?).ok()?.then(&tool).position)
+        };
+        let (mut way, mut last) = (0.0, place(0)?);
+        for k in 1..=PIECES {
+            let next = place(k)?;
+            way += norm(sub(next, last));
+            last = next;
+        }
+        (seconds > 0.0).then_some((way, seconds))
     }
 
     fn step(&mut self, body: &mut dyn Body, index: usize, action: &'p Action) {

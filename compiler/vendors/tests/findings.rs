@@ -90,6 +90,7 @@ fn every_finding() {
     note("E0634 optional stop", one("rapid", Action::Pause { optional: true }));
     note("E0637 corners", moved("inform", line(10.0, Some(0.5))));
     note("E0640 a rail", run("rapid", &on_rail(None), true));
+    note("E0641 an axis that the language has no word for", run("inform", &on_turntable("inform", 20.0), true));
     insta::assert_snapshot!(all);
     for code in 620..=637 {
         assert!(all.contains(&format!(" E0{code} at")), "E0{code} is never raised");
@@ -144,6 +145,32 @@ fn frames_on_a_rail() {
     );
     assert!(line(None, "E1 carries").ends_with("must not count E1 in poses"));
     assert!(run("rapid", &on_rail(Some(false)), true).findings.iter().all(|f| f.code.def().code != "E0640"));
+}
+
+/// A part on a turntable that stands at so many degrees.
+fn on_turntable(target: &str, at: f64) -> Builder {
+    let (id, home, _) = robot_of(target);
+    let file = format!(
+        "format = 1\nid = \"shop/turned\"\nextends = \"{id}\"\n[[external]]\nname = \"E1\"\ntype = \"revolute\"\ncarries = \"part\"\nmin = -180\nmax = 180\nposition = {at}\n"
+    );
+    let machine = gr_machine::parse(gr_text::FileId(0), &file).unwrap_or_else(|e| panic!("{e:?}"));
+    let mut b = Builder::new(machine, home);
+    assert!(b.add(&Move::Line { shift: [10.0, 0.0, 0.0], turn: [0.0; 3], speed: 10.0, zone: None }));
+    b
+}
+
+/// Languages without external axes say where these have to stand, in the program and beside it; at 0 too. The others have the value.
+#[test]
+fn external_axes_that_stand_are_told() {
+    for (target, at, place) in [("urscript", 20.0, "20°"), ("inform", 20.0, "20°"), ("inform", 0.0, "0°"), ("kawasaki-as", 20.0, "20°")] {
+        let out = run(target, &on_turntable(target, at), true);
+        let told: Vec<&str> = out.findings.iter().filter(|f| f.code.def().code == "E0641").map(|f| f.message.as_str()).collect();
+        let [message] = told.as_slice() else { panic!("{target}: {told:?}") };
+        assert!(message.starts_with(&format!("`E1` must stand at {place} before the program starts")), "{message}");
+        let text = out.files.iter().map(|f| String::from_utf8_lossy(&f.bytes).into_owned()).collect::<String>();
+        assert!(text.contains("E1 carries the part"), "{target}: {text}");
+    }
+    assert!(run("rapid", &on_turntable("rapid", 20.0), true).findings.iter().all(|f| f.code.def().code != "E0641"));
 }
 
 /// Names of instructions, functions and data types of RAPID are renamed like reserved words.
@@ -249,5 +276,34 @@ fn main_file(target: &str, text: &str) -> bool {
         "rapid" => text.contains("PROC main()"),
         "krl" => text.contains("INITMOV"),
         _ => text.contains("CALL"),
+    }
+}
+
+/// RAPID has no share of the joint speed: the speed of the tool point that is written makes its way in the time that the joints take.
+#[test]
+fn joint_moves_of_rapid_take_the_time_of_their_share() {
+    use gr_machine::math::{norm, sub};
+    let (id, home, _) = robot_of("rapid");
+    let mut b = Builder::new(machine(id), home);
+    for by in [[30.0, 10.0, -20.0, 15.0, 10.0, 40.0], [-60.0, 5.0, 10.0, -30.0, 20.0, -90.0], [1.0, 0.0, 0.0, 0.0, 0.0, 0.0]] {
+        assert!(b.add(&Move::Joint { by, share: 0.3 }));
+    }
+    let out = run("rapid", &b, true);
+    let text: String = out.files.iter().map(|f| String::from_utf8_lossy(&f.bytes).into_owned()).collect();
+    let moves = text.lines().filter(|l| l.trim().starts_with("MoveJ "));
+    let speeds: Vec<f64> = moves.map(|l| l.split("\\V:=").nth(1).and_then(|v| v.split(',').next()).and_then(|v| v.parse().ok()).unwrap_or_else(|| panic!("{l}"))).collect();
+    assert_eq!(speeds.len(), 3, "{text}");
+    let (kinematics, tool) = (b.program.machine.kinematics(), b.program.tools[0].frame);
+    let mut from = b.program.home.joints;
+    for (target, speed) in b.program.targets.iter().zip(speeds) {
+        let at = |k: i32| {
+            let q: Vec<f64> = (0..6).map(|i| from[i] + (target.joints[i] - from[i]) * f64::from(k) / 2000.0).collect();
+            kinematics.forward_frame(&q).unwrap().then(&tool).position
+        };
+        let way: f64 = (1..=2000).map(|k| norm(sub(at(k), at(k - 1)))).sum();
+        let joints = b.program.machine.joints.iter().enumerate();
+        let seconds = joints.map(|(i, j)| (target.joints[i] - from[i]).abs() / (0.3 * j.top_rapid())).fold(0.0, f64::max);
+        assert!(way > 1.0 && (way / speed - seconds).abs() < 2e-3 * seconds, "{way} mm at {speed} mm/s instead of {seconds} s");
+        from = target.joints;
     }
 }

@@ -113,7 +113,9 @@ fn run(all: &Module, routine: &str, events: &mut Vec<Event>, depth: u32) -> Resu
                 let [speed, zone, ends] = fields.as_slice() else { return Err(fault()) };
                 let (tool, frame) = ends.split_once("\\WObj:=").ok_or_else(fault)?;
                 let place = |t: &str| place(all, t, tool, frame).ok_or_else(fault);
-                let speed = *all.speeds.get(*speed).ok_or_else(fault)?;
+                let (speed, own) = speed.split_once("\\V:=").map_or((*speed, None), |(s, v)| (s, Some(v)));
+                let told = *all.speeds.get(speed).ok_or_else(fault)?;
+                let speed = own.map_or(Ok(told), str::parse).map_err(|_| fault())?;
                 let zone = if *zone == "fine" { None } else { Some(*all.zones.get(*zone).ok_or_else(fault)?) };
                 events.push(match word {
                     "MoveJ" => Event::Joint(place(first)?),
