@@ -274,6 +274,8 @@ impl<'p> Cx<'p> {
             let (name, place) = (&e.joint.name, e.joint.show(e.position));
             self.say(code::VENDOR_EXTERNAL_STANDS, &[name.clone(), place.clone(), self.traits.title.into()]);
             let carried = if e.carries_machine { "robot" } else { "part" };
+            // Few controllers have the letter.
+            let place = place.replace('°', " degrees");
             body.op(self, Op::Comment(&format!("{name} carries the {carried}: it must stand at {place} before the start, the program does not move it")));
         }
     }

@@ -168,7 +168,7 @@ fn external_axes_that_stand_are_told() {
         let [message] = told.as_slice() else { panic!("{target}: {told:?}") };
         assert!(message.starts_with(&format!("`E1` must stand at {place} before the program starts")), "{message}");
         let text = out.files.iter().map(|f| String::from_utf8_lossy(&f.bytes).into_owned()).collect::<String>();
-        assert!(text.contains("E1 carries the part"), "{target}: {text}");
+        assert!(text.contains("E1 carries the part: it must") && text.contains(&format!("stand at {at} degrees")), "{target}: {text}");
     }
     assert!(run("rapid", &on_turntable("rapid", 20.0), true).findings.iter().all(|f| f.code.def().code != "E0641"));
 }
