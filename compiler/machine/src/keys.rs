@@ -510,7 +510,8 @@ pub(crate) fn without(node: &mut Node, bad: &[Range<usize>]) {
     }
 }
 
-fn holds(node: &Node, place: &Range<usize>) -> bool {
+/// Whether a value at this place is part of a node.
+pub(crate) fn holds(node: &Node, place: &Range<usize>) -> bool {
     let inside = |n: &Node| holds(n, place);
     match &node.value {
         Value::List(l) => l.iter().any(inside),

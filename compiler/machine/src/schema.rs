@@ -188,6 +188,7 @@ impl Check {
     fn machine(&mut self, raw: &Node) -> Machine {
         let mut pruned = raw.clone();
         let bad = keys::out_of_bounds(raw, ROOT);
+        let geometry = raw.get("kinematics").is_some_and(|k| bad.iter().any(|(place, _)| keys::holds(k, place)));
         if !bad.is_empty() {
             keys::without(&mut pruned, &bad.iter().map(|(place, _)| place.clone()).collect::<Vec<_>>());
         }
@@ -207,7 +208,12 @@ impl Check {
         let list = raw.get("joint").map_or(&[][..], Node::list);
         let joints: Vec<Joint> = list.iter().map(|j| self.joint(j)).collect();
         self.names(list);
+        let told = self.found.len();
         let chain = self.chain(raw, list, &joints);
+        if geometry {
+            // What else is wrong with the geometry follows from the number that was told.
+            self.found.truncate(told);
+        }
         let machine = self.built(raw, joints, chain);
         self.structure(raw, &machine);
         if self.found.is_empty() {
@@ -923,6 +929,10 @@ mod tests {
         let joint = "[[joint]]\nname = \"J1\"\nmin = -180\nmax = 180\n[stiffness]\nsource = \"x\"\nmodulus = 210000\n[[stiffness.member]]\njoint = \"J1\"\nname = \"n\"\nouter = 50\ninner = 20\nlength = 300\n";
         let whole = format!("{cell}{home}{rail}[io.M3]\nsignal = \"do\"\nwait = \"di\"\nseconds = 1\n[io.G38]\nwait = \"di\"\nvalue = 1\n{joint}");
         assert!(parse(FileId(0), &whole).is_ok());
+        for (id, good, bad, place) in [("adept/one", "[424.942,", "[nan,", "nan"), ("usp/2ups-prp", "arm = [604.1", "arm = [1e300", "1e300")] {
+            let text = crate::source(id).unwrap().replacen(good, bad, 1);
+            assert_eq!(faults(&text).iter().map(|f| f.1.as_str()).collect::<Vec<_>>(), [place], "{}", all(&text));
+        }
         let slips = [
             ("format = 1", "formatx = 1", "formatx"), ("format = 1", "format = nan", "nan"), ("format = 1", "format = -1", "-1"),
             ("id = ", "ID = ", "ID"), ("extends = ", "extendsx = ", "extendsx"), ("\"abb/irb2400\"", "5", "5"),
