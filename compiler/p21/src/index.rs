@@ -23,7 +23,7 @@ pub struct Entry {
 /// Finds `#id=…;` statements, skipping strings and comments, and reads nothing else. On damaged files it
 /// resumes at the next line that begins with `#id=`; use [`crate::parse`] to hear what is wrong.
 pub fn index(text: &[u8]) -> Index {
-    let mut entries = Vec::with_capacity(text.len() / 96 + 4);
+    let mut entries = Vec::with_capacity(text.len() / 64 + 4);
     let (mut at, mut plain) = (0, 0);
     while at < text.len() {
         at = skip_blank(text, at);
@@ -99,7 +99,41 @@ pub(crate) fn begins_instance(text: &[u8], at: usize) -> bool {
 
 /// One past the `;` that ends the statement around `at`. One that lost its end does not reach into the next instance.
 /// `plain`: nothing that ends statements, strings or comments stands before it.
-fn statement_end(text: &[u8], mut at: usize, plain: &mut usize) -> usize {
+fn statement_end(text: &[u8], at: usize, plain: &mut usize) -> usize {
+    let before = *plain;
+    usual_end(text, at, plain).unwrap_or_else(|| {
+        *plain = before;
+        careful_end(text, at, plain)
+    })
+}
+
+/// The same of a statement with a few whole strings, without comments, `=` and another statement's beginning: nearly all.
+#[inline(always)]
+fn usual_end(text: &[u8], begin: usize, plain: &mut usize) -> Option<usize> {
+    let mut at = begin;
+    // Far ahead of a statement without an end nothing is looked for.
+    for _ in 0..4 {
+        if *plain <= at {
+            *plain = at + memchr::memchr3(b';', b'\'', b'/', &text[at..])?;
+        }
+        at = *plain;
+        match text.get(at)? {
+            b';' => return memchr(b'=', &text[begin..at]).is_none().then_some(at + 1),
+            b'\'' if text.get(at + 1) == Some(&b'\'') => at += 2,
+            b'\'' => {
+                let inside = memchr(b'\'', &text[at + 1..])?;
+                if inside > 4 && first_statement(&text[at + 1..at + 1 + inside]).is_some() {
+                    return None;
+                }
+                at += inside + 2;
+            }
+            _ => return None,
+        }
+    }
+    None
+}
+
+fn careful_end(text: &[u8], mut at: usize, plain: &mut usize) -> usize {
     // A doubled apostrophe is passed as the end of one string and the start of another: where the whole began.
     let (mut string, mut closed) = (0, usize::MAX);
     loop {

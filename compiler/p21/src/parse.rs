@@ -50,6 +50,13 @@ fn looks_like(text: &[u8]) -> (Span, &'static str) {
     (span, what)
 }
 
+/// Entities of the header: no type of a value is named like one.
+fn is_header_entity(word: &[u8]) -> bool {
+    let all: [&[u8]; 7] =
+        [b"FILE_DESCRIPTION", b"FILE_NAME", b"FILE_SCHEMA", b"FILE_POPULATION", b"SCHEMA_POPULATION", b"SECTION_LANGUAGE", b"SECTION_CONTEXT"];
+    all.contains(&word)
+}
+
 /// Whether a line is a G or M word with whatever follows.
 fn is_block(line: &[u8]) -> bool {
     let words = line.split(|b| *b == b' ').filter(|w| !w.is_empty());
@@ -733,6 +740,8 @@ impl<'t, const KEEP: bool> Parser<'t, KEEP> {
                         let code = if number { code::P21_BAD_NUMBER } else { code::P21_BARE_WORD };
                         self.fault(code, start, word, vec![written]);
                         self.push(Kind::Bad, start, word);
+                    } else if self.section_name() == Some("HEADER") && first_on_line(self.text, start) && is_header_entity(&self.text[start..word]) {
+                        return Err(self.cut_short(start));
                     } else {
                         let (s, _) = self.name("a value")?;
                         self.blank();

@@ -202,3 +202,23 @@ fn no_prefix_and_no_mutation_panics() {
         }
     }
 }
+
+/// Whatever a header statement lost behind a comma, the next one is not taken for its value.
+#[test]
+fn a_cut_header_statement_costs_no_other() {
+    let whole = file("#1=A();\n");
+    let commas = whole.match_indices(',').map(|(n, _)| n);
+    let mut cuts = 0;
+    for comma in commas {
+        let end = comma + whole[comma..].find('\n').expect("a line's end");
+        let text = format!("{}{}", &whole[..=comma], &whole[end..]);
+        let parsed = parse(text.as_bytes());
+        let found = report(text.as_bytes(), &parsed);
+        assert!(found.len() == 1 && found[0].ends_with("p21/missing-semicolon"), "{found:?}\n{text}");
+        let names: Vec<&str> = (0..parsed.instances.len() as u32).map(|n| parsed.keyword(n)).collect();
+        assert_eq!(names, ["FILE_DESCRIPTION", "FILE_NAME", "FILE_SCHEMA", "A"], "{text}");
+        assert_eq!(parsed.instances.iter().filter(|i| i.damaged).count(), 1, "{text}");
+        cuts += 1;
+    }
+    assert_eq!(cuts, 7);
+}

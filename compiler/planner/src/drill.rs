@@ -88,8 +88,8 @@ fn suits(e: &mut Emit<'_>, step: &Workingstep, d: &Drilling, feature: &Feature) 
     } else if drills && (taps || tool.is_disc() || is(&["DOVETAIL", "THREAD_MILL", "BORING"])) {
         format!("a {} does not drill", tool.kind)
     } else {
-        if drills && is(&["FACEMILL"]) {
-            e.say(code::STEP_FACEMILL_PLUNGE, o.origin, &[&o.origin.id.to_string()]);
+        if drills && tool.is_hollow() {
+            e.say(code::STEP_FACEMILL_PLUNGE, o.origin, &[&format!("T{} {}", tool.number, tool.kind), &format!("#{} {}", o.origin.id, o.keyword)]);
         }
         return true;
     };
@@ -238,7 +238,10 @@ fn checks(e: &mut Emit<'_>, step: &Workingstep, d: &Drilling, feature: &Feature,
     }
     if let Shape::Hole { diameter, .. } = feature.shape {
         let whole = !matches!(step.operation.keyword.as_str(), "CENTER_DRILLING" | "COUNTER_SINKING");
-        if whole && tool.diameter > diameter + 0.05 {
+        // A thread goes into the wall of its core hole.
+        let threads = matches!(step.operation.keyword.as_str(), "TAPPING" | "THREAD_DRILLING");
+        let room = if threads { diameter * gr_step::THREAD_OVER_CORE } else { diameter };
+        if whole && tool.diameter > room + 0.05 {
             e.say(code::PLAN_TOOL_WIDER_THAN_FEATURE, step.operation.origin, &[&name, &tool.diameter.to_string(), &feature.keyword, &diameter.to_string()]);
         }
         let slack = 2.0 * feature.tolerance.unwrap_or(0.0).max(0.05);
@@ -288,7 +291,8 @@ fn tip(tool: &Tool) -> f64 {
 /// What the operations on a hole leave in it. Holes that are milled too tell that themselves.
 pub(crate) fn leftovers(e: &mut Emit<'_>, steps: &[(&Workingstep, &Feature)]) {
     let drills = |s: &Workingstep| matches!(s.operation.kind, OperationKind::Drill(_)) && s.operation.toolpaths.is_empty();
-    if steps.iter().all(|(s, _)| drills(s)) {
+    // What follows from a point that no drill has is not told besides it.
+    if steps.iter().all(|(s, _)| drills(s) && !s.operation.tool.is_needle()) {
         narrow_sink(e, steps);
         wide_sink(e, steps);
         short_of_bottom(e, steps);
@@ -364,6 +368,17 @@ fn short_of_bottom(e: &mut Emit<'_>, steps: &[(&Workingstep, &Feature)]) {
         };
         let wanted = gr_step::short(((feature.depth + point) * 1e4).ceil() / 1e4);
         e.say(code::PLAN_SHORT_OF_BOTTOM, Origin { span: d.depth_span, ..o.origin }, &[&what, &deep, &of, &gr_step::short(feature.depth), &wanted]);
+        // Some programs count the angle of the point from the face of the tool: then the depth is the hole's and its point.
+        let (radius, half) = (o.tool.diameter / 2.0, o.tool.tip_angle.unwrap_or(0.0));
+        if (cut - feature.depth - radius * libm::tan(half)).abs() < 1e-3
+            && let Some(told) = e.out.last_mut().filter(|d| d.code == code::PLAN_SHORT_OF_BOTTOM && d.notes.is_empty())
+        {
+            let (is, meant) = (half.to_degrees(), 90.0 - half.to_degrees());
+            told.notes.push(format!(
+                "{} is the depth of the hole and the point of a drill of {} degrees: if its tip half angle of {} degrees was counted from the face, and not from the axis as the standard does, correct that instead",
+                gr_step::short(cut), gr_step::short(meant), gr_step::short(is)
+            ));
+        }
     }
 }
 

@@ -164,6 +164,11 @@ impl<'a> Emit<'a> {
     pub fn blocked(&self, a: [f64; 3], b: [f64; 3]) -> Option<f64> {
         self.stock.as_ref()?.blocks(self.upright()?, a, b)
     }
+    /// Whether material is known to stand higher than the tip, within a radius about its axis.
+    pub fn stands_under(&self, tip: [f64; 3], radius: f64) -> bool {
+        let top = self.stock.as_ref().filter(|_| self.axis[2] > 1.0 - 1e-9).and_then(|s| s.top([tip[0], tip[1]], radius));
+        top.is_some_and(|top| top > tip[2] + 1e-3)
+    }
     /// The same with what may stand close beside the way.
     fn may_be_blocked(&self, a: [f64; 3], b: [f64; 3]) -> Option<f64> {
         self.stock.as_ref()?.may_block(self.upright()?, a, b)

@@ -605,6 +605,14 @@ impl Tool {
     pub fn is_disc(&self) -> bool {
         self.is_one_of(&["T_SLOT_MILL", "WOODRUFF"])
     }
+    /// A drill or countersink with a point of less than 2 degrees to its axis: there is none.
+    pub fn is_needle(&self) -> bool {
+        self.is_one_of(&["DRILL", "COUNTERS", "SPOT"]) && self.tip_angle.is_some_and(|a| a < 2f64.to_radians())
+    }
+    /// It has no edges at its middle, as its kind says: of others the standard does not say it.
+    pub fn is_hollow(&self) -> bool {
+        self.is_one_of(&["FACEMILL", "SHOULDERMILL", "SIDE_MILL"])
+    }
     /// A cylinder, cone or ball that mills with its side and its face.
     pub fn mills(&self) -> bool {
         !self.is_pointed() && !self.is_disc() && !self.is_one_of(&["BORING", "DOVETAIL", "THREAD_MILL"])

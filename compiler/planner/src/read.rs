@@ -185,6 +185,10 @@ impl<'m> Reader<'m> {
             self.out.push(d);
             return None;
         };
+        for other in projects.iter().skip(1) {
+            self.say(code::PLAN_SECOND_PROJECT, *other, &[&title(*other), &title(project)]);
+            self.mark(&other.node("main_workplan").into_iter().collect::<Vec<_>>());
+        }
         for v in self.model.all("nc_variable") {
             self.variables.insert(v.string("its_name").into_owned(), v.real("initial_value"));
         }

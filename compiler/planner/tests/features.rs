@@ -571,3 +571,140 @@ fn countersinks_are_as_deep_as_their_cone_is_wide() {
         assert!(!beyond.is_empty() && beyond.iter().all(|m| m.starts_with("E0447")), "{beyond:?}");
     }
 }
+
+/// A step or an open pocket along the front of a block of 80 by 60, with a boss of 8 mm that stands `gap` from it.
+fn boss_at_the_edge(open: bool, gap: f64) -> Part {
+    let mut p = Part::new([80.0, 60.0, 20.0]);
+    let tool = p.tool("ENDMILL", 6.0, 0.0, None);
+    let op = p.mill(&Mill::new("BOTTOM_AND_SIDE_ROUGH_MILLING", tool, 4.0, 3.0));
+    let (place, at, size) = (p.place([40.0, 4.0 + gap, 20.0]), p.place([0.0, 0.0, -4.0]), p.length(8.0));
+    let (plane, circle) = (p.add(format!("PLANE('',#{at})")), p.add(format!("CIRCULAR_CLOSED_PROFILE($,#{size})")));
+    let boss = p.add(format!("BOSS('boss',$,(),#{place},#{plane},#{circle},$)"));
+    if open {
+        let wall = p.polyline(&[(70.0, 0.0), (70.0, 25.0), (10.0, 25.0), (10.0, 0.0)]);
+        let (wall, floor) = (p.add(format!("GENERAL_PROFILE($,#{wall})")), p.add("PLANAR_POCKET_BOTTOM_CONDITION()".into()));
+        p.machine("OPEN_POCKET", &[op], [0.0, 0.0, 20.0], Some(4.0), &format!(",(#{boss}),$,#{floor},$,$,#{wall},$"));
+    } else {
+        let (length, back) = (p.length(80.0), p.direction([-1.0, 0.0, 0.0]));
+        let course = p.add(format!("LINEAR_PATH($,#{length},#{back})"));
+        p.machine("STEP", &[op], [80.0, 25.0, 20.0], Some(4.0), &format!(",#{course},$,(#{boss})"));
+    }
+    p
+}
+
+#[test]
+fn a_tool_goes_round_a_boss_that_stands_near_an_open_side() {
+    for open in [true, false] {
+        for gap in [0.5, 1.0, 2.5] {
+            let (planned, out) = planned(&boss_at_the_edge(open, gap));
+            // Between boss and edge there is no room: it passes outside of the part.
+            let front = planned.program.steps().filter(|s| s.op.feeds()).map(|s| s.end.xyz()[1]).fold(0.0, f64::min);
+            assert!(front < gap - 3.0, "open {open}, gap {gap}: {front}");
+            let left: Vec<&str> = out.iter().filter(|d| d.code == code::PLAN_UNREACHABLE_CORNER).map(|d| d.message.as_str()).collect();
+            // The corners of the pocket alone.
+            let corners = 2.0 * 9.0 * (1.0 - std::f64::consts::FRAC_PI_4);
+            let wanted = format!("2 spots, {corners:.2}");
+            assert!(if open { left.len() == 1 && left[0].contains(&wanted) } else { left.is_empty() }, "{left:?}");
+        }
+    }
+}
+
+/// What two bosses leave between them where a tool of this radius does not fit.
+fn between(radius: f64, distance: f64, tool: f64) -> f64 {
+    let half = (distance / 2.0 / (radius + tool)).acos();
+    let height = ((radius + tool).powi(2) - distance * distance / 4.0).sqrt();
+    distance * height - 2.0 * half * radius * radius - (std::f64::consts::PI - 2.0 * half) * tool * tool
+}
+
+/// A face of 60 by 40 with bosses; more than walls is cut where the operation says it.
+fn face_with_bosses(at: &[[f64; 2]], strategy: &str, side: Option<f64>) -> Part {
+    let mut p = Part::new([60.0, 40.0, 20.0]);
+    let tool = p.tool("ENDMILL", 8.0, 0.0, None);
+    let bosses: Vec<String> = at
+        .iter()
+        .map(|q| {
+            let (place, low, size) = (p.place([q[0], q[1], 20.0]), p.place([0.0, 0.0, -4.0]), p.length(10.0));
+            let (plane, circle) = (p.add(format!("PLANE('',#{low})")), p.add(format!("CIRCULAR_CLOSED_PROFILE($,#{size})")));
+            format!("#{}", p.add(format!("BOSS('boss',$,(),#{place},#{plane},#{circle},$)")))
+        })
+        .collect();
+    let keyword = if side.is_some() { "BOTTOM_AND_SIDE_ROUGH_MILLING" } else { "PLANE_ROUGH_MILLING" };
+    let op = p.mill(&Mill::new(keyword, tool, 2.0, 5.0).strategy(strategy).leave(side.unwrap_or(0.0), 0.0));
+    let (length, along, width) = (p.length(60.0), p.direction([1.0, 0.0, 0.0]), p.number(40.0));
+    let (course, profile) = (p.add(format!("LINEAR_PATH($,#{length},#{along})")), p.add(format!("LINEAR_PROFILE($,#{width})")));
+    p.machine("PLANAR_FACE", &[op], [0.0, 0.0, 20.0], Some(4.0), &format!(",#{course},#{profile},$,({})", bosses.join(",")));
+    p
+}
+
+#[test]
+fn bosses_of_a_face_are_kept_and_what_stays_between_them_is_told() {
+    for strategy in ["BIDIRECTIONAL($,$,$,.LEFT.,$)", "CONTOUR_PARALLEL($,$,$,$)"] {
+        let (_, out) = planned(&face_with_bosses(&[[20.0, 20.0], [35.0, 20.0]], strategy, None));
+        let left: Vec<&str> = out.iter().filter(|d| d.code == code::PLAN_UNREACHABLE_CORNER).map(|d| d.message.as_str()).collect();
+        let wanted = format!("1 spots, {:.3}", between(5.0, 15.0, 4.0));
+        assert!(left.len() == 1 && left[0].contains(&wanted) && left[0].contains("X27.5000 Y20.0000"), "{left:?} {wanted}");
+        // Far enough from each other nothing is left.
+        let (_, out) = planned(&face_with_bosses(&[[20.0, 20.0], [39.0, 20.0]], strategy, None));
+        assert!(!out.iter().any(|d| d.code == code::PLAN_UNREACHABLE_CORNER));
+        let errors = refused(&face_with_bosses(&[[100.0, 20.0]], strategy, None));
+        assert!(errors.len() == 1 && errors[0].message.contains("BOSS: all of it lies outside"), "{errors:#?}");
+        // One beside the face, where the tool runs over the edge, is kept too.
+        let beside = planned(&face_with_bosses(&[[66.0, 20.0]], strategy, None)).0;
+        let near = beside.program.steps().filter(|s| s.op.feeds() && s.end.xyz()[2] < 19.0).map(|s| (s.end.xyz()[0] - 66.0).hypot(s.end.xyz()[1] - 20.0));
+        assert!(near.fold(f64::INFINITY, f64::min) > 9.0 - 1e-3, "{strategy}");
+        // What is to stay on its walls stays.
+        let (planned, _) = planned(&face_with_bosses(&[[30.0, 20.0]], strategy, Some(1.0)));
+        let nearest = |s: gr_ir::Step<'_>| if s.op.feeds() && s.end.xyz()[2] < 19.0 { (s.end.xyz()[0] - 30.0).hypot(s.end.xyz()[1] - 20.0) } else { f64::INFINITY };
+        let nearest = planned.program.steps().map(nearest).fold(f64::INFINITY, f64::min);
+        assert!((nearest - 10.0).abs() < 1e-3, "{strategy} {nearest}");
+    }
+}
+
+/// What the numbers of an approach or an allowance make impossible is told where they are written.
+#[test]
+fn impossible_approaches_and_allowances_are_told_at_their_numbers() {
+    let pocket = |approach: &str, side: f64| -> (Vec<Diagnostic>, String) {
+        let mut p = Part::new(BLOCK);
+        let tool = p.tool("ENDMILL", 6.0, 0.0, None);
+        let op = p.mill(&Mill::new("BOTTOM_AND_SIDE_ROUGH_MILLING", tool, 2.0, 3.0).approach(approach).leave(side, 0.0));
+        let (w, l) = (p.length(24.0), p.length(30.0));
+        let (profile, bottom) = (p.add(format!("RECTANGULAR_CLOSED_PROFILE($,#{w},#{l})")), p.add("PLANAR_POCKET_BOTTOM_CONDITION()".into()));
+        p.machine("CLOSED_POCKET", &[op], [30.0, 20.0, TOP], Some(4.0), &format!(",(),$,#{bottom},$,$,#{profile}"));
+        let text = p.text();
+        let (made, out) = plan(text.as_bytes(), FileId(0), &Options::default());
+        let errors: Vec<Diagnostic> = out.into_iter().filter(|d| d.severity == Severity::Error).collect();
+        assert_eq!(made.is_none(), !errors.is_empty());
+        (errors, text)
+    };
+    for (approach, side, at, words) in [
+        ("PLUNGE_RAMP($,0.)", 0.0, "0.)", "angle of #"),
+        ("PLUNGE_HELIX($,-2.,3.)", 0.0, "-2.", "radius of #"),
+        ("PLUNGE_HELIX($,2.,91.)", 0.0, "91.", "0.06 to 90 degrees"),
+        ("PLUNGE_ZIGZAG($,3.,0.)", 0.0, "0.)", "width of #"),
+        ("AP_RETRACT_TANGENT($,0.)", 0.0, "0.)", "radius of #"),
+        ("PLUNGE_RAMP($,3.)", 15.0, "15.", "with it there is no room for the tool of 6 mm"),
+        ("PLUNGE_RAMP($,3.)", -0.5, "-0.5", "zero or more"),
+    ] {
+        let (errors, text) = pocket(approach, side);
+        assert_eq!(errors.len(), 1, "{approach}: {errors:#?}");
+        assert_eq!(errors[0].code, code::PLAN_BAD_SIZE, "{approach}");
+        assert!(errors[0].message.contains(words), "{}", errors[0].message);
+        let start = errors[0].labels[0].span.start as usize;
+        assert!(text[start..].starts_with(at), "{approach}: {}", &text[start..start + 10]);
+    }
+    // A pocket too narrow for the tool itself is not the fault of its allowance.
+    assert!(pocket("PLUNGE_RAMP($,3.)", 0.2).0.is_empty());
+}
+
+/// Walls that go apart end in sharp corners out in the air: the tool comes past the mouth all the same.
+#[test]
+fn nothing_is_left_at_the_mouth_of_a_pocket_that_opens() {
+    let mut p = Part::new([80.0, 60.0, 20.0]);
+    let tool = p.tool("ENDMILL", 8.0, 0.0, None);
+    let op = p.mill(&Mill::new("BOTTOM_AND_SIDE_ROUGH_MILLING", tool, 4.0, 3.0));
+    let wall = p.polyline(&[(68.0, 0.0), (60.0, 22.0), (20.0, 22.0), (12.0, 0.0)]);
+    let (wall, floor) = (p.add(format!("GENERAL_PROFILE($,#{wall})")), p.add("PLANAR_POCKET_BOTTOM_CONDITION()".into()));
+    p.machine("OPEN_POCKET", &[op], [0.0, 0.0, 20.0], Some(4.0), &format!(",(),$,#{floor},$,$,#{wall},$"));
+    let left: Vec<String> = planned(&p).1.into_iter().filter(|d| d.code == code::PLAN_UNREACHABLE_CORNER).map(|d| d.message).collect();
+    assert!(left.len() == 1 && left[0].contains("2 spots"), "{left:?}");
+}

@@ -261,3 +261,44 @@ fn steps_that_no_workplan_has_are_told() {
     assert_eq!(orphans.len(), 1, "{out:?}");
     assert!(orphans[0].message.contains("#47"), "{}", orphans[0].message);
 }
+
+/// One project is run; what only another lists is not said to be in no workplan.
+#[test]
+fn a_second_project_is_told() {
+    let text = with("#58", "#80=PROJECT('second',#81,(),$,$,$);\n#81=WORKPLAN('other',(#47),$,#10,$);\n");
+    let (p, out) = read(&text);
+    assert_eq!((ids(&p), p.orphans.len()), (vec![58], 0));
+    let told: Vec<&Diagnostic> = out.iter().filter(|d| d.code == code::PLAN_SECOND_PROJECT).collect();
+    assert_eq!(told.len(), 1);
+    assert!(text[told[0].labels[0].span.start as usize..].starts_with("PROJECT('second'"));
+    assert!(told[0].message.starts_with("#80 PROJECT 'second' is not run: the file's plan is that of #"), "{}", told[0].message);
+}
+
+/// The point of a drill in radians, read in degrees, would be a needle that is drilled with its whole length.
+#[test]
+fn a_drill_with_a_point_in_radians_is_refused() {
+    // Without a depth of its own, and with speeds that fit the standard's units.
+    let text = HOLE.replace("11.819851171331011", "$").replace(",11.0,-3.5014087480216975,", ",$,-3.5,").replace("0.245", "0.002");
+    let text = text.replace(",11.0,-5.83568124670283,", ",$,-5.8,").replace("0.175", "0.002");
+    let errors = |units: Option<Units>| -> Vec<String> {
+        let (_, out) = plan(text.as_bytes(), FileId(0), &Options { units, ..Options::default() });
+        assert!(!out.iter().any(|d| d.code == code::PLAN_SHORT_OF_BOTTOM) || units == Some(Units::StepModeler));
+        out.into_iter().filter(|d| d.severity == Severity::Error).map(|d| format!("{} {}", d.code.def().code, d.message)).collect()
+    };
+    let open = errors(None);
+    assert!(open.len() == 1 && open[0].starts_with("E0485 ") && open[0].contains("degrees"), "{open:?}");
+    let said = errors(Some(Units::Iso));
+    assert!(said.len() == 2 && said.iter().all(|d| d.contains("it must be more than 2 degrees")), "{said:?}");
+    assert_eq!(errors(Some(Units::StepModeler)), Vec::<String>::new());
+}
+
+/// A depth that fits the other reading of a point's angle says so.
+#[test]
+fn a_point_counted_from_the_face_is_offered_as_a_reading() {
+    let (_, out) = plan(HOLE.as_bytes(), FileId(0), &modeler());
+    let told: Vec<&Diagnostic> = out.iter().filter(|d| d.code == code::PLAN_SHORT_OF_BOTTOM).collect();
+    assert!(told.len() == 1 && told[0].notes.iter().any(|n| n.contains("a drill of 70 degrees")), "{told:#?}");
+    let deeper = HOLE.replace("11.819851171331011", "11.9");
+    let (_, out) = plan(deeper.as_bytes(), FileId(0), &modeler());
+    assert!(out.iter().filter(|d| d.code == code::PLAN_SHORT_OF_BOTTOM).all(|d| d.notes.is_empty()));
+}

@@ -424,7 +424,8 @@ fn check(plan: &Plan) -> Result<&'static str, String> {
         // Only what is no room for the tool, or what the words name.
         let known = ["too large", "no room", "wide", "flat end", "shorter", "needs too many", "does not fit", "radius of", "leave no", "lies outside"];
         for d in j.out.iter().filter(|d| d.severity == Severity::Error) {
-            if d.code != code::PLAN_CANNOT_CUT || !known.iter().any(|k| d.message.contains(k)) {
+            let allowance = d.code == code::PLAN_BAD_SIZE && d.message.contains("there is no room");
+            if !allowance && (d.code != code::PLAN_CANNOT_CUT || !known.iter().any(|k| d.message.contains(k))) {
                 return Err(format!("refused: {}", d.message));
             }
         }

@@ -89,7 +89,7 @@ fn speeds_in_two_readings() {
     let file = shaft(TURNING, "CONST_SPINDLE_SPEED(500.)", PER_REV, "#19");
     let (none, out) = run(&file, None);
     assert!(none.is_none());
-    assert_eq!(errors(&out), ["E0485 two readings of this technology: 30000.0 rpm as the standard says, 500.0 rpm as STEP Modeler writes"]);
+    assert_eq!(errors(&out), ["E0485 two readings of these numbers: 30000.0 rpm as the standard says, 500.0 rpm as STEP Modeler writes"]);
     let (program, out) = run(&file, Some(Units::StepModeler));
     assert!(program.is_some_and(|p| p.contains("spindle-turn 0 ccw")));
     assert!(out.iter().any(|d| d.code.def().code == "E0426" && d.message.contains("M4")), "{out:#?}");

@@ -354,7 +354,13 @@ impl Out<'_> {
                 Origin::Resource => code::STEP_RESOURCE_RULE,
             };
             let args = [node.keyword().to_string(), rule.says.to_string(), format!("{}.{}", rule.entity, rule.label)];
-            self.list.push(Diagnostic::new(code, self.file, node.keyword_span(), &args));
+            let mut told = Diagnostic::new(code, self.file, node.keyword_span(), &args);
+            // By its letter the rule forbids a row alone, which the same entity lets its attributes say.
+            if rule.entity == "rectangular_pattern" && node.attr("number_of_rows").is_none_or(|v| v.integer().is_some_and(|rows| rows <= 1)) {
+                told.severity = Severity::Warning;
+                told = told.note("one row alone is read as it is meant; by the letter of the standard it is a GENERAL_PATTERN");
+            }
+            self.list.push(told);
         }
     }
 

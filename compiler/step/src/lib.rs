@@ -17,7 +17,7 @@ mod schema;
 pub use check::check;
 pub use diagnose::{diagnostics, diagnostics_of, diagnostics_while};
 pub use dialect::{Dialect, dialect};
-pub use lint::{lint, short};
+pub use lint::{THREAD_OVER_CORE, lint, short};
 pub use model::{Model, Node, Val};
 pub use rules::{Decided, Origin, RULES, Rule, broken, rules_of_entity};
 pub use schema::{Attribute, Edition, Entity, EntityId, Name, Schema, Type, schema};

@@ -9,6 +9,9 @@ use gr_text::Span;
 
 use crate::model::{Model, Node, Val};
 
+/// How many times wider than its core hole a thread may be: M1 with 1.34 is the widest.
+pub const THREAD_OVER_CORE: f64 = 1.4;
+
 /// A finding of [`lint`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Finding {
@@ -368,12 +371,6 @@ impl<'m> Lints<'m, '_> {
             {
                 self.add(code::STEP_AXIAL_DEPTH, op, v.span(), vec![short(depth), short(edge)]);
             }
-            let body = tool.and_then(|t| t.node("its_tool_body")).filter(|b| b.is_a("facemill"));
-            if let Some(body) = body
-                && op.node("approach").is_some_and(|a| a.is_a("plunge_toolaxis"))
-            {
-                self.once(code::STEP_FACEMILL_PLUNGE, body, body.keyword_span(), vec![op.id().to_string()]);
-            }
         }
         let unused: Vec<Node<'m>> = self.model.all("milling_technology").filter(|t| !seen.contains(&t.index())).collect();
         for t in unused {
@@ -495,12 +492,15 @@ impl<'m> Lints<'m, '_> {
         };
         // A reamer or drill may use the hole's tolerance.
         let slack = feature.node("diameter").and_then(|t| t.node("implicit_tolerance")).and_then(|t| t.real("upper_limit"));
+        // The thread of a tap goes into the wall of its core hole: no thread is deeper than this.
+        let wide = room.unwrap_or(0.0);
+        let room = room.map(|room| if op.is_a("tapping") || op.is_a("thread_drilling") { room * THREAD_OVER_CORE } else { room });
         if let Some(room) = room
             && room > 0.0
             && d > room + slack.unwrap_or(0.0) + 1e-9
         {
             let v = op.attr("its_tool").map_or(op.keyword_span(), Val::span);
-            let args = vec![short(d), feature.keyword().into(), short(room), feature.id().to_string()];
+            let args = vec![short(d), feature.keyword().into(), short(wide), feature.id().to_string()];
             if let Some(f) = self.add(code::STEP_TOOL_TOO_LARGE, op, v, args) {
                 f.labels.push((feature.keyword_span(), "the feature".into()));
             }

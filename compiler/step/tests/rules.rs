@@ -68,6 +68,21 @@ fn every_rule_has_a_passing_and_a_failing_file() {
     assert!(wrong.is_empty(), "{} of {}:\n{}", wrong.len(), RULES.len(), wrong.join("\n"));
 }
 
+/// What the letter of a rule forbids and every reader understands does not stop anybody.
+#[test]
+fn a_pattern_of_one_row_is_a_warning() {
+    let (common, examples) = all();
+    let e = examples.iter().find(|e| e.rule == "rectangular_pattern.WR1").expect("its example");
+    let said = |text: &str| -> Vec<gr_spec::Severity> {
+        let all = diagnostics(&file(&format!("{text}\n{common}")));
+        all.into_iter().filter(|d| d.message.starts_with("rule rectangular_pattern.WR1 of the standard asks that")).map(|d| d.severity).collect()
+    };
+    assert_eq!(said(&e.broken), [gr_spec::Severity::Warning]);
+    assert_eq!(said(&e.broken.replace(",1,3,#271,#206,", ",$,3,$,$,")), [gr_spec::Severity::Warning]);
+    assert_eq!(said(&e.holds.replace(",2,3,#271,#206,", ",2,3,$,$,")), [gr_spec::Severity::Error]);
+    assert_eq!(said(&e.holds), []);
+}
+
 #[test]
 fn every_rule_of_the_table_is_there() {
     let mut missing = Vec::new();

@@ -24,5 +24,5 @@ fn pocket(bencher: divan::Bencher<'_, '_>, strategy: &Strategy) {
 #[divan::bench]
 fn left_over(bencher: divan::Bencher<'_, '_>) {
     let region = part();
-    bencher.bench(|| residuals(&region, 5.0));
+    bencher.bench(|| residuals(&region, &[], 5.0));
 }

@@ -19,25 +19,28 @@ pub struct Residual {
     pub needs_radius: f64,
 }
 
-/// What a tool of this radius leaves in a region, largest first. Spots below 1e-4 mm² are left out.
-pub fn residuals(region: &Region, radius: f64) -> Result<Vec<Residual>, Error> {
+/// What a tool of this radius leaves in a region, largest first. Spots below 1e-4 mm² are left out, and those in the
+/// air: the part of the region that lets the tool pass where there is nothing to be cut.
+pub fn residuals(region: &Region, air: &[Region], radius: f64) -> Result<Vec<Residual>, Error> {
     let r = positive(radius, "tool radius")?;
-    let mut out: Vec<Residual> = spots(region, r)?.iter().map(|s| described(region, s, r)).collect();
+    let mut out: Vec<Residual> = spots(region, air, r)?.iter().map(|s| described(region, air, s, r)).collect();
     out.retain(|s| s.area > 1e-4);
     out.sort_by(|a, b| b.area.total_cmp(&a.area).then(a.at.x.total_cmp(&b.at.x)).then(a.at.y.total_cmp(&b.at.y)));
     Ok(out)
 }
 
-fn spots(region: &Region, r: f64) -> Result<Vec<Region>, Error> {
+fn spots(region: &Region, air: &[Region], r: f64) -> Result<Vec<Region>, Error> {
     let whole = core::slice::from_ref(region);
     let room = places(region, r)?;
-    if room.is_empty() {
+    if room.is_empty() && air.is_empty() {
         return Ok(vec![region.clone()]);
     }
-    difference(whole, &dilate(&room, r)?, HAIR)
+    let mut reached = if room.is_empty() { Vec::new() } else { dilate(&room, r)? };
+    reached.extend_from_slice(air);
+    difference(whole, &reached, HAIR)
 }
 
-fn described(region: &Region, spot: &Region, r: f64) -> Residual {
+fn described(region: &Region, air: &[Region], spot: &Region, r: f64) -> Residual {
     let area = spot.area() + HAIR * spot.loops().map(Path2::length).sum::<f64>();
     let near = spot.bounds().grown(4.0 * HAIR);
     let inside = |p: P2| near.dist(p) <= 0.0 && (spot.contains(p) || spot.dist(p) < 20.0 * HAIR);
@@ -62,7 +65,7 @@ fn described(region: &Region, spot: &Region, r: f64) -> Residual {
     }
     let at = at.unwrap_or_else(|| middle(spot));
     if needs >= r {
-        needs = neck(region, spot, r);
+        needs = neck(region, air, spot, r);
     }
     Residual { at, area, needs_radius: needs }
 }
@@ -74,11 +77,11 @@ fn middle(spot: &Region) -> P2 {
 }
 
 /// The tool that just passes: found by halving.
-fn neck(region: &Region, spot: &Region, r: f64) -> f64 {
+fn neck(region: &Region, air: &[Region], spot: &Region, r: f64) -> f64 {
     let (mut lo, mut hi) = (0.0, r);
     for _ in 0..16 {
         let mid = (lo + hi) * 0.5;
-        let stays = spots(region, mid.max(1e-5)).is_ok_and(|left| {
+        let stays = spots(region, air, mid.max(1e-5)).is_ok_and(|left| {
             left.iter().any(|s| s.bounds().overlaps(&spot.bounds()) && s.area() > 1e-6)
         });
         if stays { hi = mid } else { lo = mid }

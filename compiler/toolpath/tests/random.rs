@@ -113,7 +113,7 @@ proptest! {
             return Ok(());
         }
         let Ok(plan) = clear(&region, &Clear::new(r, r, gr_toolpath::Strategy::ContourParallel)) else { return Ok(()) };
-        let told: f64 = residuals(&region, r).unwrap().iter().map(|s| s.area).sum();
+        let told: f64 = residuals(&region, &[], r).unwrap().iter().map(|s| s.area).sum();
         let moves = motion(&plan.passes, &Depth::new(0.0, -1.0, 1.0), &Entry::default(), Some(&region), r).unwrap();
         let mut judge = Judge::new(&region, r + 1.0, 0.1);
         judge.run(&moves, r, -1.0, 0.0, false);
@@ -137,7 +137,7 @@ proptest! {
         let _ = offset_open(&path, r);
         let _ = face(&path, &[], &Face::new(r, step));
         if let Ok(region) = Region::new(path, vec![]) {
-            let _ = residuals(&region, r);
+            let _ = residuals(&region, &[], r);
             if let Ok(plan) = clear(&region, &Clear::new(r, step, strategy)) {
                 let _ = motion(&plan.passes, &Depth::new(0.0, -r, step), &Entry::default(), Some(&region), r);
             }

@@ -141,7 +141,7 @@ fn offsets_are_exact() {
 #[test]
 fn sharp_corners_stay_and_are_told() {
     let region = Region::new(rect(50.0, 30.0, 0.0), vec![]).unwrap();
-    let left = residuals(&region, 5.0).unwrap();
+    let left = residuals(&region, &[], 5.0).unwrap();
     assert_eq!(left.len(), 4);
     for spot in &left {
         let expected = 25.0 * (1.0 - std::f64::consts::FRAC_PI_4);
@@ -150,12 +150,12 @@ fn sharp_corners_stay_and_are_told() {
         assert_eq!(spot.needs_radius, 0.0);
     }
     let region = Region::new(rect(50.0, 30.0, 3.0), vec![]).unwrap();
-    let left = residuals(&region, 5.0).unwrap();
+    let left = residuals(&region, &[], 5.0).unwrap();
     assert_eq!(left.len(), 4);
     assert!((left[0].area - (1.0 - std::f64::consts::FRAC_PI_4) * 16.0).abs() < 0.01, "{left:?}");
     assert!((left[0].needs_radius - 3.0).abs() < 1e-6);
-    assert!(residuals(&region, 3.0).unwrap().is_empty());
-    assert!(residuals(&two_islands(), 4.0).unwrap().is_empty());
+    assert!(residuals(&region, &[], 3.0).unwrap().is_empty());
+    assert!(residuals(&two_islands(), &[], 4.0).unwrap().is_empty());
 }
 
 #[test]

@@ -90,6 +90,8 @@ struct Area {
     gain: f64,
     /// Levels without islands begin inside the outline.
     open: bool,
+    /// What of the outline only lets the tool pass open sides.
+    air: Vec<Region>,
     floor: Floor,
     /// The edge of the tool that goes down to the floor, and what it may leave between two rings on it.
     edge: f64,
@@ -267,6 +269,10 @@ fn rounded_open(sharp: &Path2, radius: f64) -> Done<Path2> {
     Ok(if lost <= 1e-6 * radius.abs() { sharp.clone() } else { line })
 }
 
+fn quad(corners: [P2; 4]) -> Done<Region> {
+    Region::new(Path2::polyline(&corners, true).map_err(words)?, Vec::new()).map_err(words)
+}
+
 fn no_room(radius: f64) -> String {
     format!("its orthogonal_radius of {radius} mm, for which its outline has no room")
 }
@@ -341,18 +347,22 @@ impl Job<'_> {
             Shape::OpenPocket { boundary, bosses, slope, bottom: floor, planar_radius, orthogonal_radius } => {
                 bottom(floor, *planar_radius)?;
                 let lean = self.slope(*slope)?;
-                let mut a = plain(self.opened(boundary, *orthogonal_radius, self.depth * libm::tan(lean))?)?;
-                a.islands = self.islands(bosses)?;
-                (a.slope, a.open) = (lean, true);
-                a.fillet = self.fillet(planar_radius.unwrap_or(0.0));
+                let islands = self.islands(bosses)?;
+                let fillet = self.fillet(planar_radius.unwrap_or(0.0));
+                let (outline, air) = self.opened(boundary, *orthogonal_radius, self.depth * libm::tan(lean) + fillet, &islands)?;
+                let mut a = plain(outline)?;
+                (a.islands, a.air) = (islands, vec![air]);
+                (a.slope, a.open, a.fillet) = (lean, true, fillet);
                 a
             }
             Shape::Step { start, length, direction, wall, radius, bosses } => {
                 let lean = self.slope(*wall)?;
-                let mut a = plain(self.step_outline(*start, *length, *direction, self.depth * libm::tan(lean))?)?;
-                a.islands = self.islands(bosses)?;
-                (a.slope, a.open) = (lean, true);
-                a.fillet = self.fillet(*radius);
+                let islands = self.islands(bosses)?;
+                let fillet = self.fillet(*radius);
+                let (outline, air) = self.step_outline(*start, *length, *direction, self.depth * libm::tan(lean) + fillet, &islands)?;
+                let mut a = plain(outline)?;
+                (a.islands, a.air) = (islands, air);
+                (a.slope, a.open, a.fillet) = (lean, true, fillet);
                 a
             }
             Shape::Hole { diameter, final_diameter, bottom } => {
@@ -392,7 +402,7 @@ impl Job<'_> {
         // Rings of a round edge as near as their scallops allow, of a flat one as its passes.
         let scallop = 2.0 * libm::sqrt((self.tolerance * (2.0 * self.edge - self.tolerance)).max(0.0));
         let ring = (scallop + 2.0 * (self.radius - self.edge)).min(self.coarse);
-        Area { outline, islands, slope: 0.0, fillet: 0.0, depth: self.depth, gain: 0.0, open, floor: Floor::Flat, edge: self.edge, ring }
+        Area { outline, islands, slope: 0.0, fillet: 0.0, depth: self.depth, gain: 0.0, open, air: Vec::new(), floor: Floor::Flat, edge: self.edge, ring }
     }
 
     fn pocket_outline(&self, boundary: &Closed, corner: Option<f64>) -> Done<Path2> {
@@ -412,8 +422,19 @@ impl Job<'_> {
         }
     }
 
-    /// An open boundary closed over its mouth, out in the air far enough for the tool's centre to pass the mouth.
-    fn opened(&self, boundary: &Contour, corner: Option<f64>, lean: f64) -> Done<Path2> {
+    /// How far outlines go on past an open side, so that the tool's centre passes it, and the whole tool where an
+    /// island stands so near to it that the tool does not fit between. `at` lies on that side, `out` is the way out.
+    fn past(&self, at: P2, out: P2, lean: f64, islands: &[Island]) -> f64 {
+        let reach = self.radius + self.m.allowance_side;
+        let near = islands.iter().any(|i| {
+            let foot = i.path.sampled(self.radius / 4.0).into_iter().map(|p| (p - at).dot(out)).fold(f64::NEG_INFINITY, f64::max);
+            foot + self.depth * libm::tan(i.slope) > -2.0 * reach
+        });
+        lean + RUN_OUT + if near { 2.0 * reach } else { reach }
+    }
+
+    /// An open boundary closed over its mouth, out in the air far enough for the tool to pass the mouth, and that air.
+    fn opened(&self, boundary: &Contour, corner: Option<f64>, lean: f64, islands: &[Island]) -> Done<(Path2, Region)> {
         let mut line = path(boundary)?;
         if line.is_closed() {
             return Err("its open boundary is closed".into());
@@ -429,27 +450,35 @@ impl Job<'_> {
         if let Some(r) = corner.filter(|r| *r > 0.0) {
             line = rounded_open(&line, if area > 0.0 { r } else { -r })?;
         }
-        let far = self.radius + self.m.allowance_side + RUN_OUT + lean;
         // Walls that go apart are prolonged, so that nothing is left beside the mouth.
-        let prolonged = |t: P2, sideways: P2| {
-            let (along, aside) = (t.dot(out), t.dot(sideways));
-            if along > 0.2 && aside > 0.0 { out + sideways * (aside / along) } else { out }
-        };
         let u = mouth.unit();
-        let (p, q) = (a + prolonged(-line.start_tangent(), -u) * far, b + prolonged(line.end_tangent(), u) * far);
+        let slant = |t: P2, sideways: P2| Some((t.dot(sideways), t.dot(out))).filter(|(aside, along)| *along > 0.2 && *aside > 0.0);
+        let (at_a, at_b) = (slant(-line.start_tangent(), -u), slant(line.end_tangent(), u));
+        // The sharp corners that they end in keep the tool off: further out the more they lean.
+        let steepest = [at_a, at_b].into_iter().flatten().fold(0.0, |most: f64, (aside, _)| most.max(aside));
+        let reach = self.radius + self.m.allowance_side;
+        let far = self.past(a, out, lean, islands).max(reach * (1.01 + steepest) + lean);
+        let prolonged = |slant: Option<(f64, f64)>, sideways: P2| slant.map_or(out, |(aside, along)| out + sideways * (aside / along));
+        let (p, q) = (a + prolonged(at_a, -u) * far, b + prolonged(at_b, u) * far);
         let rest = [tp::Seg::Line { a: b, b: q }, tp::Seg::Line { a: q, b: p }, tp::Seg::Line { a: p, b: a }];
-        tp::Path2::from_segs(line.segs().iter().copied().chain(rest), true).map_err(words)
+        let outline = tp::Path2::from_segs(line.segs().iter().copied().chain(rest), true).map_err(words)?;
+        Ok((outline, quad([a, b, q * 2.0 - b, p * 2.0 - a])?))
     }
 
     /// From the edge to the nearer side of the raw part: how wide a step is does not stand in the feature.
-    fn step_outline(&self, start: [f64; 2], length: f64, direction: [f64; 2], lean: f64) -> Done<Path2> {
+    fn step_outline(&self, start: [f64; 2], length: f64, direction: [f64; 2], lean: f64, islands: &[Island]) -> Done<(Path2, Vec<Region>)> {
         let (u, a) = (P2::new(direction[0], direction[1]), P2::new(start[0], start[1]));
         let (side, width) = self.open_side(start, direction)?;
+        let (b, edge) = (a + u * length, side * width);
         // The tool's centre goes as far as the side of the raw part.
-        let out = self.radius + self.m.allowance_side + RUN_OUT + lean;
-        let (p, q) = (a - u * out, a + u * (length + out));
-        let far = side * (width + out);
-        Path2::polyline(&[p, q, q + far, p + far], true).map_err(words)
+        let (before, after) = (u * self.past(a, u * -1.0, lean, islands), u * self.past(b, u, lean, islands));
+        let beside = side * self.past(a + edge, side, lean, islands);
+        let (p, q) = (a - before, b + after);
+        let far = edge + beside;
+        let outline = Path2::polyline(&[p, q, q + far, p + far], true).map_err(words)?;
+        let (wide, long) = (side * (2.0 * width + far.norm()), u * (before.norm() + after.norm()));
+        let air = [[a, a + wide, a + wide - long, a - long], [b, b + long, b + wide + long, b + wide], [p + edge, q + edge, q + wide, p + wide]];
+        Ok((outline, air.into_iter().map(quad).collect::<Done<_>>()?))
     }
 
     /// The side of a step's edge on which it is cut, and how far it is from there to the side of the raw part.
@@ -511,23 +540,24 @@ impl Job<'_> {
                 e.say(gr_text::code::PLAN_AIR, self.step.origin, &[&self.name(), &why]);
             }
         }
-        self.bosses_within(e, &area)?;
+        if let Shape::Pocket { bosses, .. } | Shape::OpenPocket { bosses, .. } | Shape::Step { bosses, .. } = &self.feature.shape {
+            self.bosses_within(e, bosses, &area.outline)?;
+        }
         let moves = self.emptied(e, &area)?;
-        if let Shape::Pocket { .. } | Shape::Hole { .. } = self.feature.shape {
-            // A floor that is not flat leaves a disk further down: corners are those of the walls.
-            let y = match (area.floor, &self.feature.shape) {
-                // A rounded foot or a ball of a floor draws the outline in: corners are those above it.
-                (Floor::Flat, Shape::Hole { bottom: HoleBottom::Radiused(r) | HoleBottom::Spherical(r), .. }) => (self.depth - r).max(0.0),
-                (Floor::Flat, _) => self.depth.min(self.bottom),
-                _ => 0.0,
-            };
-            if let Some(region) = area.at(y)?.first() {
-                self.rest(e, region, |_| true);
-            }
-        } else if let Shape::OpenPocket { boundary, .. } = &self.feature.shape {
-            let wall = path(boundary)?;
-            let (a, b) = (wall.start(), wall.end());
-            self.rest(e, &area.outline, |p| wall.dist(p) < self.radius && p.dist(a) > 1e-6 && p.dist(b) > 1e-6);
+        // A floor that is not flat leaves a disk further down: corners are those of the walls.
+        let y = match (area.floor, &self.feature.shape) {
+            // A rounded foot or a ball of a floor draws the outline in: corners are those above it.
+            (Floor::Flat, Shape::Hole { bottom: HoleBottom::Radiused(r) | HoleBottom::Spherical(r), .. }) => (self.depth - r).max(0.0),
+            (Floor::Flat, _) => self.depth.min(self.bottom),
+            _ => 0.0,
+        };
+        // Where walls of an open pocket go on in the air, corners are not its own.
+        let ends = match &self.feature.shape {
+            Shape::OpenPocket { boundary, .. } => vec![path(boundary)?.start(), path(boundary)?.end()],
+            _ => Vec::new(),
+        };
+        if let Some(region) = area.at(y)?.first() {
+            self.rest(e, region, &area.air, |p| ends.iter().all(|end| p.dist(*end) > 1e-6));
         }
         if let Some((_, deep)) = floor_depth(self.feature, self.radius, self.edge, self.m.allowance_bottom)
             && self.bottom + self.m.allowance_bottom < deep - 1e-6
@@ -556,12 +586,11 @@ impl Job<'_> {
     }
 
     /// A boss that stands nowhere in the area it is a boss of: what it should keep would be cut away.
-    fn bosses_within(&self, e: &mut Emit<'_>, area: &Area) -> Done<()> {
-        let (Shape::Pocket { bosses, .. } | Shape::OpenPocket { bosses, .. } | Shape::Step { bosses, .. }) = &self.feature.shape else { return Ok(()) };
+    fn bosses_within(&self, e: &mut Emit<'_>, bosses: &[Boss], outline: &Region) -> Done<()> {
         for boss in bosses {
             let foot = path(&boss.boundary)?;
-            let within = foot.sampled(self.radius / 4.0).iter().any(|p| area.outline.contains(*p));
-            if !within && !foot.contains(area.outline.outer().start()) {
+            let within = foot.sampled(self.radius / 4.0).iter().any(|p| outline.contains(*p));
+            if !within && !foot.contains(outline.outer().start()) {
                 let why = format!("all of it lies outside {}; the placements of both are relative to the workpiece, not that of the boss to what it stands in", self.name());
                 e.say(gr_text::code::PLAN_CANNOT_CUT, boss.origin, &[&format!("#{} BOSS", boss.origin.id), &why]);
             }
@@ -690,11 +719,24 @@ impl Job<'_> {
         };
         let overrun = self.step.operation.overcut.filter(|v| *v >= 0.0).unwrap_or(RUN_OUT);
         self.inside_part(e, &outline);
+        // Beside the face a boss keeps the tool off where it runs over the edge.
+        let reach = tp::grow(std::slice::from_ref(&outline), 2.0 * self.radius + overrun).map_err(words)?;
+        self.bosses_within(e, bosses, reach.first().ok_or("its boundary encloses nothing")?)?;
         let lines = self.m.strategy.as_ref().is_none_or(|s| matches!(s.keyword.as_str(), "UNIDIRECTIONAL" | "BIDIRECTIONAL"));
         if !lines || bosses.iter().any(|b| b.top > 1e-9 || b.slope != 0.0) {
             return self.face_as_area(e, &outline, bosses, overrun);
         }
-        let solid: Done<Vec<Path2>> = bosses.iter().map(|b| path(&b.boundary)).collect();
+        let solid = bosses.iter().map(|b| path(&b.boundary)).collect::<Done<Vec<_>>>()?;
+        // Its lines end in the air, and it goes round bosses wherever they stand.
+        let (area, air) = self.face_room(&outline, bosses, 2.0 * self.radius + RUN_OUT)?;
+        if let Some(region) = area.at(self.bottom)?.first().filter(|_| !bosses.is_empty()) {
+            self.rest(e, region, &[air], |_| true);
+        }
+        let solid = if solid.is_empty() || self.m.allowance_side == 0.0 {
+            solid
+        } else {
+            tp::grow(&solid, self.m.allowance_side).map_err(words)?.iter().map(|r| r.outer().clone()).collect()
+        };
         let mut what = tp::Face::new(self.radius, self.by);
         let feed = self.m.strategy.as_ref().and_then(|s| s.feed).unwrap_or(*direction);
         what.angle = libm::atan2(feed[1], feed[0]);
@@ -703,7 +745,7 @@ impl Job<'_> {
             what.bidirectional = s.keyword != "UNIDIRECTIONAL";
             what.step_left = s.step_left.unwrap_or(true);
         }
-        let passes = self.connected(tp::face(&outline, &solid?, &what).map_err(words)?);
+        let passes = self.connected(tp::face(&outline, &solid, &what).map_err(words)?);
         tp::motion(&passes, &self.heights(0.0, self.bottom), &self.entry(true)?, None, self.radius).map_err(words)
     }
 
@@ -718,12 +760,22 @@ impl Job<'_> {
 
     /// A plane by a strategy that follows its edge: the tool's centre goes over all of it, and past it by the overrun.
     fn face_as_area(&self, e: &mut Emit<'_>, outline: &Path2, bosses: &[Boss], overrun: f64) -> Done<Moves> {
-        let grown = tp::grow(std::slice::from_ref(outline), self.radius + self.m.allowance_side + overrun).map_err(words)?;
-        let outer = grown.first().ok_or("its boundary encloses nothing")?.outer().clone();
-        let outline = Region::new(outer, Vec::new()).map_err(words)?;
-        let islands = self.islands(bosses)?;
-        let area = self.plain(outline, islands, true);
+        let (area, air) = self.face_room(outline, bosses, self.radius + overrun)?;
+        if let Some(region) = area.at(self.bottom)?.first().filter(|_| !bosses.is_empty()) {
+            self.rest(e, region, &[air], |_| true);
+        }
         self.emptied(e, &area)
+    }
+
+    /// A plane with all round it as far as the tool may go, and what of that is in the air.
+    fn face_room(&self, outline: &Path2, bosses: &[Boss], beyond: f64) -> Done<(Area, Region)> {
+        let around = |by: f64| -> Done<Path2> {
+            let grown = tp::grow(std::slice::from_ref(outline), by + self.m.allowance_side).map_err(words)?;
+            Ok(grown.first().ok_or("its boundary encloses nothing")?.outer().clone())
+        };
+        let outer = Region::new(around(beyond)?, Vec::new()).map_err(words)?;
+        let air = Region::new(around(beyond + RUN_OUT)?, vec![outline.clone()]).map_err(words)?;
+        Ok((self.plain(outer, self.islands(bosses)?, true), air))
     }
 
     /// Round about a boss or a profile.
@@ -755,7 +807,7 @@ impl Job<'_> {
             let area = self.plain(outline, islands, true);
             let moves = self.emptied(e, &area)?;
             if let Some(region) = area.at(self.bottom)?.first() {
-                self.rest(e, region, |p| line.dist(p) < 2.0 * self.radius);
+                self.rest(e, region, &[], |p| line.dist(p) < 2.0 * self.radius);
             }
             if slope > 0.0 && !self.m.finish {
                 self.leaves(e, &format!("stairs of up to {:.4} mm on its walls; a finishing workingstep takes them", self.stairs(&area)));

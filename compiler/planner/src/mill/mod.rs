@@ -85,16 +85,12 @@ pub(crate) fn mill(e: &mut Emit<'_>, step: &Workingstep, m: &Milling, feature: &
         return;
     }
     let Some(job) = job(e, step, m, feature, given) else { return };
-    let planned = match &feature.shape {
-        Shape::Face { .. } => job.face(e),
-        Shape::Pocket { .. } | Shape::OpenPocket { .. } | Shape::Hole { .. } | Shape::Step { .. } => job.area(e),
-        Shape::Outside { .. } | Shape::Boss(_) => job.around(e),
-        Shape::Slot { path, section, ends } => job.slot(e, path, section, ends),
-        Shape::Toolpath => Err("a tool path feature needs an explicit tool path".into()),
-        _ => Err(String::new()),
-    };
-    let moves = match planned {
+    let moves = match job.moves(e) {
         Ok(moves) => moves,
+        Err(_) if m.allowance_side > 0.0 && job.has_room_without_allowance(e) => {
+            let must = format!("less: with it there is no room for the tool of {} mm in #{} {}", step.operation.tool.diameter, feature.origin.id, feature.keyword);
+            return bad_size(e, step, "allowance_side", m.allowance_side, &must);
+        }
         Err(why) if why.is_empty() => {
             let what = format!("{} with {}", feature.keyword, step.operation.keyword);
             return e.say(code::PLAN_NOT_LOWERED, feature.origin, &[&what, ""]);
@@ -134,13 +130,12 @@ fn job<'a>(e: &mut Emit<'_>, step: &'a Workingstep, m: &'a Milling, feature: &'a
         e.say(code::PLAN_BAD_SIZE, feature.origin, &[&feature.keyword, "depth", &depth.to_string(), "above zero"]);
         return None;
     }
-    let bad = |e: &mut Emit<'_>, what: &str, v: f64, must: &str| {
-        e.say(code::PLAN_BAD_SIZE, o.origin, &[&o.keyword, what, &v.to_string(), must]);
-    };
-    if m.allowance_side < 0.0 || m.allowance_bottom < 0.0 || m.allowance_bottom >= depth {
-        let side = m.allowance_side < 0.0;
-        let (what, v) = if side { ("allowance_side", m.allowance_side) } else { ("allowance_bottom", m.allowance_bottom) };
-        bad(e, what, v, if side { "zero or more" } else { "between zero and the depth" });
+    if m.allowance_side < 0.0 {
+        bad_size(e, step, "allowance_side", m.allowance_side, "zero or more");
+        return None;
+    }
+    if m.allowance_bottom < 0.0 || m.allowance_bottom >= depth {
+        bad_size(e, step, "allowance_bottom", m.allowance_bottom, "between zero and the depth");
         return None;
     }
     let deepest = match floor {
@@ -158,7 +153,7 @@ fn job<'a>(e: &mut Emit<'_>, step: &'a Workingstep, m: &'a Milling, feature: &'a
         Some(a) if a > 0.0 => a,
         None => depth,
         Some(a) => {
-            bad(e, "axial_cutting_depth", a, "above zero");
+            bad_size(e, step, "axial_cutting_depth", a, "above zero");
             return None;
         }
     };
@@ -214,12 +209,19 @@ fn job<'a>(e: &mut Emit<'_>, step: &'a Workingstep, m: &'a Milling, feature: &'a
     Some(Job { step, m, feature, radius, edge, clean, by, coarse, axial, depth, bottom, retract, tolerance: given.tolerance, tells: given.tells, two_axes: o.two_axes() })
 }
 
+/// A number of the operation that no path can be made with, told where it is written.
+fn bad_size(e: &mut Emit<'_>, step: &Workingstep, what: &str, v: f64, must: &str) {
+    let o = &step.operation;
+    let at = e.attribute(o.origin, &[what]);
+    e.say(code::PLAN_BAD_SIZE, at, &[&o.keyword, what, &v.to_string(), must]);
+}
+
 /// From the radial depth and the overlap: the smaller of the two.
 fn stepover(e: &mut Emit<'_>, step: &Workingstep, m: &Milling, written: Overlap) -> Option<f64> {
     let d = step.operation.tool.diameter;
     let o = &step.operation;
     if let Some(r) = m.radial.filter(|r| !(*r > 0.0)) {
-        e.say(code::PLAN_BAD_SIZE, o.origin, &[&o.keyword, "radial_cutting_depth", &r.to_string(), "above zero"]);
+        bad_size(e, step, "radial_cutting_depth", r, "above zero");
         return None;
     }
     if let Some(r) = m.radial.filter(|r| *r > d + 1e-9) {
@@ -244,7 +246,7 @@ fn stepover(e: &mut Emit<'_>, step: &Workingstep, m: &Milling, written: Overlap)
         by = by.min(d * (1.0 - ratio));
     }
     if by < d * 1e-3 {
-        e.say(code::PLAN_BAD_SIZE, step.operation.origin, &[&step.operation.keyword, "radial_cutting_depth", &by.to_string(), "more than a thousandth of the tool"]);
+        bad_size(e, step, "radial_cutting_depth", by, "more than a thousandth of the tool");
         return None;
     }
     Some(by)
@@ -269,6 +271,24 @@ fn path(c: &Contour) -> Done<Path2> {
 }
 
 impl Job<'_> {
+    fn moves(&self, e: &mut Emit<'_>) -> Done<Moves> {
+        match &self.feature.shape {
+            Shape::Face { .. } => self.face(e),
+            Shape::Pocket { .. } | Shape::OpenPocket { .. } | Shape::Hole { .. } | Shape::Step { .. } => self.area(e),
+            Shape::Outside { .. } | Shape::Boss(_) => self.around(e),
+            Shape::Slot { path, section, ends } => self.slot(e, path, section, ends),
+            Shape::Toolpath => Err("a tool path feature needs an explicit tool path".into()),
+            _ => Err(String::new()),
+        }
+    }
+    /// Whether nothing but the stock left on walls keeps the tool out.
+    fn has_room_without_allowance(&self, e: &mut Emit<'_>) -> bool {
+        let m = Milling { allowance_side: 0.0, ..self.m.clone() };
+        let said = e.out.len();
+        let fits = Job { m: &m, ..*self }.moves(e).is_ok();
+        e.out.truncate(said);
+        fits
+    }
     fn strategy(&self) -> Done<tp::Strategy> {
         let Some(s) = &self.m.strategy else { return Ok(tp::Strategy::ContourParallel) };
         let angle = s.feed.map_or(0.0, |f| libm::atan2(f[1], f[0]));
@@ -428,8 +448,8 @@ impl Job<'_> {
             e.say(code::PLAN_UNREACHABLE_CORNER, self.step.operation.origin, &[&tool, &format!("{:.4}", self.radius), &self.name(), text]);
         }
     }
-    /// Spots of an outline the tool does not reach; `of` says which belong to the feature.
-    fn rest(&self, e: &mut Emit<'_>, region: &tp::Region, of: impl Fn(P2) -> bool) {
+    /// Spots of an outline the tool does not reach, but for those in the air; `of` says which belong to the feature.
+    fn rest(&self, e: &mut Emit<'_>, region: &tp::Region, air: &[tp::Region], of: impl Fn(P2) -> bool) {
         if !self.tells {
             return;
         }
@@ -438,7 +458,7 @@ impl Job<'_> {
         let Ok(inner) = inner else { return };
         let mut all: Vec<tp::Residual> = Vec::new();
         for region in &inner {
-            let Ok(some) = tp::residuals(region, self.radius - 1e-6) else { return };
+            let Ok(some) = tp::residuals(region, air, self.radius - 1e-6) else { return };
             all.extend(some);
         }
         all.sort_by(|a, b| b.area.total_cmp(&a.area));
@@ -500,6 +520,15 @@ fn along(paths: &[Toolpath]) -> Done<Vec<tp::P3>> {
     Ok(out)
 }
 
+/// Down along its axis into material, a tool that has no edges at its middle rubs there.
+fn plunges(e: &mut Emit<'_>, step: &Workingstep, to: [f64; 3]) {
+    let (o, Some(at)) = (&step.operation, e.at) else { return };
+    let down = (to[0] - at[0]).abs() + (to[1] - at[1]).abs() < crate::emit::TINY && to[2] < at[2];
+    if down && o.tool.is_hollow() && e.stands_under(to, o.tool.diameter / 4.0) {
+        e.say(code::STEP_FACEMILL_PLUNGE, o.origin, &[&format!("T{} {}", o.tool.number, o.tool.kind), &format!("#{} {}", o.origin.id, o.keyword)]);
+    }
+}
+
 /// Moves of the feature's plane as motion of one copy.
 fn write(e: &mut Emit<'_>, step: &Workingstep, frame: &Frame, moves: &[tp::Move], security: f64) {
     let Some(first) = moves.first() else { return };
@@ -510,7 +539,10 @@ fn write(e: &mut Emit<'_>, step: &Workingstep, frame: &Frame, moves: &[tp::Move]
         let to = p3(m.to);
         match m.kind {
             tp::Kind::Rapid => e.rapid(to),
-            tp::Kind::Line => e.line(to),
+            tp::Kind::Line => {
+                plunges(e, step, to);
+                e.line(to);
+            }
             tp::Kind::Arc { centre, sweep } => {
                 let z = e.at.map_or(m.to.z, |at| frame.inverse_point(at)[2]);
                 e.arc(frame.point([centre.x, centre.y, z]), frame.z, to, sweep);

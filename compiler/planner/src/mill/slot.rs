@@ -420,7 +420,7 @@ impl Job<'_> {
             let (p, q) = (line.start(), line.end());
             let near = (b - a) / 2.0 + 2.0 * self.radius;
             let is_open = |i: usize| ends.get(i).or(ends.first()) == Some(&SlotEnd::Open);
-            self.rest(e, &region, |at| !(is_open(0) && at.dist(p) < near || is_open(1) && at.dist(q) < near));
+            self.rest(e, &region, &[], |at| !(is_open(0) && at.dist(p) < near || is_open(1) && at.dist(q) < near));
         }
     }
 

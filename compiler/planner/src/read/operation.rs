@@ -1,5 +1,7 @@
 //! Operations, tools, technology and explicit tool paths.
 
+use std::f64::consts::FRAC_PI_2;
+
 use gr_step::Node;
 use gr_text::code;
 
@@ -19,6 +21,9 @@ const DOUBTFUL_CUT: f64 = 10.0;
 /// Largest feed per tooth that any mill takes, mm: face mills for high feeds come near it.
 const THICKEST: f64 = 4.0;
 
+/// Flattest slope down into the material, rad.
+const FLATTEST: f64 = 1e-3;
+
 /// Fastest turn of a lathe, 1/s.
 const FASTEST_LATHE: f64 = 200.0;
 
@@ -30,6 +35,15 @@ const FASTEST_FEED: f64 = 1.0;
 fn agree(spindle: f64, cut: f64, round: f64) -> bool {
     let turns = spindle.abs();
     round <= 0.0 || turns == 0.0 || ((turns * round - cut * 1000.0).abs() <= 0.02 * cut.abs() * 1000.0 && cut.abs() <= FASTEST[0] && turns <= FASTEST[1])
+}
+
+/// Where the angle of a tool's point is written.
+fn tip_of<'m>(tool: Node<'m>) -> (Node<'m>, &'static str) {
+    let dimension = tool.node("its_tool_body").and_then(|b| b.node("dimension"));
+    match dimension.filter(|d| d.real("tool_tip_half_angle").is_some()) {
+        Some(d) => (d, "tool_tip_half_angle"),
+        None => (tool, "point_angle"),
+    }
 }
 
 fn feed_words(mm_per_min: f64) -> Option<String> {
@@ -58,6 +72,9 @@ impl<'m> Reader<'m> {
                 return None;
             }
         };
+        if let Some(t) = node.node("its_tool").filter(|_| tool.is_needle()) {
+            self.needle(t, &tool);
+        }
         let functions = node.node("its_machine_functions").map(|f| self.functions(f)).unwrap_or_default();
         let toolpaths = node.node("its_toolpath").map(|t| self.toolpaths(t, Some(&tool))).unwrap_or_default();
         let direction = node.node("its_tool_direction");
@@ -229,21 +246,38 @@ impl<'m> Reader<'m> {
 
     fn approach(&mut self, node: Node<'m>, attribute: &str) -> Approach {
         let Some(a) = node.node(attribute) else { return Approach::None };
-        let length = |name: &str| a.real(name).unwrap_or(0.0);
         if a.attr("tool_orientation").is_some() {
             self.no_effect(a, "tool_orientation", "the tool stands along the axis of its feature all the way");
         }
-        let angle = |name: &str| a.real(name).map_or(0.0, |v| self.angle(v));
-        match a.keyword() {
+        self.way(a).unwrap_or(Approach::None)
+    }
+
+    /// None where one of its numbers leads nowhere, which has been told.
+    fn way(&mut self, a: Node<'m>) -> Option<Approach> {
+        let length = |r: &mut Self, name: &str| r.in_range(a, name, a.real(name).unwrap_or(0.0), 1e-3, "at least 0.001 mm");
+        let angle = |r: &mut Self, name: &str| {
+            let written = a.real(name).unwrap_or(0.0);
+            let v = r.angle(written);
+            if FLATTEST <= v && v <= FRAC_PI_2 + 1e-9 {
+                return Some(v.min(FRAC_PI_2));
+            }
+            let must = match r.units {
+                Units::Iso => "0.06 to 90 degrees",
+                Units::StepModeler => "0.001 to 1.5708 rad",
+            };
+            r.say_at(code::PLAN_BAD_SIZE, a, name, &[&super::title(a), name, &gr_step::short(written), must]);
+            None
+        };
+        Some(match a.keyword() {
             "PLUNGE_TOOLAXIS" => Approach::Axis,
-            "PLUNGE_RAMP" => Approach::Ramp(angle("angle")),
-            "PLUNGE_HELIX" => Approach::Helix(length("radius"), angle("angle")),
-            "PLUNGE_ZIGZAG" => Approach::Zigzag(angle("angle"), length("width")),
-            "AP_RETRACT_ANGLE" => Approach::Angle(angle("angle"), length("travel_length")),
-            "AP_RETRACT_TANGENT" => Approach::Tangent(length("radius")),
+            "PLUNGE_RAMP" => Approach::Ramp(angle(self, "angle")?),
+            "PLUNGE_HELIX" => Approach::Helix(length(self, "radius")?, angle(self, "angle")?),
+            "PLUNGE_ZIGZAG" => Approach::Zigzag(angle(self, "angle")?, length(self, "width")?),
+            "AP_RETRACT_ANGLE" => Approach::Angle(angle(self, "angle")?, length(self, "travel_length")?),
+            "AP_RETRACT_TANGENT" => Approach::Tangent(length(self, "radius")?),
             "ALONG_PATH" => Approach::Along(a.node("path").map(|p| self.toolpaths(p, None)).unwrap_or_default()),
             _ => Approach::None,
-        }
+        })
     }
 
     /// Feed and speed of a lathe. Feeds per revolution are in mm (ISO 14649-12 gives no unit, its example means that).
@@ -383,10 +417,7 @@ impl<'m> Reader<'m> {
             number: 0,
         };
         if self.units == crate::process::Units::StepModeler && tool.is_pointed() && tool.tip_angle.is_some_and(|a| a > std::f64::consts::FRAC_PI_2 + 1e-3) {
-            let (of, name) = match dimension.filter(|d| d.real("tool_tip_half_angle").is_some()) {
-                Some(d) => (d, "tool_tip_half_angle"),
-                None => (node, "point_angle"),
-            };
+            let (of, name) = tip_of(node);
             let value = of.real(name).unwrap_or(0.0).to_string();
             self.say_at(code::PLAN_BAD_SIZE, of, name, &[&super::title(node), name, &value, "a quarter of a turn at most: with `--step-units step-modeler` angles are radians"]);
             return None;
@@ -420,6 +451,25 @@ impl<'m> Reader<'m> {
             return None;
         }
         Some(angle)
+    }
+
+    /// The point of a drill that is many times longer than wide: its angle means radians, or nothing.
+    fn needle(&mut self, node: Node<'m>, tool: &Tool) {
+        let (of, name) = tip_of(node);
+        let written = of.real(name).unwrap_or(0.0);
+        if self.units_said {
+            // That the file is in other units has been told, or the units were chosen by hand.
+            if !self.out.iter().any(|d| d.code == code::PLAN_UNITS_OPEN) {
+                let must = "more than 2 degrees: in units of the standard angles are degrees; `--step-units step-modeler` reads radians";
+                self.say_at(code::PLAN_BAD_SIZE, of, name, &[&super::title(of), name, &gr_step::short(written), must]);
+            }
+            return;
+        }
+        let half = tool.tip_angle.unwrap_or(FRAC_PI_2);
+        let long = |half: f64| gr_step::short(tool.diameter / 2.0 / libm::tan(half));
+        let iso = format!("a point of {} degrees, {} mm long,", gr_step::short(written), long(half));
+        let other = format!("one of {} degrees, {} mm long,", gr_step::short(written.to_degrees()), long(half.to_degrees()));
+        self.units_are_open(of, name, &iso, &other);
     }
 
     /// Attributes of tools that no path depends on.
