@@ -87,7 +87,9 @@ impl Planner<'_> {
             let mut more = self.findings.apart(code::ROBOT_JOINT_SPEED, self.told.iter().copied().flatten());
             emit.look_at_speeds(&mut self.g, &list, &nodes, &start, &mut more);
             self.findings.adopt_errors(more);
-            return Err(self.findings.take());
+            let mut told = self.findings.take();
+            told.sort_by_key(|d| (d.primary().0.0, d.primary().1.start));
+            return Err(told);
         }
         let (program, summary) = emit.run(&mut self.g, &list, &nodes, &start, &mut self.findings);
         if self.findings.bad() {
