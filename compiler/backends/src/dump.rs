@@ -172,6 +172,9 @@ fn machine<'j>(line: &'j mut Json, op: &Op<'_>) -> &'j mut Json {
         Op::WorkOffset(number, axes) => {
             line.op("work_offset").int("number", n(i32::from(*number))).nums("offset", axes)
         }
+        Op::StoredOffset { number, offset, rotation } => {
+            line.op("store_offset").int("number", n(i32::from(*number))).nums("offset", offset).num("rotation", *rotation)
+        }
         Op::LocalOffset(axes) => line.op("local_offset").nums("offset", axes),
         Op::Rotation(r) => line.op("rotation").num("angle", *r),
         _ => rest(line, op),

@@ -88,6 +88,10 @@ pub fn from_line(
         let heights = [safe.max(pose.axes[2]), lowest].map(|z| format!("{z:.3}"));
         notes.push(Diagnostic::new(code::FROM_LINE_LOW_HEIGHT, place.0, place.1, &heights));
     }
+    if let Some((_, source)) = kept_here(program, found.index, sources).into_values().next() {
+        let (file, span) = sources.place(source);
+        notes.push(Diagnostic::new(code::FROM_LINE_OFFSET_KEPT, file, span, &[]));
+    }
     let lathe = approach::is_lathe(program);
     let places = places(program, found.index, lathe, sources);
     let cuts = cuts_first(program, found.index, sources);
@@ -359,6 +363,7 @@ fn build(program: &Program, from: &From, state: &State, pose: &Pose, safe: f64, 
     let offset = own.filter(|s| matches!(s.op, Op::ToolOffset(_))).last().map(|s| s.source);
     let mut restore = Restore { out, source };
     restore.push(Op::Note(Note::Comment, &format!("restart at line {}", from.line)));
+    restore.stored(program, index, sources);
     restore.frame(state, named);
     restore.tool(state, offset);
     if units_under_offset(program, index) {
@@ -394,6 +399,24 @@ fn build(program: &Program, from: &From, state: &State, pose: &Pose, safe: f64, 
         out.push_to(view.op, &end, view.source);
     }
     out.finish()
+}
+
+/// Work offsets that were last set from where the tool stood (G10 L20): what the machine has by then, and the line that set it.
+fn kept_here(program: &Program, index: usize, sources: &dyn Sources) -> BTreeMap<u8, (Op<'static>, Source)> {
+    let mut kept = BTreeMap::new();
+    for step in program.steps().take(index) {
+        let (number, offset) = match step.op {
+            Op::StoredOffset { number, offset, .. } | Op::WorkOffset(number, offset) => (number, offset),
+            _ => continue,
+        };
+        let Some(line) = sources.line(step.source.file, step.source.line).filter(|l| Words::of(l).g(100)) else { continue };
+        if line.to_ascii_lowercase().replace([' ', '\t'], "").contains("l20") {
+            kept.insert(number, (Op::StoredOffset { number, offset, rotation: 0.0 }, step.source));
+        } else {
+            kept.remove(&number);
+        }
+    }
+    kept
 }
 
 /// Whether the program says before a line which work offset is in force: by an operation, or by a line that selects what
@@ -448,6 +471,25 @@ impl Restore {
         }
         if s.local_offset != [0.0; 9] {
             self.push(Op::LocalOffset(s.local_offset));
+        }
+    }
+
+    /// Work offsets that were set before, for later too, as their lines name them. One that comes from where the tool stood
+    /// stays with the machine.
+    fn stored(&mut self, program: &Program, index: usize, sources: &dyn Sources) {
+        let kept = kept_here(program, index, sources);
+        let stored = program.steps().take(index).filter(|s| matches!(s.op, Op::StoredOffset { .. }));
+        // Of a line in a loop the last pass counts.
+        let last: BTreeMap<_, _> = stored.map(|s| ((s.source.file, s.source.line), s)).collect();
+        let mut last: Vec<_> = last.into_values().collect();
+        last.sort_by_key(|s| s.index);
+        for step in last {
+            if !matches!(step.op, Op::StoredOffset { number, .. } if kept.contains_key(&number)) {
+                self.out.push(step.op, step.source);
+            }
+        }
+        for op in kept.into_values().map(|(op, _)| op) {
+            self.push(op);
         }
     }
 

@@ -162,6 +162,21 @@ G28 Z20
 M30
 ";
 
+/// Work offsets that are set while another is in force, named where the simulation has the value already, or never used.
+const STORED: &str = "\
+G21 G90 G54
+G0 X1 Y2 Z3
+G10 L20 P2 X50 Z[2+3]
+G10 L2 P3 X0 Y[1+1]
+G10 L2 P1 X0
+G55 G0 X3 Y4 Z5
+G92 X9
+G10 L20 P3 X1 Y1
+G56 G0 X1 Y1
+G10 L2 P6 Z0
+M2
+";
+
 const OFFSETS: &str = "\
 G21 G90 G17
 G10 L2 P2 X10 Y20 Z-5
@@ -242,6 +257,7 @@ fn snapshots() {
         ("compensated", COMPENSATED),
         ("tools", TOOLS),
         ("offsets", OFFSETS),
+        ("stored", STORED),
         ("odd", ODD),
     ];
     for (name, text) in all {
@@ -273,7 +289,7 @@ fn snapshots() {
 
 #[test]
 fn every_program_moves_the_same() {
-    for text in [PLAIN, STRUCTURED, COMPENSATED, TOOLS, OFFSETS, ODD, EVENTS] {
+    for text in [PLAIN, STRUCTURED, COMPENSATED, TOOLS, OFFSETS, STORED, ODD, EVENTS] {
         for units in [Units::Mm, Units::Inch] {
             for decimals in [None, Some(3), Some(8)] {
                 for arcs in [Arcs::Ijk, Arcs::IjkAbsolute, Arcs::R] {
@@ -403,6 +419,7 @@ fn starts_from_a_line() {
     run(&text);
     insta::assert_snapshot!("from_line_tools", from(TOOLS, 13).unwrap().0);
     insta::assert_snapshot!("from_line_offsets", from(OFFSETS, 7).unwrap().0);
+    insta::assert_snapshot!("from_line_stored", from(STORED, 7).unwrap().0);
     assert_eq!(slug(from(COMPENSATED, 5)), "from-line/inside-compensation");
     assert!(from(COMPENSATED, 3).is_ok());
     let shifted = "G21 G90\nG0 X0 Y0 Z5\nG92 X10\nG92.2\nG0 X5\nX6\nG92.3\nG0 X7\nX8\nM2\n";
@@ -668,7 +685,7 @@ mod oracle {
     #[test]
     fn rs274_moves_the_same() {
         let o = Options { decimals: Some(9), ..options(Language::Linuxcnc) };
-        for text in [PLAIN, STRUCTURED, COMPENSATED, TOOLS, OFFSETS] {
+        for text in [PLAIN, STRUCTURED, COMPENSATED, TOOLS, OFFSETS, STORED] {
             let written = write(text, &o);
             let (Some(a), Some(b)) = (canon(text), canon(&written)) else {
                 return;

@@ -77,6 +77,8 @@ pub enum Call {
     UseLengthUnits(Units),
     /// Work offset: number (1 = G54 … 9 = G59.3) and values.
     SetG5xOffset(u8, Axes),
+    /// G10 of a work offset that is not in force: number, values and rotation in degrees. The real `rs274` prints a remark.
+    StoreG5xOffset(u8, Axes, f64),
     /// G92/G52 offset.
     SetG92Offset(Axes),
     /// Rotation of the work frame about Z, degrees.

@@ -106,6 +106,7 @@ impl<W: std::io::Write> Sink for Printer<W> {
         n_number(at.now, &mut self.buffer);
         match call {
             Call::Comment(s) => self.quoted("COMMENT", s),
+            Call::StoreG5xOffset(..) => self.quoted("COMMENT", "interpreter: setting coordinate system origin"),
             Call::Message(s) => self.quoted("MESSAGE", s),
             Call::Log(s) => self.quoted("LOG", s),
             Call::LogOpen(s) => self.quoted("LOGOPEN", s),

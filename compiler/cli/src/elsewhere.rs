@@ -14,7 +14,7 @@ use crate::pipeline::{Motion, Unit, motion_of};
 /// Where the translation goes another way: read back as it is, or on such a machine.
 pub fn differs(unit: &Unit, source: &Motion, written: &str, to: &'static Dialect, length: f64) -> Option<Diagnostic> {
     // Times follow from the ways; the numbers of tools are told elsewhere.
-    let tolerance = Tolerance { length, rate: 1e-3, limit: 50, ..Tolerance::default() };
+    let tolerance = Tolerance { rate: 1e-3, limit: 50, ..Tolerance::within(length) };
     let mut there = Setup { dialect: to, ..unit.setup.clone() };
     if to.family != unit.setup.dialect.family {
         // Another control does not run that startup code.
@@ -27,7 +27,15 @@ pub fn differs(unit: &Unit, source: &Motion, written: &str, to: &'static Dialect
     };
     let again = |setup: &Setup| motion_of("<translation>", written.to_string(), setup).program;
     let same = diff(&source.program, &again(&there), &tolerance).differences;
-    if let Some(difference) = same.iter().find(|d| d.aspect == Aspect::Path) {
+    // How the path is followed, each control has its own words for, and what it lacks has been told.
+    let none: &[Aspect] = if to.id == "grbl" { &[Aspect::Control, Aspect::Tool, Aspect::Event] } else { &[Aspect::Control] };
+    // A sum of times has no place: it follows from the ways, which rounding moves.
+    let placed = |d: &Difference| d.a.or(d.b).is_some();
+    // A Fanuc program has no other end than M30, which changes the pallet; a source that just stops has none.
+    let ended = |d: &Difference| d.a.is_none() && to.family == Family::Fanuc;
+    let counts = |d: &&Difference| !none.contains(&d.aspect) && placed(d) && !ended(d);
+    let worst = same.iter().find(|d| d.aspect == Aspect::Path).or_else(|| same.iter().find(counts));
+    if let Some(difference) = worst {
         return told(difference, code::EMIT_NOT_EQUAL, std::slice::from_ref(&difference.message));
     }
     let (first, why) = first(unit, source, &tolerance, &[Aspect::Path, Aspect::Feed, Aspect::Event], |change| again(&change(&there)))?;

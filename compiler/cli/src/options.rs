@@ -367,7 +367,7 @@ pub struct DiffArgs {
     pub a: PathBuf,
     /// Second program
     pub b: PathBuf,
-    /// Greatest distance between equal paths, mm
+    /// Greatest distance between equal paths, mm, and as many degrees of rotary axes
     #[arg(long, value_name = "MM", default_value_t = 1e-6)]
     pub tolerance: f64,
     /// Greatest difference of feeds, speeds and times, as a share

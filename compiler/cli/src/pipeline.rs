@@ -108,10 +108,11 @@ pub fn load(path: &Path, station: &Station) -> Result<Unit, Checked> {
     Ok(unit)
 }
 
-/// Runs a program into a sink and checks it. `Err` holds the findings when there are errors; otherwise they are
+/// Runs a program into a sink as `rs274` does, which knows no startup code, and checks it. `Err` holds the findings when there are errors; otherwise they are
 /// warnings.
 pub fn run<S: Sink>(unit: &Unit, sink: S) -> Result<(S, Loaded, Checked), Checked> {
-    let streamed = gr_driver::stream(&unit.name(), unit.text.clone(), &unit.setup, Some(&unit.rules()), sink);
+    let setup = Setup { startup_code: false, ..unit.setup.clone() };
+    let streamed = gr_driver::stream(&unit.name(), unit.text.clone(), &setup, Some(&unit.rules()), sink);
     let checked = if streamed.clean { unit.told(Checked::nothing()) } else { unit.check()? };
     Ok((streamed.sink, streamed.files, checked))
 }

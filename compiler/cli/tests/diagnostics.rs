@@ -187,6 +187,8 @@ fn what_a_written_program_cannot_carry() {
     told("E0606", &[file("a.p21", &plan(&[]))], "build a.p21 --cutter-compensation control -o a.nc");
     let shifted = "G21 G90\nG0 X0 Y0 Z5\nG92 X10\nG92.2\nG0 X5\nX6\nG92.3\nG0 X7\nM2\n";
     told("E0650", &[file("a.ngc", shifted)], "build a.ngc --target rs274ngc --from-line 6 -o a.nc");
+    let touched = "G21 G90 G54\nG0 X1 Y2 Z3\nG10 L20 P2 X0 Y0 Z0\nG55 G0 X5 Y5 Z5\nG1 X6 F100\nM2\n";
+    told("E0651", &[file("a.ngc", touched)], "build a.ngc --target rs274ngc --from-line 5 --safe-z 20 -o a.nc");
     told("E0614", &[file("a.ngc", PART)], "build a.ngc --target rs274ngc --from-line 4 -o a.nc");
     let deep = "G21 G90 F100\nG0 X0 Y0 Z5\nX9\nG1 Z-3\nX5\nG0 Z5\nX20\nG1 Z-3\nX30\nM2\n";
     let bare = "G21 G90 F100\nT1 M6\nG0 X1 Y1\nG43 H1 Z5\nG1 Z-1\nM2\n";
@@ -251,7 +253,12 @@ fn a_translation_holds_on_every_machine_or_says_so() {
         "G21 G90\nG0 X1 Y1 Z1\nG38.2 Z-5 F10\nG92 Z0\nG0 Z5\nM2\n",
         "G21 G90\nG0 X1 Y1 Z1\nG38.2 Z-5 F10\nG10 L20 P1 Z2.5\nG0 Z5\nM2\n",
         "G21 G90\nG0 X10\nG10 L20 P1 X0\nG0 X5\nM2\n",
+        "G21 G90 G54\nG0 X1 Y2 Z3\nG10 L20 P2 X50 Z[2+3]\nG10 L2 P3 X0 Y[1+1] R20\nG10 L2 P1 X0\nG55 G0 X3 Y4 Z5\nG92 X9\nG10 L20 P3 X1 Y1\nG56 G0 X1 Y1\nG10 L2 P6 Z0\nM2\n",
         "G21 G90 G17 G40 G49 G54\nG0 X1 Y1 Z1\nM2\n",
+        // A first block that names G0 and no axis.
+        "G21\nG0 G17 G40 G49 G80 G90\nT1 M6\nG0 X1 Y1\nG43 H1 Z5\nG1 Z-1 F100\nM2\n",
+        // Rotary words that are rounded, along a line and an arc.
+        "G21 G90 F100\nG0 A51.428571\nG1 X5 Y0 Z0 A[100/7]\nG2 X15 Y10 I10 A45.123456\nM2\n",
         "G20 G90\nG92 X0 Y0 Z0\nG0 Z1\nX1 Y1\nG92.2\nG0 X2\nG92.3\nG0 X3\nM2\n",
         "G21 G90\nG52 X0 Y0\nG0 X1\nM2\n",
         "G21 G90\nG92.1\nG0 X1 Z5\nM2\n",
@@ -261,6 +268,32 @@ fn a_translation_holds_on_every_machine_or_says_so() {
     ] {
         let (found, status) = codes(&program(text), "verify a.ngc");
         assert!(!found.iter().any(|c| c == "E0607") && status == Some(0), "{found:?}, {status:?}\n{text}");
+    }
+}
+
+/// Cycles of a program that leaves the way to follow the path to the machine follow it exactly in between M70 and M72. M72 brings
+/// back more than that: feed mode, spindle, coolant and work offset go on as the program has them.
+#[test]
+fn nothing_is_undone_behind_cycles() {
+    let ini = "[RS274NGC]\nPARAMETER_FILE = m.var\n[EMCIO]\nTOOL_TABLE = m.tbl\n[TRAJ]\nLINEAR_UNITS = mm\n";
+    let head = "G21 G90 G17 G54 G98 F100 S500 M3\nG0 X0 Y0 Z5\n";
+    for body in [
+        "G1 X4\nG95 F0.15\nG81 X-21 Y-2 Z-6 R4\nX-30\nG80\nG0 X0 Y0\nG1 Z-2\n",
+        "G95 F0.2\nG1 X-4\nG94 F150\nG81 X5 Y5 Z-2 R1\nG80\nG1 X5\n",
+        "G81 X5 Y5 Z-2 R1\nG80\nT2 M6\nG43 H2\nS900 M4 M8\nG81 X6 Y5 Z-2 R1\nG80\nG0 X0 Y0\nG1 Z-2\n",
+        "G81 X5 Y5 Z-2 R1\nM8 S700 X9\nG80\nG1 Z-2\n",
+        "G81 X10 Z-2 R1\nX20\nG55 X10\nX20\nG80\nG0 X0\nG1 Z-1\n",
+    ] {
+        let files = [
+            file("a.ngc", &format!("{head}{body}M5 M9\nM2\n")),
+            file("m.ini", ini),
+            file("m.var", "5241 40\n5242 50\n5243 0\n"),
+            file("m.tbl", "T1 P1 Z5 D3\nT2 P2 Z7 D3\n"),
+        ];
+        for command in ["build a.ngc --ini m.ini -o o.ngc", "verify a.ngc --ini m.ini"] {
+            let (found, status) = codes(&files, command);
+            assert!(!found.iter().any(|c| c == "E0607" || c == "E0609") && status == Some(0), "{found:?}, {status:?}\n{body}");
+        }
     }
 }
 

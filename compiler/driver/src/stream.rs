@@ -134,8 +134,10 @@ pub(crate) fn stream_of<S: Sink>(mut files: Loaded, setup: &Setup, rules: Option
             // The state before the controller is reset.
             lints.found.extend(crate::lints::left_on(run.modal(), crate::lints::Where::default(), rules));
         }
-        // Closing the file and leaving both reset the controller.
-        run.reset();
+        // Closing the file and leaving both reset the controller; with an INI file the real `rs274` forgets the former.
+        if setup.startup_code || setup.ini.values.is_empty() {
+            run.reset();
+        }
         run.reset();
     }
     let outcome = run.finish(end);
@@ -217,7 +219,8 @@ pub struct Motion {
 
 /// Runs a program and lowers it to motion.
 pub fn lower(path: &str, text: Text, setup: &Setup, rules: Option<&Rules>) -> Motion {
-    let Streamed { sink, files, clean, .. } = stream(path, text, setup, rules, Mute(Lowering::new().on(setup.machine_units)));
+    let lowering = Lowering::new().on(setup.machine_units).standing(&setup.start);
+    let Streamed { sink, files, clean, .. } = stream(path, text, setup, rules, Mute(lowering));
     let mut lowering = sink.0;
     let texts = files.texts();
     for (i, (name, _)) in texts.iter().enumerate() {

@@ -323,7 +323,7 @@ impl<S: Sink> Interp<'_, S> {
             self.write_param(base + 1 + i as u32, stored);
         }
         if !active {
-            self.remark("interpreter: setting coordinate system origin");
+            self.emit_queued(Call::StoreG5xOffset(system as u8, to, rotation));
             return Ok(());
         }
         self.leave_origin();

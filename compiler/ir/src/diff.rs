@@ -28,6 +28,13 @@ impl Default for Tolerance {
     }
 }
 
+impl Tolerance {
+    /// Paths within a length, mm; rotary axes, whose words have as many decimals, within as many degrees.
+    pub fn within(length: f64) -> Tolerance {
+        Tolerance { length, angle: length.to_radians(), ..Tolerance::default() }
+    }
+}
+
 /// What differs.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, PartialOrd, Ord)]
 pub enum Aspect {
@@ -258,6 +265,7 @@ enum Event {
     Input(i32, bool, i32, f64),
     UserM(i32, f64, f64),
     Orient(i32, f64),
+    Stored(u8, Axes, f64),
 }
 
 impl Event {
@@ -272,15 +280,21 @@ impl Event {
             Op::InputWait { index, digital, wait, timeout } => Event::Input(index, digital, wait, timeout),
             Op::UserM { code, p, q } => Event::UserM(code, p, q),
             Op::SpindleOrient { spindle, angle, .. } => Event::Orient(spindle, angle),
+            Op::StoredOffset { number, offset, rotation } => Event::Stored(number, offset, rotation),
             _ => return None,
         })
     }
-    fn same(&self, other: &Event, rate: f64) -> bool {
+    fn same(&self, other: &Event, tolerance: &Tolerance) -> bool {
+        let rate = tolerance.rate;
         match (self, other) {
             (Event::Dwell(a), Event::Dwell(b)) => close(*a, *b, rate),
             (Event::Analog(i, a, s), Event::Analog(j, b, t)) => i == j && s == t && close(*a, *b, rate),
             (Event::Orient(i, a), Event::Orient(j, b)) => i == j && close(*a, *b, rate),
             (Event::UserM(i, p, q), Event::UserM(j, r, s)) => i == j && close(*p, *r, rate) && close(*q, *s, rate),
+            (Event::Stored(i, a, r), Event::Stored(j, b, s)) => {
+                let within = |k: usize| if (3..6).contains(&k) { tolerance.angle } else { tolerance.length };
+                i == j && (0..9).all(|k| (a[k] - b[k]).abs() <= within(k)) && (r - s).abs() <= tolerance.angle
+            }
             (a, b) => a == b,
         }
     }
@@ -301,6 +315,10 @@ impl Event {
                 format!("waits for {kind} input {index} (M66 L{wait} Q{timeout})")
             }
             Event::UserM(code, p, q) => format!("runs M{code} P{p} Q{q}"),
+            Event::Stored(number, offset, _) => {
+                let [x, y, z, ..] = offset;
+                format!("stores work offset {number} (X{x:.4} Y{y:.4} Z{z:.4} in its first axes, mm)")
+            }
             Event::Orient(spindle, angle) => {
                 format!("turns spindle {spindle} to {:.4}°", angle.to_degrees())
             }
@@ -407,7 +425,7 @@ fn same_item(
             true
         }
         (Item::Event(p), Item::Event(q)) => {
-            if !p.same(q, tolerance.rate) {
+            if !p.same(q, tolerance) {
                 let message = format!("{}, the other {}", p.text(), q.text());
                 out.note(tolerance.limit, p.aspect(), sa, sb, message);
             }

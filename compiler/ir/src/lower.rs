@@ -30,6 +30,11 @@ impl Lowering {
     pub fn on(self, machine: Units) -> Lowering {
         Lowering { machine, ..self }
     }
+    /// Of a machine that stands at this place, its own coordinates in its units and degrees; without it, at its zero.
+    pub fn standing(self, at: &Axes) -> Lowering {
+        let k = if self.machine == Units::Inch { 25.4 } else { 1.0 };
+        Lowering { out: Builder::from_state(Pose::at(Self::scaled(at, k)), *self.out.state()), ..self }
+    }
     /// The program.
     pub fn finish(self) -> Program {
         self.out.finish()
@@ -161,6 +166,7 @@ impl Lowering {
         Some(match *call {
             Call::UseLengthUnits(units) => Op::Units(units),
             Call::SetG5xOffset(n, ref a) => Op::WorkOffset(n, self.axes(a)),
+            Call::StoreG5xOffset(number, ref a, angle) => Op::StoredOffset { number, offset: self.axes(a), rotation: angle * RAD },
             Call::SetG92Offset(ref a) => Op::LocalOffset(self.axes(a)),
             Call::SetXyRotation(angle) => Op::Rotation(angle * RAD),
             Call::SetFeedReferenceXyz => Op::FeedReferenceXyz,

@@ -288,6 +288,15 @@ pub enum Op<'a> {
     ToolOffset(Axes),
     /// Work offset: 1 = G54 … 9 = G59.3.
     WorkOffset(u8, Axes),
+    /// G10: a work offset that is not in force is stored for later.
+    StoredOffset {
+        /// 1 = G54 … 9 = G59.3.
+        number: u8,
+        /// Its values from now on.
+        offset: Axes,
+        /// Its rotation about Z, rad.
+        rotation: f64,
+    },
     /// G92, G52.
     LocalOffset(Axes),
     /// Rotation of the work frame about Z, rad.

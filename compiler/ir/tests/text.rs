@@ -5,7 +5,8 @@ use gr_ir::text::{parse, print};
 use gr_ir::*;
 use proptest::prelude::*;
 
-fn number() -> impl Strategy<Value = f64> {
+/// Boxed: dozens of them in one strategy would not fit on the stack of a test.
+fn number() -> BoxedStrategy<f64> {
     prop_oneof![
         4 => -1000.0..1000.0f64,
         1 => any::<f64>().prop_filter("finite", |v| v.is_finite()),
@@ -13,6 +14,7 @@ fn number() -> impl Strategy<Value = f64> {
         1 => Just(-0.0),
         1 => (-100i32..100).prop_map(f64::from),
     ]
+    .boxed()
 }
 
 fn axes() -> impl Strategy<Value = Axes> {
@@ -54,6 +56,7 @@ fn op() -> impl Strategy<Value = Op<'static>> {
     let frames = prop_oneof![
         axes().prop_map(Op::ToolOffset),
         (1u8..10, axes()).prop_map(|(n, a)| Op::WorkOffset(n, a)),
+        (1u8..10, axes(), number()).prop_map(|(number, offset, rotation)| Op::StoredOffset { number, offset, rotation }),
         axes().prop_map(Op::LocalOffset),
         number().prop_map(Op::Rotation),
         (int(), int(), axes(), three(), 0i32..10).prop_map(|(pocket, tool, offset, v, orientation)| {

@@ -272,6 +272,7 @@ impl<'a> Writer<'a> {
             Op::Rotation(r) if r != 0.0 => self.cannot("a rotated work frame", v),
             Op::LocalOffset(o) if o != [0.0; 9] => self.cannot("a shifted work frame (G92, G52)", v),
             Op::ToolEntry { .. } => self.cannot("writing the tool table (G10 L1)", v),
+            Op::StoredOffset { .. } => self.cannot("storing a work offset (G10)", v),
             Op::WorkOffset(n, _) if n > 1 => self.cannot("more than one work offset", v),
             Op::Override(gr_ir::Override::Adaptive, true) => self.cannot("adaptive feed (M52)", v),
             Op::PathMode(mode) if !self.options.planned => self.path_mode(mode, v),

@@ -84,8 +84,9 @@ pub(super) struct Emitter<'a> {
     pub said_system: bool,
     /// The program has named a way to follow the path: G61, G61.1, G64.
     pub said_path: bool,
-    /// The way to follow the path that only the machine knows is kept by M70, to come back with M72.
-    pub kept_path: bool,
+    /// The way to follow the path that only the machine knows is kept by M70, to come back with M72; and with it what
+    /// feeds meant then.
+    pub kept_path: Option<FeedMode>,
     last_source: Option<Source>,
 }
 
@@ -122,7 +123,7 @@ impl<'a> Emitter<'a> {
             rounding: false,
             said_system: false,
             said_path: false,
-            kept_path: false,
+            kept_path: None,
             last_source: None,
         }
     }

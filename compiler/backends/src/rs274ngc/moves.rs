@@ -9,18 +9,21 @@ use gr_ir::{Axes, FeedMode, Marker, Op, Plane, Pose, Source, State, View};
 impl Emitter<'_> {
     /// Whether the language has these axes; an error if not.
     fn has_axes(&mut self, start: &Axes, end: &Axes, source: Source) -> bool {
+        let lacks = self.lacks(|i| start[i] != end[i]);
+        if let Some(axis) = lacks {
+            self.cannot(&format!("a move of the {axis} axis"), source);
+        }
+        lacks.is_none()
+    }
+
+    /// The first of these axes that the language does not have.
+    pub fn lacks(&self, of: impl Fn(usize) -> bool) -> Option<char> {
         let most = match self.options.language {
             Language::Linuxcnc => 9,
             Language::FanucMill => 6,
             Language::Grbl => 3,
         };
-        match (most..9).find(|i| start[*i] != end[*i]) {
-            Some(i) => {
-                self.cannot(&format!("a move of the {} axis", AXES[i]), source);
-                false
-            }
-            None => true,
-        }
+        (most..9).find(|i| of(*i)).map(|i| AXES[i])
     }
 
     /// Whether the source line gave a word for the axis. Without a text: whether it is a main axis.
@@ -340,6 +343,9 @@ impl Emitter<'_> {
     pub fn probe(&mut self, view: &View<'_, '_>, kind: u8) {
         if self.options.language == Language::FanucMill {
             return self.cannot("probing with an own error rule (G38)", view.source);
+        }
+        if !self.has_axes(&view.start.axes, &view.end.axes, view.source) {
+            return;
         }
         let moved: Vec<usize> = (0..9).filter(|i| view.start.axes[*i] != view.end.axes[*i]).collect();
         let mut words = vec![format!("G38.{}", 2 + (kind & 3))];

@@ -3,6 +3,7 @@
 use super::emit::Emitter;
 use super::{ChangeAt, Language};
 use super::write::AXES;
+use crate::sources::Words;
 use gr_ir::{Axes, Op, Override, PathMode, Source, Turn, View};
 use gr_text::code;
 
@@ -16,6 +17,7 @@ impl Emitter<'_> {
         let source = view.source;
         match view.op {
             Op::WorkOffset(n, offset) => self.work_offset(n, &offset, view),
+            Op::StoredOffset { number, offset, rotation } => self.stored_offset(number, &offset, rotation, view),
             Op::Rotation(angle) => self.rotation(angle, view),
             Op::LocalOffset(offset) => self.local_offset(&offset, view),
             Op::ToolOffset(offset) => self.tool_offset(&offset, view),
@@ -76,10 +78,17 @@ impl Emitter<'_> {
 
     /// Words of the axes in which two offsets differ, with all the decimals an offset needs.
     fn changed(&self, new: &Axes, old: &Axes) -> Vec<String> {
+        self.changed_or_named(new, old, None)
+    }
+
+    /// The same, and the axes that a block of the source names: what it says is said again, also where the simulation has
+    /// it already. The control may not.
+    fn changed_or_named(&self, new: &Axes, old: &Axes, block: Option<Words>) -> Vec<String> {
         let places = self.w.places.max(9);
+        let named = |i: usize| block.is_some_and(|w| w.has(AXES[i].to_ascii_lowercase() as u8));
         // The same value, stored in inches and told in mm, may differ in its last bit.
-        let differs = (0..9).filter(|i| (new[*i] - old[*i]).abs() > 1e-10);
-        differs.map(|i| format!("{}{}", AXES[i], self.w.axis_fine(i, new[i], places).0)).collect()
+        let said = (0..9).filter(|i| (new[*i] - old[*i]).abs() > 1e-10 || named(*i));
+        said.map(|i| format!("{}{}", AXES[i], self.w.axis_fine(i, new[i], places).0)).collect()
     }
 
     fn work_offset(&mut self, n: u8, offset: &Axes, view: &View<'_, '_>) {
@@ -89,7 +98,8 @@ impl Emitter<'_> {
             self.cannot(&format!("work offset {}", OFFSETS[index]), view.source);
             return self.move_frame(view.state);
         }
-        let words = self.changed(offset, &self.offsets[index]);
+        let set = self.words(view.source).filter(|w| w.g(100));
+        let words = self.changed_or_named(offset, &self.offsets[index], set);
         if let Some(block) = self.set_here(n, offset, view) {
             self.w.block(&block);
             self.offsets[index] = *offset;
@@ -101,14 +111,8 @@ impl Emitter<'_> {
         if !words.is_empty() {
             let fanuc = self.options.language == Language::FanucMill;
             // P0 is the one in force, whichever that is; on a Fanuc control it is another one.
-            let here = selected
-                && !fanuc
-                && self.words(view.source).is_some_and(|w| w.g(100))
-                && self.number_of('p', view.source) == Some(0);
-            let number = if here { 0 } else { index };
-            let block = format!("G10 L2 P{number} {}", words.join(" "));
-            self.say(code::EMIT_OFFSET_NOT_CARRIED, view.source, &[OFFSETS[index].into(), block.clone()]);
-            self.w.block(&if fanuc { block.replacen("G10", "G90 G10", 1) } else { block });
+            let here = selected && !fanuc && set.is_some() && self.number_of('p', view.source) == Some(0);
+            self.store(if here { 0 } else { index }, index, &words, view.source);
         }
         self.offsets[index] = *offset;
         self.motion_unsure();
@@ -116,6 +120,58 @@ impl Emitter<'_> {
         if !selected {
             // Where its origin is the machine knows: the same numbers are another place.
             self.anchored = [false; 9];
+        }
+    }
+
+    /// Writes G10 L2 for a work offset, called by its number or 0.
+    fn store(&mut self, number: usize, index: usize, words: &[String], source: Source) {
+        if let Some(axis) = self.lacks(|i| words.iter().any(|w| w.starts_with(AXES[i]))) {
+            return self.cannot(&format!("a work offset of the {axis} axis"), source);
+        }
+        let block = format!("G10 L2 P{number} {}", words.join(" "));
+        self.say(code::EMIT_OFFSET_NOT_CARRIED, source, &[OFFSETS[index].into(), block.clone()]);
+        let fanuc = self.options.language == Language::FanucMill;
+        self.w.block(&if fanuc { block.replacen("G10", "G90 G10", 1) } else { block });
+    }
+
+    /// A work offset that is not in force gets values for later.
+    fn stored_offset(&mut self, number: u8, offset: &Axes, rotation: f64, view: &View<'_, '_>) {
+        let index = usize::from(number.clamp(1, 9));
+        let (old, turned) = (self.offsets[index], rotation != self.rotations[index]);
+        self.offsets[index] = *offset;
+        if view.source.line == crate::from_line::INSERTED {
+            // The machine has kept it.
+            return;
+        }
+        self.rotations[index] = rotation;
+        if !self.linuxcnc() && index > 6 {
+            return self.cannot(&format!("work offset {}", OFFSETS[index]), view.source);
+        }
+        let set = self.words(view.source).filter(|w| w.g(100));
+        self.motion_unsure();
+        if set.is_some() && self.number_of('l', view.source) == Some(20) {
+            let known = self.options.stored_known && self.anchored == [true; 9] && self.loose == [false; 9];
+            if self.options.language != Language::FanucMill {
+                // The numbers that the place has under that offset, wherever rounding has put it.
+                let mut there = *view.state;
+                let mut nowhere = gr_ir::Pose::default();
+                [Op::WorkOffset(number, *offset), Op::Rotation(rotation)].iter().for_each(|op| there.apply(op, &mut nowhere));
+                let place = there.work_frame(&self.frame.machine(&self.at));
+                let words = self.changed_or_named(&place, &place, set);
+                return self.w.block(&format!("G10 L20 P{index} {}", words.join(" ")));
+            } else if !known {
+                return self.cannot("a work offset set from where the tool stands (G10 L20)", view.source);
+            }
+        }
+        let mut words = self.changed_or_named(offset, &old, set);
+        if turned || set.is_some_and(|w| w.has(b'r')) {
+            if !self.linuxcnc() {
+                return self.cannot("a rotated work offset", view.source);
+            }
+            words.push(format!("R{}", self.w.number(rotation.to_degrees(), 10)));
+        }
+        if !words.is_empty() {
+            self.store(index, index, &words, view.source);
         }
     }
 
@@ -245,6 +301,9 @@ impl Emitter<'_> {
         if words.is_empty() {
             return;
         }
+        if let Some(axis) = self.lacks(|i| words.iter().any(|w| w.starts_with(AXES[i]))) {
+            return self.cannot(&format!("a shift of the {axis} axis"), view.source);
+        }
         self.w.block(&format!("{code} {}", words.join(" ")));
         self.motion_unsure();
     }
@@ -312,7 +371,8 @@ impl Emitter<'_> {
 
     fn changed_all(&self, offset: &Axes) -> String {
         let words = self.changed(offset, &self.frame.tool_offset);
-        if words.is_empty() { "Z0".into() } else { words.join(" ") }
+        // What is not named stays; a block needs a word.
+        if words.is_empty() { format!("Z{}", self.w.axis_fine(2, offset[2], self.w.places.max(9)).0) } else { words.join(" ") }
     }
 
     /// The block that asks for the length of a tool of which the source knows no length.
@@ -552,15 +612,18 @@ impl Emitter<'_> {
             if let Some(Op::MergeTolerance(_)) = self.op_after(view.index) {
                 self.done_until = view.index + 2;
             }
-            if self.kept_path && !self.exact_again(view.index) {
-                self.kept_path = false;
+            let exact_again = self.exact_again(view.index);
+            if let Some(mode) = self.kept_path.take_if(|_| !exact_again) {
                 self.w.block("M72");
+                // What M70 kept is in force again.
+                self.feed_mode = mode;
                 self.feed.clear();
                 self.motion_unsure();
             }
             return;
         }
-        if !std::mem::replace(&mut self.kept_path, true) {
+        if self.kept_path.is_none() {
+            self.kept_path = Some(self.feed_mode);
             self.w.block("M70");
             self.w.block(if mode == PathMode::ExactStop { "G61.1" } else { "G61" });
         }
@@ -569,7 +632,13 @@ impl Emitter<'_> {
     /// Whether another cycle follows before anything moves.
     fn exact_again(&self, index: usize) -> bool {
         const NEAR: usize = 16;
-        let next = (1..NEAR).map_while(|n| self.program.get(index + n)).find(|s| s.op.moves() || matches!(s.op, Op::PathMode(_)));
+        // What else is set between two cycles, M72 behind the second would undo.
+        let part = |op: &Op<'_>| match op {
+            Op::Begin { marker, .. } | Op::Close(marker) => *marker == gr_ir::Marker::Cycle,
+            Op::Feed { .. } | Op::FeedMode { .. } | Op::MergeTolerance(_) | Op::Note(gr_ir::Note::Comment, _) => true,
+            _ => false,
+        };
+        let next = (1..NEAR).map_while(|n| self.program.get(index + n)).find(|s| !part(&s.op));
         next.is_some_and(|s| s.op == Op::PathMode(PathMode::ExactPath) && crate::Words::at(self.sources, s.source.file, s.source.line).is_some_and(|w| !w.g(610)))
     }
 

@@ -47,7 +47,7 @@ pub fn run(global: &Global, args: &DiffArgs) -> Exit {
             return exit;
         }
     };
-    let tolerance = Tolerance { length: args.tolerance, rate: args.rate, limit: args.limit, work_frame: args.work_frame, ..Tolerance::default() };
+    let tolerance = Tolerance { rate: args.rate, limit: args.limit, work_frame: args.work_frame, ..Tolerance::within(args.tolerance) };
     let mut result = diff(&a.motion.program, &b.motion.program, &tolerance);
     if a.unit.setup.dialect.id != b.unit.setup.dialect.id || a.unit.exchange != b.unit.exchange {
         // Each control has its own way to begin with, and a plan none.
@@ -197,7 +197,7 @@ pub fn verify(global: &Global, args: &VerifyArgs) -> Exit {
         setup.machine_units = gr_canon::Units::Mm;
     }
     let b = motion_of("<translation>", text, &setup);
-    let tolerance = Tolerance { length: crate::emit::allowed(&args.options), rate: 1e-3, ..Tolerance::default() };
+    let tolerance = Tolerance { rate: 1e-3, ..Tolerance::within(crate::emit::allowed(&args.options)) };
     let mut result = diff(&a.program, &b.program, &tolerance);
     match args.options.to.as_deref() {
         // It has no tool changes: they are stops with a remark.

@@ -76,7 +76,7 @@ pub(super) fn by_shape<'p>(a: &'p Program, b: &'p Program, tolerance: &Tolerance
                 return out;
             }
             (Piece::Event(x), Piece::Event(y)) => {
-                if !x.same(&y, tolerance.rate) {
+                if !x.same(&y, tolerance) {
                     let message = format!("{}, the other {}", x.text(), y.text());
                     out.note(tolerance.limit, x.aspect(), p.spot, q.spot, message);
                 }

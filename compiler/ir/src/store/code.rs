@@ -46,6 +46,7 @@ pub(super) fn kind(op: &Op<'_>) -> u8 {
         Op::ToolEntry { .. } => 30,
         Op::ToolOffset(_) => 31,
         Op::WorkOffset(..) => 32,
+        Op::StoredOffset { .. } => 51,
         Op::LocalOffset(_) => 33,
         Op::Rotation(_) => 34,
         Op::Override(..) => 35,
@@ -190,6 +191,11 @@ impl Builder {
                 self.int(i32::from(n));
                 self.values(&axes);
             }
+            Op::StoredOffset { number, offset, rotation } => {
+                self.int(i32::from(number));
+                self.values(&offset);
+                self.values(&[rotation]);
+            }
             _ => self.encode_rest(op),
         }
     }
@@ -308,6 +314,7 @@ impl<'p> Cursor<'p> {
             }
             31 => Op::ToolOffset(self.nine()?),
             32 => Op::WorkOffset(u8::try_from(self.int()?).ok()?, self.nine()?),
+            51 => Op::StoredOffset { number: u8::try_from(self.int()?).ok()?, offset: self.nine()?, rotation: self.value()? },
             33 => Op::LocalOffset(self.nine()?),
             34 => Op::Rotation(self.value()?),
             _ => return self.decode_rest(kind),

@@ -214,6 +214,7 @@ fn tool_op(f: &mut Fields<'_>) -> Res<Op<'static>> {
 fn rest_op(f: &mut Fields<'_>) -> Res<Op<'static>> {
     Ok(match f.head {
         "work-offset" => Op::WorkOffset(f.int()?, f.axes([0.0; 9])?),
+        "store-offset" => Op::StoredOffset { number: f.int()?, rotation: f.num("rotation")?, offset: f.axes([0.0; 9])? },
         "local-offset" => Op::LocalOffset(f.axes([0.0; 9])?),
         "override" => {
             let which = match f.bare()? {

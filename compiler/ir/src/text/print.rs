@@ -233,6 +233,9 @@ impl Line {
             }
             Op::ToolOffset(axes) => self.word("tool-offset").axes(&[0.0; 9], axes),
             Op::WorkOffset(n, axes) => self.word("work-offset").bare(n).axes(&[0.0; 9], axes),
+            Op::StoredOffset { number, offset, rotation } => {
+                self.word("store-offset").bare(number).num("rotation", *rotation).axes(&[0.0; 9], offset)
+            }
             Op::LocalOffset(axes) => self.word("local-offset").axes(&[0.0; 9], axes),
             Op::Rotation(r) => self.word("rotation").bare_number(*r),
             _ => self.rest(op),
