@@ -72,6 +72,9 @@ pub fn write_at(
     words: &mut dyn FnMut(&View<'_, '_>) -> Words,
 ) -> Result<(String, Vec<Diagnostic>), Vec<Diagnostic>> {
     let mut w = Writer::new(program, options, place);
+    if let Some((mode, source)) = named_path_mode(program).filter(|_| !options.planned) {
+        w.path_mode(mode, source);
+    }
     let mut cursor = program.cursor();
     while let Some(view) = cursor.next() {
         w.op(&view, words(&view));
@@ -157,8 +160,6 @@ struct Writer<'a> {
     spindle: Option<i32>,
     /// Where a technology was first needed.
     begun: Option<Source>,
-    /// That path modes are lost was told.
-    path_mode_told: bool,
     /// The first helix, how many there are, and their chords.
     helices: Option<(Source, usize, usize)>,
 }
@@ -202,7 +203,6 @@ impl<'a> Writer<'a> {
             loaded: None,
             spindle: None,
             begun: None,
-            path_mode_told: false,
             helices: None,
         };
         // Instance 1 is the project; it is written last.
@@ -275,7 +275,6 @@ impl<'a> Writer<'a> {
             Op::StoredOffset { .. } => self.cannot("storing a work offset (G10)", v),
             Op::WorkOffset(n, _) if n > 1 => self.cannot("more than one work offset", v),
             Op::Override(gr_ir::Override::Adaptive, true) => self.cannot("adaptive feed (M52)", v),
-            Op::PathMode(mode) if !self.options.planned => self.path_mode(mode, v),
             Op::ToolChange(_) => self.changed(v.state.prepared, v.source),
             Op::ToolNumber(number) => self.changed(number, v.source),
             Op::ToolOffset(offset) => self.offset(&offset, v),
@@ -300,18 +299,15 @@ impl<'a> Writer<'a> {
         }
     }
 
-    /// Told once: the first is the program's own, those of cycles come and go.
-    fn path_mode(&mut self, mode: PathMode, v: &View<'_, '_>) {
-        if std::mem::replace(&mut self.path_mode_told, true) {
-            return;
-        }
+    /// Told once, of the first that the program names.
+    fn path_mode(&mut self, mode: PathMode, source: Source) {
         let what = match mode {
             PathMode::ExactStop => "stopping at every corner (G61.1)".to_string(),
             PathMode::ExactPath => "exact corners (G61)".to_string(),
             PathMode::Blend(t) if t > 0.0 => format!("rounding corners by up to {t} mm (G64 P)"),
             PathMode::Blend(_) => "rounding corners (G64)".to_string(),
         };
-        let (file, span) = (self.place)(v.source);
+        let (file, span) = (self.place)(source);
         self.out.push(Diagnostic::new(code::STEPNC_NO_PATH_MODE, file, span, &[what]));
     }
 
@@ -718,6 +714,24 @@ impl<'a> Writer<'a> {
         out.push_str("ENDSEC;\nEND-ISO-10303-21;\n");
         out
     }
+}
+
+/// The first path mode that the program names: cycles go on the exact path and give back what was before.
+fn named_path_mode(program: &Program) -> Option<(PathMode, Source)> {
+    let mut held = None;
+    let mut cycle = false;
+    for s in program.steps() {
+        let own = held.is_some_and(|(_, at)| at == s.source);
+        match s.op {
+            Op::PathMode(_) if cycle && own => (held, cycle) = (None, false),
+            Op::PathMode(mode) if held.is_none() => held = Some((mode, s.source)),
+            Op::Begin { marker: Marker::Cycle, .. } if own => cycle = true,
+            _ if cycle && own => {}
+            _ if held.is_some() => break,
+            _ => {}
+        }
+    }
+    held
 }
 
 /// Entity of a body and what it has more than all of them. A ball has no radius of its own, a bull nose must have one.

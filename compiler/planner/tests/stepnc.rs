@@ -265,6 +265,43 @@ fn path_modes_are_told() {
     assert_eq!(told(&[PathMode::Blend(0.01)], true), Vec::<String>::new());
 }
 
+/// Cycles go on the exact path and give back what was before: nobody has named that.
+#[test]
+fn the_exact_path_of_a_cycle_is_its_own() {
+    let told = |own: Option<(u32, PathMode)>, back: bool| -> String {
+        let mut b = Build::new();
+        b.tool(1);
+        b.feed(5.0);
+        b.to(Op::Linear, 1.0, 1.0, 5.0);
+        let mut b = b.0;
+        let mut at = |line: u32, op: Op<'_>| b.push(op, Source { line, ..Source::default() });
+        if let Some((line, mode)) = own {
+            at(line, Op::PathMode(mode));
+        }
+        if back {
+            at(6, Op::PathMode(PathMode::ExactPath));
+        }
+        for _ in 0..2 {
+            at(6, Op::Begin { marker: Marker::Cycle, code: 810, text: "" });
+            at(6, Op::Dwell(1.0));
+            at(6, Op::Close(Marker::Cycle));
+        }
+        if back {
+            at(6, Op::PathMode(PathMode::Blend(0.0)));
+        }
+        at(7, Op::PathMode(PathMode::ExactStop));
+        at(8, Op::End);
+        let (_, notes) = write(&b.finish(), &Options::default()).expect("written");
+        let modes: Vec<String> = notes.into_iter().filter(|d| d.code == code::STEPNC_NO_PATH_MODE).map(|d| d.message).collect();
+        assert_eq!(modes.len(), 1);
+        modes.concat()
+    };
+    assert!(told(None, true).contains("G61.1"));
+    // In the block of the cycle or before it, it is the program's own.
+    assert!(told(Some((6, PathMode::ExactPath)), false).contains("(G61)"));
+    assert!(told(Some((5, PathMode::Blend(0.1))), true).contains("G64 P"));
+}
+
 #[test]
 fn an_unknown_tool_is_told() {
     let mut b = Build::new();
