@@ -70,6 +70,8 @@ struct Parser<'t, const KEEP: bool> {
     at: usize,
     out: Exchange,
     names: FxHashMap<Box<[u8]>, u32>,
+    /// Names of anchors.
+    anchors: rustc_hash::FxHashSet<Box<[u8]>>,
     /// Keywords seen lately: first eight bytes, length, number. Spares the hash table.
     recent: [(u64, usize, u32); 64],
     open: Vec<u32>,
@@ -123,6 +125,7 @@ impl<'t, const KEEP: bool> Parser<'t, KEEP> {
         at: 0,
         out: Exchange::default(),
         names: FxHashMap::default(),
+        anchors: rustc_hash::FxHashSet::default(),
         recent: [(0, 0, u32::MAX); 64],
         open: Vec::new(),
         last_id: 0,

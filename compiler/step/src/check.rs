@@ -60,6 +60,9 @@ pub fn check(text: &[u8], file: &Exchange) -> Vec<Fault> {
     check.known = file.keywords.iter().map(|k| resolve(schema, k)).collect();
     for n in 0..file.instances.len() as u32 {
         let i = &file.instances[n as usize];
+        if !i.damaged && text.get(i.start as usize) == Some(&b'<') {
+            check.anchor(n);
+        }
         if i.damaged || text.get(i.start as usize) != Some(&b'#') {
             continue;
         }
@@ -85,6 +88,15 @@ impl Check<'_> {
 
     fn keyword_span(&self, n: u32) -> Span {
         keyword_span(self.text, self.file, n)
+    }
+
+    /// What an anchor refers to is there.
+    fn anchor(&mut self, n: u32) {
+        for value in self.file.values_of(n) {
+            if let Some(id) = self.file.reference(self.text, *value).filter(|id| self.file.find(*id).is_none()) {
+                self.fault(code::P21_DANGLING_REFERENCE, Span::new(value.start, value.start + value.len()), vec![id.to_string()]);
+            }
+        }
     }
 
     fn instance(&mut self, n: u32) {

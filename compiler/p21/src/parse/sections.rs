@@ -4,8 +4,8 @@ use gr_spec::code;
 use gr_text::Span;
 
 use super::{Lost, Parser, Stage};
-use crate::index::skip_blank;
-use crate::lex::{DIGIT, LOWER, UPPER, is, peek, run};
+use crate::index::{first_on_line, skip_blank};
+use crate::lex::{self, DIGIT, LOWER, UPPER, is, peek, run};
 use crate::model::{Kind, Section};
 
 impl<const KEEP: bool> Parser<'_, KEEP> {
@@ -83,28 +83,104 @@ impl<const KEEP: bool> Parser<'_, KEEP> {
         let n = self.begin(0, start);
         let mut body = || -> Result<(), Lost> {
             self.resource()?;
+            let name = &self.text[start..self.at];
+            if self.section_name() == Some("ANCHOR") && !self.anchors.insert(name.into()) {
+                let written = String::from_utf8_lossy(name).into_owned();
+                self.fault(code::P21_UNEXPECTED, start, self.at, vec![written, "a name that no other anchor has".into()]);
+            }
             self.blank();
             if self.byte() != b'=' {
                 return Err(self.unexpected("`=`"));
             }
             self.at += 1;
-            // The value, and tags in braces, are read as they stand.
-            match memchr::memchr(b';', &self.text[self.at..]) {
-                Some(n) => {
-                    let (s, e) = (skip_blank(self.text, self.at), self.at + n);
-                    self.push(Kind::Resource, s.min(e), e);
-                    self.at = e + 1;
-                    Ok(())
-                }
-                None => {
-                    self.at = self.text.len();
-                    Err(self.unexpected("`;`"))
-                }
+            self.item()?;
+            while {
+                self.blank();
+                self.byte() == b'{'
+            } {
+                self.tag()?;
             }
+            if matches!(self.byte(), b'<' | b'@') && first_on_line(self.text, self.at) {
+                let end = self.text[..self.at].trim_ascii_end().len();
+                self.fault(code::P21_MISSING_SEMICOLON, end, end, vec!["the next statement begins".into(), ";".into()]);
+                return Ok(());
+            }
+            self.semicolon()
         };
         let result = body();
         self.end(n, result.is_err());
         result
+    }
+
+    /// A value on its own: that of an anchor, or of its tag.
+    fn item(&mut self) -> Result<(), Lost> {
+        self.blank();
+        let start = self.at;
+        match self.byte() {
+            b'(' => {
+                self.open_list(Kind::List, start)?;
+                self.at += 1;
+                return self.list();
+            }
+            b'#' => {
+                let digits = peek(self.text, start + 1).1;
+                let end = run(self.text, digits, DIGIT);
+                if end == digits {
+                    return self.constant(start);
+                }
+                self.push(Kind::Reference, start, end);
+            }
+            b'0'..=b'9' | b'+' | b'-' => match lex::number(self.text, start) {
+                Some((real, end)) if !self.text.get(end).is_some_and(|b| is(*b, UPPER | LOWER | DIGIT) || *b == b'.') => {
+                    self.push(if real { Kind::Real } else { Kind::Integer }, start, end);
+                }
+                _ => self.bad_number(start),
+            },
+            b'\'' => return self.string(start),
+            b'$' => self.push(Kind::Unset, start, start + 1),
+            b'.' => return self.enumeration(start),
+            b'"' => return self.binary(start),
+            b'<' | b'@' => return self.resource(),
+            _ => return Err(self.unexpected("a value")),
+        }
+        Ok(())
+    }
+
+    /// `{name:value}`
+    fn tag(&mut self) -> Result<(), Lost> {
+        self.at += 1;
+        self.blank();
+        let end = run(self.text, self.at, UPPER | LOWER | DIGIT);
+        if end == self.at {
+            return Err(self.unexpected("the name of a tag"));
+        }
+        self.at = end;
+        self.blank();
+        if self.byte() != b':' {
+            return Err(self.unexpected("`:`"));
+        }
+        self.at += 1;
+        self.item()?;
+        self.blank();
+        if self.byte() != b'}' {
+            return Err(self.unexpected("`}`"));
+        }
+        self.at += 1;
+        Ok(())
+    }
+
+    /// The section keyword that a word with a slip of the pen can only mean here; told once.
+    fn slip(&mut self, word: &[u8], end: usize) -> &'static str {
+        let next = peek(self.text, skip_blank(self.text, end)).0;
+        let meant: &[&'static str] = match self.section_name() {
+            Some(_) => &["ENDSEC"],
+            None if self.headed => &["DATA", "ANCHOR", "REFERENCE"],
+            None => &["HEADER"],
+        };
+        let near = |m: &&&'static str| near(m.as_bytes(), word);
+        let Some(name) = meant.iter().find(near).filter(|_| next == b';' && self.stage == Stage::Inside && !self.loose) else { return "" };
+        self.unexpected(&format!("`{name};`"));
+        name
     }
 
     pub(super) fn close_section(&mut self, end: usize) {
@@ -144,7 +220,13 @@ impl<const KEEP: bool> Parser<'_, KEEP> {
     pub(super) fn word(&mut self) -> Result<(), Lost> {
         let start = self.at;
         let end = self.word_end(start);
-        let clean: Vec<u8> = self.text[start..end].iter().filter(|b| **b >= 0x20).map(u8::to_ascii_uppercase).collect();
+        let mut clean: Vec<u8> = self.text[start..end].iter().filter(|b| **b >= 0x20).map(u8::to_ascii_uppercase).collect();
+        if !matches!(&clean[..], b"HEADER" | b"DATA" | b"ANCHOR" | b"REFERENCE" | b"SIGNATURE" | b"ISO" | b"END" | b"ENDSEC") {
+            let slip = self.slip(&clean, end);
+            if !slip.is_empty() {
+                clean = slip.into();
+            }
+        }
         let name = match &clean[..] {
             b"HEADER" => "HEADER",
             b"DATA" => "DATA",
@@ -154,14 +236,19 @@ impl<const KEEP: bool> Parser<'_, KEEP> {
             b"ISO" | b"END" => {
                 let end = memchr::memchr(b';', &self.text[start..]).map_or(self.text.len(), |n| start + n).min(start + 64);
                 let line: Vec<u8> = self.text[start..end].iter().copied().filter(|b| *b > 0x20).collect();
-                let last = line.starts_with(b"END-ISO-10303-21");
+                let right = line.starts_with(b"END-ISO-10303-21");
+                let slip = !right && clean == b"END" && line.starts_with(b"END-ISO") && self.stage == Stage::Inside;
+                if slip {
+                    self.unexpected("`END-ISO-10303-21;`");
+                }
+                let last = right || slip;
                 if last || line.starts_with(b"ISO-10303-21") {
                     self.exchange = true;
                     if last && self.stage == Stage::Inside {
                         self.still_open(start, end);
                         self.stage = Stage::Ended;
                     }
-                    self.at = start + self.text[start..end].iter().rposition(|b| *b == b'1').map_or(0, |n| n + 1);
+                    self.at = if slip { end } else { start + self.text[start..end].iter().rposition(|b| *b == b'1').map_or(0, |n| n + 1) };
                     return self.semicolon();
                 }
                 ""
@@ -211,7 +298,9 @@ impl<const KEEP: bool> Parser<'_, KEEP> {
             self.end(n, result.is_err());
             result?;
         }
-        self.semicolon()?;
+        if name != "SIGNATURE" || next == b';' {
+            self.semicolon()?;
+        }
         if name == "SIGNATURE" {
             // Encoded bytes up to the end of the section.
             match memchr::memmem::find(&self.text[self.at..], b"ENDSEC") {
@@ -253,5 +342,19 @@ impl<const KEEP: bool> Parser<'_, KEEP> {
         let body = body.and_then(|()| self.semicolon()).map_err(|lost| self.reopen(lost));
         self.end(n, body.is_err());
         body
+    }
+}
+
+/// Whether a word is a keyword with one letter wrong, missing, too many, or two that changed places.
+fn near(keyword: &[u8], word: &[u8]) -> bool {
+    let same = keyword.iter().zip(word).take_while(|(a, b)| a == b).count();
+    let (a, b) = (&keyword[same..], &word[same..]);
+    match (a, b) {
+        ([], [_]) | ([_], []) => true,
+        ([_, a @ ..], [_, b @ ..]) if a == b => true,
+        ([_, a @ ..], b) if a == b => true,
+        (a, [_, b @ ..]) if a == b => true,
+        ([p, q, a @ ..], [r, s, b @ ..]) => p == s && q == r && a == b,
+        _ => false,
     }
 }
