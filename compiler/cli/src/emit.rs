@@ -11,7 +11,7 @@ use gr_ir::{Program, Source};
 use gr_machine::Machine;
 use gr_planner::Tool;
 use gr_robot::along::is_planned;
-use gr_text::{Diagnostic, FileId};
+use gr_text::{Diagnostic, FileId, code};
 
 use crate::options::UnitArg;
 use crate::commands::check::Checked;
@@ -633,6 +633,9 @@ fn normalised(motion: &Motion, unit: &Unit, options: &TargetOptions, name: &str)
     }))
 }
 
+/// Decimals that round nothing away.
+const FINEST: usize = 9;
+
 /// What is to be said of a translation that depends on values nobody has named.
 fn state_told(motion: &Motion, unit: &Unit, options: &TargetOptions, o: &rs274ngc::Options, text: &str) -> Option<Diagnostic> {
     let begins_later = motion.program.steps().any(|s| s.source.line == gr_backends::from_line::INSERTED);
@@ -640,7 +643,17 @@ fn state_told(motion: &Motion, unit: &Unit, options: &TargetOptions, o: &rs274ng
         return None;
     }
     let to = gr_spec::Dialect::find(options.to.as_deref().unwrap_or("linuxcnc"))?;
-    crate::elsewhere::differs(unit, motion, text, to, allowed(options).max(1e-3) + 4.0 * o.arc_tolerance)
+    let differs = |text: &str| crate::elsewhere::differs(unit, motion, text, to, allowed(options).max(1e-3) + 4.0 * o.arc_tolerance);
+    let found = differs(text)?;
+    if found.code != code::EMIT_NOT_EQUAL || o.decimals >= Some(FINEST) {
+        return Some(found);
+    }
+    // Where points are closer than a decimal, roundings meet; what is the same with all decimals is the same.
+    let finest = rs274ngc::Options { decimals: Some(FINEST), ..o.clone() };
+    match rs274ngc::emit(&motion.program, &finest, &texts(motion)) {
+        Ok(finest) => differs(&finest.text),
+        Err(_) => Some(found),
+    }
 }
 
 /// One unit of the last decimal that is written. With straight pieces for arcs, their tolerance too; with arcs, what

@@ -136,6 +136,9 @@ impl Project {
             if gr_spec::TargetDef::find(&row.target).is_none() {
                 say(code::PROJECT_UNKNOWN_TARGET, &at("target"), std::slice::from_ref(&row.target));
             }
+            if let Some(name) = row.output.as_deref().and_then(placeholder) {
+                say(code::PROJECT_TARGET_OPTION, &at("output"), &["output".into(), format!("`{name}` stands for nothing; there are `{{name}}` and `{{extension}}`")]);
+            }
             for (key, value) in &row.options {
                 let alone = toml::Table::from_iter([(key.clone(), value.clone())]);
                 if let Err(why) = crate::commands::build::options_of(&alone) {
@@ -192,6 +195,12 @@ impl Project {
         closed.retain(|(p, _)| told.insert(p.clone()));
         (found, closed)
     }
+}
+
+/// The first `{…}` in the name of a result that stands for nothing.
+fn placeholder(output: &str) -> Option<&str> {
+    let ends = output.match_indices('{').filter_map(|(i, _)| Some(&output[i..=i + output[i..].find('}')?]));
+    ends.into_iter().find(|p| !matches!(*p, "{name}" | "{extension}"))
 }
 
 /// A step from a table to what is in it.
@@ -294,7 +303,7 @@ mod tests {
     fn names_that_stand_for_nothing() {
         let text = "schema = 1\n[project]\n# dialect = \"elvish\"\ndialect = \"elvish\"\n[[dialects]]\nfiles = \"*\"\ndialect = \"grbl\"\n\
                     [[dialects]]\nfiles = \"*\"\ndialect = \"dwarvish\"\n[lints]\nallow = [\"spindle/stopped\", \"E0203\"]\ndeny = [\"no/such\"]\n\
-                    [[targets]]\ntarget = \"rs274\"\n[[targets]]\ntarget = \"rs274ngc\"\ndecimals = 3\ndecimal = 4\narcs = \"q\"\n";
+                    [[targets]]\ntarget = \"rs274\"\noutput = \"{name}/{nam}.ngc\"\n[[targets]]\ntarget = \"rs274ngc\"\ndecimals = 3\ndecimal = 4\narcs = \"q\"\n";
         let project = Project::parse(Path::new("x"), FileId(0), text).unwrap();
         let found = project.faults(FileId(0), text);
         let told: Vec<_> = found.iter().map(|d| (d.code.def().code, &text[d.primary().1.range()])).collect();
@@ -306,6 +315,7 @@ mod tests {
                 ("E0805", "\"E0203\""),
                 ("E0804", "\"no/such\""),
                 ("E0846", "\"rs274\""),
+                ("E0847", "\"{name}/{nam}.ngc\""),
                 ("E0847", "\"q\""),
                 ("E0847", "4"),
             ]

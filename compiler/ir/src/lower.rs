@@ -6,6 +6,8 @@ use crate::state::{State, Sync, plane_axes};
 use crate::{Axes, Builder, FeedMode, Marker, Note, Op, Override, PathMode, Program, Stop, Turn, Units};
 use gr_canon::{At, Call, CallFrame, FrameId, Mark, Sink};
 
+/// Share of a coordinate, and of 1, that is no difference.
+const NOISE: f64 = 1e-12;
 const RAD: f64 = std::f64::consts::PI / 180.0;
 
 /// Builds a [`Program`] from the canonical stream.
@@ -63,8 +65,14 @@ impl Lowering {
     }
     #[inline]
     fn goto(&mut self, op: Op<'_>, axes: &Axes, source: Source) {
-        let pose = Pose::at(self.axes(axes));
-        self.out.push_to(op, &pose, source);
+        let mut end = self.axes(axes);
+        // Through inches and offsets a place comes back with other last bits: that is no motion.
+        for (to, from) in end.iter_mut().zip(&self.out.pose().axes) {
+            if *to != *from && (*to - *from).abs() <= NOISE * (1.0 + from.abs()) {
+                *to = *from;
+            }
+        }
+        self.out.push_to(op, &Pose::at(end), source);
     }
 
     fn arc(&mut self, ends: [f64; 3], center: [f64; 2], turns: i32, rest: &[f64; 6], source: Source) {

@@ -57,13 +57,13 @@ pub fn run(global: &Global, args: &BuildArgs) -> Exit {
 
 /// What the patterns of a project name now.
 fn listed(project: &Project, args: &BuildArgs) -> BTreeSet<PathBuf> {
-    rows(project, args).flat_map(|(_, patterns)| project.files(patterns).0).collect()
+    rows(project, args).flat_map(|(_, _, patterns)| project.files(patterns).0).collect()
 }
 
 /// The results that are asked for, each with the patterns of its sources.
-fn rows<'p>(project: &'p Project, args: &'p BuildArgs) -> impl Iterator<Item = (&'p crate::project::Target, &'p [String])> {
-    let asked = project.file.targets.iter().filter(|t| args.target.as_ref().is_none_or(|id| *id == t.target));
-    asked.map(|t| (t, if t.sources.is_empty() { &project.file.project.sources[..] } else { &t.sources[..] }))
+fn rows<'p>(project: &'p Project, args: &'p BuildArgs) -> impl Iterator<Item = (usize, &'p crate::project::Target, &'p [String])> {
+    let asked = project.file.targets.iter().enumerate().filter(|(_, t)| args.target.as_ref().is_none_or(|id| *id == t.target));
+    asked.map(|(i, t)| (i, t, if t.sources.is_empty() { &project.file.project.sources[..] } else { &t.sources[..] }))
 }
 
 /// When files were changed last; a file that is not there has no time.
@@ -80,6 +80,8 @@ struct Job<'s> {
     options: TargetOptions,
     /// None: standard output.
     goal: Option<PathBuf>,
+    /// The row of a project's targets that asks for it.
+    row: Option<usize>,
 }
 
 /// What a round of building came to.
@@ -231,7 +233,7 @@ impl<'a> Round<'a> {
             let mut options = self.args.options.clone();
             options.reference = options.reference.or(station.project.as_ref().and_then(|p| p.file.project.reference));
             let goal = out.map(|o| if is_folder(o) { o.join(file_name(source, target)) } else { o.to_path_buf() });
-            Some(Job { source: source.clone(), station, target, options, goal })
+            Some(Job { source: source.clone(), station, target, options, goal, row: None })
         };
         Ok(self.args.files.iter().enumerate().filter_map(job).collect())
     }
@@ -239,13 +241,14 @@ impl<'a> Round<'a> {
     fn project_jobs<'s>(&mut self, station: &'s Station, project: &Project) -> Result<Vec<Job<'s>>, String> {
         let mut jobs = Vec::new();
         if project.file.targets.is_empty() {
-            return Err(format!("{} has no [[targets]]", project.path.display()));
+            self.fault(project, None, "there are none; each row says what to make: `target = \"rs274ngc\"`".into());
+            return Ok(jobs);
         }
         if let Some(id) = self.args.target.as_ref().filter(|id| !project.file.targets.iter().any(|t| t.target == **id)) {
             target(id)?;
             return Err(format!("{} has no [[targets]] entry for {id}", project.path.display()));
         }
-        for (row, patterns) in rows(project, self.args) {
+        for (index, row, patterns) in rows(project, self.args) {
             let target = target(&row.target)?;
             let mut options = options_of(&row.options).map_err(|e| format!("{}: target {}: {e}", project.path.display(), row.target))?;
             options.reference = options.reference.or(project.file.project.reference);
@@ -265,10 +268,34 @@ impl<'a> Round<'a> {
                 let name = output.replace("{name}", &stem(&source)).replace("{extension}", target.extension);
                 self.files.push(source.clone());
                 self.listed.insert(source.clone());
-                jobs.push(Job { source, station, target, options: options.clone(), goal: Some(project.path_of(Path::new(&name))) });
+                jobs.push(Job { source, station, target, options: options.clone(), goal: Some(project.path_of(Path::new(&name))), row: Some(index) });
             }
         }
         Ok(jobs)
+    }
+
+    /// A fault of the project file's targets: of one row, or of all.
+    fn fault(&mut self, project: &Project, row: Option<usize>, why: String) {
+        use crate::project::{Step, place};
+        let text = std::fs::read_to_string(&project.path).unwrap_or_default();
+        let steps = [Step::Key("targets"), Step::Index(row.unwrap_or_default())];
+        let span = place(&text, &steps[..1 + usize::from(row.is_some())]);
+        let mut sources = Sources::default();
+        let file = sources.add(project.path.display().to_string(), text);
+        self.renderer.forget();
+        self.renderer.show(&sources, &Diagnostic::new(code::PROJECT_TARGET, file, span, &[why]));
+        self.fail(Exit::Findings);
+    }
+
+    /// What can't be made: by the command line, or by the project's row.
+    fn refused(&mut self, job: &Job<'_>, why: String) {
+        match (job.row, &job.station.project) {
+            (Some(row), Some(project)) => self.fault(project, Some(row), why),
+            _ => {
+                eprintln!("{why}");
+                self.fail(Exit::Usage);
+            }
+        }
     }
 
     fn job(&mut self, job: &Job<'_>, station: &Station) {
@@ -283,10 +310,7 @@ impl<'a> Round<'a> {
                 self.show_new(job, checked);
                 self.keep(job, station, built);
             }
-            Ok(Err(text)) => {
-                eprintln!("{text}");
-                self.fail(Exit::Usage);
-            }
+            Ok(Err(text)) => self.refused(job, text),
             Err(checked) => {
                 self.fail(if checked.unreadable { Exit::Io } else { Exit::Findings });
                 self.show_new(job, checked);
@@ -343,8 +367,8 @@ impl<'a> Round<'a> {
         }
         let taken = |g: &&PathBuf| self.args.depfile.as_ref() == Some(*g) || self.results.iter().map(|(p, _)| p).chain(self.written.iter().map(|(p, _)| p)).any(|p| p == *g);
         if let Some(twice) = goals.iter().find(taken) {
-            eprintln!("two results would both be written to {}: give them different names or folders", twice.display());
-            return self.fail(Exit::Usage);
+            let why = format!("two results would both be written to {}: give them different names or folders", twice.display());
+            return self.refused(job, why);
         }
         let all = goals.iter().chain(&self.args.depfile);
         if let Some(same) = read.iter().find(|r| all.clone().any(|g| same_file(r, g))) {
