@@ -42,6 +42,31 @@ fn faces() {
     }
 }
 
+/// No way in or out of a face goes through its bosses; one that finds no room is replaced, and that is said.
+#[test]
+fn ways_in_and_out_keep_off_the_bosses_of_a_face() {
+    let ways = ["PLUNGE_RAMP($,6.)", "PLUNGE_HELIX($,3.,5.)", "AP_RETRACT_ANGLE($,20.,6.)", "AP_RETRACT_TANGENT($,4.)"];
+    for s in ["$", "UNIDIRECTIONAL($,$,$,$)", "BIDIRECTIONAL($,$,$,.LEFT.,$)", "CONTOUR_PARALLEL($,$,.CCW.,.CLIMB.)"] {
+        for way in ways {
+            let j = good(&face_with_boss(s, way, "$", 6.0, [30.0, 20.0]));
+            let said = j.out.iter().any(|d| d.code == gr_text::code::PLAN_APPROACH_CHANGED);
+            // Straight lines that begin at the boss have no slope before them.
+            assert!(said || way != ways[2] || s.starts_with("CONTOUR"), "{s} {way}");
+            good(&face_with_boss(s, "$", way, 6.0, [30.0, 20.0]));
+        }
+    }
+}
+
+/// A boss near the edge of a face: the tool goes round it outside, whatever the strategy.
+#[test]
+fn behind_a_boss_near_the_edge_a_face_is_cut() {
+    for s in STRATEGIES.iter().filter(|s| !s.starts_with("CENTER")) {
+        let j = good(&face_with_boss(s, "$", "$", 10.0, [30.0, 6.2]));
+        let left: Vec<_> = j.out.iter().filter(|d| d.code == gr_text::code::PLAN_UNREACHABLE_CORNER).collect();
+        assert!(left.is_empty(), "{s}: {left:?}");
+    }
+}
+
 #[test]
 fn slots() {
     for end in ["OPEN_SLOT_END_TYPE()", "RADIUSED_SLOT_END_TYPE()", "FLAT_SLOT_END_TYPE(@,@)"] {

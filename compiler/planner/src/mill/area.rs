@@ -746,7 +746,14 @@ impl Job<'_> {
             what.step_left = s.step_left.unwrap_or(true);
         }
         let passes = self.connected(tp::face(&outline, &solid, &what).map_err(words)?);
-        tp::motion(&passes, &self.heights(0.0, self.bottom), &self.entry(true)?, None, self.radius).map_err(words)
+        // Approaches go anywhere but into bosses, whose allowance is in their outlines already.
+        let clear = if solid.is_empty() {
+            None
+        } else {
+            let around = solid.iter().map(Path2::bounds).fold(outline.bounds(), tp::Bounds::union).grown(self.room_to_enter() + overrun.max(0.0));
+            Some(Region::new(rectangle(around)?, solid).map_err(words)?)
+        };
+        tp::motion(&passes, &self.heights(0.0, self.bottom), &self.entry(true)?, clear.as_ref(), self.radius).map_err(words)
     }
 
     /// A face that ends inside the raw part has its neighbourhood cut by the overrun: that is said.
@@ -760,7 +767,14 @@ impl Job<'_> {
 
     /// A plane by a strategy that follows its edge: the tool's centre goes over all of it, and past it by the overrun.
     fn face_as_area(&self, e: &mut Emit<'_>, outline: &Path2, bosses: &[Boss], overrun: f64) -> Done<Moves> {
-        let (area, air) = self.face_room(outline, bosses, self.radius + overrun)?;
+        // Where a boss stands so near to the edge that the tool does not fit between, its rings go round it outside.
+        let mut near = false;
+        for boss in bosses {
+            let foot = path(&boss.boundary)?.sampled(self.radius / 4.0);
+            near |= foot.iter().any(|p| !outline.contains(*p) || outline.dist(*p) < 2.0 * (self.radius + self.m.allowance_side));
+        }
+        let beyond = self.radius + overrun;
+        let (area, air) = self.face_room(outline, bosses, if near { beyond.max(2.0 * self.radius + RUN_OUT) } else { beyond })?;
         if let Some(region) = area.at(self.bottom)?.first().filter(|_| !bosses.is_empty()) {
             self.rest(e, region, &[air], |_| true);
         }
@@ -838,9 +852,7 @@ impl Job<'_> {
                 let passes = tp::contour(&p, side, &what).map_err(words)?;
                 let h = if slope > 0.0 { self.level(above, y) } else { self.heights(0.0, self.bottom) };
                 let far = self.room_to_enter();
-                let b = p.bounds().grown(far);
-                let around = Path2::polyline(&[b.min, P2::new(b.max.x, b.min.y), b.max, P2::new(b.min.x, b.max.y)], true).map_err(words)?;
-                let outside = Region::new(around, vec![p.clone()]).map_err(words)?;
+                let outside = Region::new(rectangle(p.bounds().grown(far))?, vec![p.clone()]).map_err(words)?;
                 let inset = self.radius + self.m.allowance_side;
                 moves.extend(tp::motion(&passes, &h, &self.entry(false)?, Some(&outside), inset).map_err(words)?);
             }
@@ -896,4 +908,8 @@ impl Job<'_> {
         let inset = self.radius + self.m.allowance_side;
         tp::motion(&passes, &self.heights(0.0, self.bottom), &entry, free.as_ref(), inset).map_err(words)
     }
+}
+
+fn rectangle(b: tp::Bounds) -> Done<Path2> {
+    Path2::polyline(&[b.min, P2::new(b.max.x, b.min.y), b.max, P2::new(b.min.x, b.max.y)], true).map_err(words)
 }

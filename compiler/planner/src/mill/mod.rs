@@ -411,27 +411,30 @@ impl Job<'_> {
             e.say(code::PLAN_APPROACH_CHANGED, o.origin, &["the way out", "one along the tool axis", why]);
         }
     }
-    /// A helix or an arc that found no room was replaced by a slope or a plunge: that is said.
+    /// A helix, an arc or a slope that found no room was replaced by a slope or a plunge: that is said.
     fn check_approach(&self, e: &mut Emit<'_>, moves: &Moves) {
         let (what, with) = match &self.m.approach {
             Approach::Helix(..) => ("the helix of the approach", "a slope along the first pass"),
             Approach::Tangent(_) => ("the arc of the approach", "a plunge along the tool axis"),
+            Approach::Angle(..) => ("the slope of the approach", "a plunge along the tool axis"),
             _ => return,
         };
         let mut found = 0;
         let mut starts = 0;
-        let mut before = None;
-        let mut arc = false;
+        let mut before: Option<&tp::Move> = None;
+        let mut asked = false;
         for m in moves {
-            let tag = Some(m.tag);
             if m.tag == tp::Tag::Approach {
-                arc |= matches!(m.kind, tp::Kind::Arc { .. });
-            } else if before == Some(tp::Tag::Approach) {
+                asked |= match (&self.m.approach, m.kind) {
+                    (Approach::Angle(..), tp::Kind::Line) => before.is_some_and(|b| b.to.flat().dist(m.to.flat()) > 1e-9),
+                    (_, kind) => matches!(kind, tp::Kind::Arc { .. }),
+                };
+            } else if before.is_some_and(|b| b.tag == tp::Tag::Approach) {
                 starts += 1;
-                found += usize::from(arc);
-                arc = false;
+                found += usize::from(asked);
+                asked = false;
             }
-            before = tag;
+            before = Some(m);
         }
         if found < starts {
             let places = format!("at {} of {starts} places it has no room", starts - found);

@@ -281,6 +281,24 @@ pub fn face(strategy: &str, d: f64, angle: f64) -> Case {
     case("planar face", p, d / 2.0, 10.5, |_, _, _| 10.5)
 }
 
+/// A face with a round boss on it.
+pub fn face_with_boss(strategy: &str, approach: &str, retract: &str, d: f64, at: [f64; 2]) -> Case {
+    let mut p = Part::new(BLOCK);
+    let t = p.tool("ENDMILL", d, 0.0, None);
+    let m = Mill::new("PLANE_ROUGH_MILLING", t, 3.0, 0.6 * d).strategy(strategy).approach(approach).retract(retract);
+    let o = p.mill(&m);
+    let round = circle_profile(&mut p, 10.0);
+    let boss = boss(&mut p, [at[0], at[1], TOP], &round, 3.0, 0.0);
+    let path = p.length(60.0);
+    let along = p.direction([1.0, 0.0, 0.0]);
+    let path = p.add(format!("LINEAR_PATH($,#{path},#{along})"));
+    let width = p.number(40.0);
+    let width = p.add(format!("LINEAR_PROFILE($,#{width})"));
+    p.machine("PLANAR_FACE", &[o], [0.0, 0.0, TOP], Some(3.0), &format!(",#{path},#{width},$,({boss})"));
+    let stays = circle(at[0], at[1], 5.0);
+    case("face with a boss", p, d / 2.0, 9.0, move |x, y, grow| if inside(&stays, x, y) - grow < 0.0 { 9.0 } else { TOP })
+}
+
 pub fn step(strategy: &str, d: f64, tilt: f64) -> Case {
     let mut p = Part::new(BLOCK);
     let m = op(&mut p, "BOTTOM_AND_SIDE_FINISH_MILLING", d, strategy, "$");
