@@ -134,6 +134,25 @@ fn setups_of_a_job() {
     assert!(text(&bad.stderr).contains("needs `from_line` or `workingsteps`"), "{}", text(&bad.stderr));
 }
 
+/// A restart in a later setup needs none of those that are done; one that comes after it must still begin.
+#[test]
+fn a_restart_in_a_later_setup() {
+    let folder = tempfile::tempdir().unwrap();
+    let (source, job) = (folder.path().join("two.ngc"), folder.path().join("job.toml"));
+    std::fs::write(&source, "G21 G90 G54\nT1 M6\nG43 H1\nG0 X10 Y20 Z20\nG1 Z0 F600\nG0 Z20\nG54 G0 X0 Y0 Z20\nG1 Z5 F700\nG0 Z20\nM5\nM2\n").unwrap();
+    let told = |more: &str, line: &str| {
+        std::fs::write(&job, format!("[[setup]]\nname = \"a\"\nfrom_line = 1\n[[setup]]\nname = \"b\"\nfrom_line = 7\n{more}")).unwrap();
+        let o = run(&["build", source.to_str().unwrap(), "--machine", CELL, "--target", "rapid", "--job", job.to_str().unwrap(), "--from-line", line]);
+        (o.status.success(), text(&o.stderr))
+    };
+    for line in ["5", "7", "8"] {
+        let (made, told) = told("", line);
+        assert!(made, "{line}: {told}");
+    }
+    let (made, told) = told("[[setup]]\nname = \"c\"\nfrom_line = 11\n", "8");
+    assert!(!made && told.contains("E0551") && told.contains("'c' never begins"), "{told}");
+}
+
 /// `check` asks the robot with the same setups as `build`.
 #[test]
 fn check_takes_a_job() {

@@ -15,6 +15,7 @@ use gr_text::{Code, Diagnostic, Severity, code};
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::PI;
 
+use gr_backends::from_line::INSERTED;
 use gr_backends::sources::Words as Letters;
 
 use crate::cell::Cells;
@@ -195,6 +196,14 @@ pub(crate) struct Gather<'a> {
     offset: bool,
     /// That was told.
     offset_told: bool,
+    /// Directions in which the program believes the tool at a place because of its words.
+    said: [bool; 3],
+    /// The operation belongs to the way to a restart, and not to its line.
+    inserted: bool,
+    /// The program begins later than at its first line.
+    restarted: bool,
+    /// Made from features: every move says all.
+    planned: bool,
     /// Whether lines go by increments.
     increments: places::Increments,
     /// What the frame in force is placed by.
@@ -270,6 +279,10 @@ impl<'a> Gather<'a> {
             probed: None,
             offset: false,
             offset_told: false,
+            said: [!mill; 3],
+            inserted: false,
+            restarted: false,
+            planned: false,
             increments: places::Increments::default(),
             placed: None,
             path_said: false,
@@ -298,12 +311,15 @@ impl<'a> Gather<'a> {
     pub fn run(&mut self, program: &Program) {
         let mut unnamed = places::Unnamed::new(program, self.machine);
         self.closes = closing(program);
+        self.planned = program.steps().any(|s| matches!(s.op, Op::Begin { marker: Marker::Workingstep, .. }));
         let mut cursor = program.cursor();
         while let Some(view) = cursor.next() {
             if self.ended || self.findings.list.full() {
                 break;
             }
             self.source = leads_to(program, view.source);
+            self.inserted = view.source.line == INSERTED;
+            self.restarted |= self.inserted;
             // An error of its own; where the tool is afterwards nobody knows.
             self.rapids |= matches!(view.op, Op::RigidTap { .. });
             if !self.options.setups.is_empty() {
@@ -668,22 +684,36 @@ impl<'a> Gather<'a> {
     /// How far the tool stands from where the program believes it, in the work frame, where the tool offset was changed
     /// while it stood still.
     fn lag(&mut self, frame: u16, believed: [f64; 3]) -> [f64; 3] {
-        let Some(at) = self.at.filter(|_| self.offset && self.probed.is_none()) else { return [0.0; 3] };
-        let here = self.out.frames[usize::from(frame)].frame.inverse().apply(at.position);
-        let lag = sub(here, believed).map(|v| if v.abs() < NEAR { 0.0 } else { v });
-        self.offset = lag != [0.0; 3];
-        if self.offset && !std::mem::replace(&mut self.offset_told, true) {
-            let axes = (0..3).filter(|i| lag[*i] != 0.0);
-            let show = |p: [f64; 3]| axes.clone().map(|i| format!("{} {}", ["X", "Y", "Z"][i], gr_text::figures::number(p[i], 3))).collect::<Vec<_>>().join(" ");
-            self.findings.say(code::ROBOT_OFFSET_MOVED, Some(self.source), &[show(believed), show(here)]);
+        let mut lag = [0.0; 3];
+        if let Some(at) = self.at.filter(|_| self.offset && self.probed.is_none()) {
+            let here = self.out.frames[usize::from(frame)].frame.inverse().apply(at.position);
+            lag = sub(here, believed).map(|v| if v.abs() < NEAR { 0.0 } else { v });
+            self.offset = lag != [0.0; 3];
         }
+        (0..3).for_each(|i| self.said[i] |= lag[i] == 0.0);
         lag
+    }
+
+    /// Directions that a move brings to a coordinate: by its words, also where the program believes the tool there already,
+    /// or because they change.
+    fn named(&self, start: &Pose, end: &Pose, state: &State) -> [bool; 3] {
+        let letters = match self.inserted {
+            _ if self.planned => None,
+            // The way to a restart begins anywhere: it names what it changes.
+            true => Some(Letters::default()),
+            false => Letters::at(self.findings.sources, self.source.file, self.source.line),
+        };
+        let Some(letters) = letters else { return [true; 3] };
+        let home = (letters.g(280) || letters.g(300)) && !letters.names_axes();
+        // In a cycle the letter of its own axis is the depth, which each move takes when it gets there.
+        let depth = self.cycle.map(|_| gr_ir::plane_axes(state.plane).2);
+        [0, 1, 2].map(|i| start.axes[i] != end.axes[i] || home || letters.has(b"xyz"[i]) && depth != Some(i))
     }
 
     /// A move from where the tool stands instead of where the program believes it: what it doesn't name stays. None where
     /// a curve would be bent.
-    fn held<'v>(&mut self, op: Op<'v>, start: &Pose, end: &Pose, lag: [f64; 3]) -> Option<(Op<'v>, Pose, Pose)> {
-        let mut named = [0, 1, 2].map(|i| start.axes[i] != end.axes[i]);
+    fn held<'v>(&mut self, op: Op<'v>, start: &Pose, end: &Pose, state: &State, lag: [f64; 3]) -> Option<(Op<'v>, Pose, Pose)> {
+        let mut named = self.named(start, end, state);
         let mut op = op;
         match &mut op {
             Op::Arc(arc) => {
@@ -706,12 +736,25 @@ impl<'a> Gather<'a> {
         }
         // An increment goes on from where the tool stands.
         let increments = self.increments.at(self.findings.sources, self.source);
+        self.tell_offset(start.xyz(), lag, named.map(|n| !n || increments));
         let (mut from, mut to) = (*start, *end);
         for i in 0..3 {
             from.axes[i] += lag[i];
             to.axes[i] += if named[i] && !increments { 0.0 } else { lag[i] };
+            self.said[i] |= named[i] && !increments;
         }
         Some((op, from, to))
+    }
+
+    /// Tells once that the tool stands elsewhere than the program has said, where a move leaves it so.
+    fn tell_offset(&mut self, believed: [f64; 3], lag: [f64; 3], stays: [bool; 3]) {
+        let axes = (0..3).filter(|i| lag[*i] != 0.0 && stays[*i] && self.said[*i]);
+        let leaves = axes.clone().next().is_some();
+        if !leaves || std::mem::replace(&mut self.offset_told, true) {
+            return;
+        }
+        let show = |p: [f64; 3]| axes.clone().map(|i| format!("{} {}", ["X", "Y", "Z"][i], gr_text::figures::number(p[i], 3))).collect::<Vec<_>>().join(" ");
+        self.findings.say(code::ROBOT_OFFSET_MOVED, Some(self.source), &[show(believed), show(add(believed, lag))]);
     }
 
     fn nowhere(&mut self, here: [f64; 3], believed: [f64; 3]) {
@@ -816,7 +859,7 @@ impl<'a> Gather<'a> {
         let mut to = end.xyz();
         let lag = self.lag(frame, start.xyz());
         if lag != [0.0; 3] {
-            let Some((.., held)) = self.held(Op::Rapid, start, end, lag) else { return };
+            let Some((.., held)) = self.held(Op::Rapid, start, end, state, lag) else { return };
             to = held.xyz();
         }
         let words = self.words(start, end);
@@ -929,7 +972,7 @@ impl<'a> Gather<'a> {
         let view = if lag == [0.0; 3] {
             view
         } else {
-            let Some(held) = self.held(view.op, view.start, view.end, lag) else { return };
+            let Some(held) = self.held(view.op, view.start, view.end, state, lag) else { return };
             (op, first, last) = held;
             &View { op, start: &first, end: &last, ..*view }
         };

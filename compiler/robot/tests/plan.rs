@@ -820,3 +820,46 @@ fn a_jump_is_told_at_its_place() {
     let said = faults("G21 G90\nT1 M6\nG0 X-300 Y0 Z20\nG1 Z0 F600\nG1 X300\nG0 Z20\nM2\n", &machine);
     assert!(said.starts_with("E0520 line 5: ") && said.contains("X 0.000 Y 0.000 Z 0.000"), "{said}");
 }
+
+/// After a change of the offset a coordinate that a move names is one also where the program believes the tool there already.
+#[test]
+fn a_named_coordinate_is_reached_also_where_it_is_believed() {
+    let text = "G21 G90\nT1 M6\nG43 H1\nG0 X10 Y10 Z50\nG43.1 X5 Z10\nG0 X5 Y10 Z30\nG1 Z5 F600\nM30\n";
+    let p = planned(text, &cell()).unwrap_or_else(|e| panic!("{}", messages(&e, text)));
+    let places = |line: u32| -> Vec<[f64; 3]> {
+        let steps = p.program.steps.iter().filter(|s| s.source.is_some_and(|s| s.line + 1 == line));
+        let place = |s: &gr_robot::Step| match s.action {
+            Action::Linear { to, .. } | Action::Joint { to, .. } => Some(p.program.targets[to as usize].position.map(|v| (v * 1e6).round() / 1e6)),
+            _ => None,
+        };
+        steps.filter_map(place).collect()
+    };
+    assert_eq!((places(6), places(7)), (vec![[5.0, 10.0, 30.0]], vec![[5.0, 10.0, 5.0]]), "{}", told(&p));
+    assert!(!messages(&p.warnings, text).contains("E0555"), "{}", messages(&p.warnings, text));
+}
+
+/// The same on a five-axis mill: where its tilted tool is changed, and before its first move with a part that is clamped turned.
+#[test]
+fn mills_go_to_named_coordinates_after_a_tool_change() {
+    let machine = |rotation: &str| {
+        let tools = [75.2, 102.4].into_iter().enumerate().map(|(i, z)| format!("[[tool]]\nnumber = {}\nname = \"t{i}\"\nposition = [0, 0, {z}]\n", i + 1));
+        let text = format!(
+            "format = 1\nid = \"t/m\"\nextends = \"generic/mill5-ac-table\"\n[frames.part]\nposition = [10, 20, -100]\nrotation = {rotation}\n{}",
+            tools.collect::<String>()
+        );
+        gr_machine::parse(FileId(0), &text).unwrap_or_else(|e| panic!("{}", messages(&e, &text)))
+    };
+    let tip = |text: &str, machine: &Machine| {
+        let p = planned(text, machine).unwrap_or_else(|e| panic!("{}", messages(&e, text)));
+        assert!(!messages(&p.warnings, text).contains("E0555"), "{}", messages(&p.warnings, text));
+        let cut = |s: &gr_robot::Step| match s.action {
+            Action::Linear { to, rapid: false, .. } => Some(p.program.targets[to as usize].position.map(|v| (v * 1e6).round() / 1e6 + 0.0)),
+            _ => None,
+        };
+        p.program.steps.iter().filter_map(cut).collect::<Vec<_>>()
+    };
+    let two = "G21 G90\nT1 M6 G43 H1\nS1000 M3\nG0 X5 Y5 Z50 A-20 C30\nG1 Z0 F100\nG0 Z80\nM5\nT2 M6 G43 H2\nM3\nG0 X5 Y5 Z50\nG1 Z0 F100\nG0 Z80\nM5\nM2\n";
+    assert_eq!(tip(two, &machine("[0, 0, 0]")), [[5.0, 5.0, 0.0]; 2]);
+    let first = "G21 G90\nT1 M6 G43 H1\nS1000 M3\nG0 X0 Y0 Z50\nG1 Z0 F100\nG0 Z50\nM5\nM2\n";
+    assert_eq!(tip(first, &machine("[0, 0, 30]")), [[0.0; 3]]);
+}

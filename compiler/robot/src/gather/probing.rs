@@ -48,7 +48,7 @@ impl Gather<'_> {
             return;
         }
         let lag = self.lag(frame, view.start.xyz());
-        let Some((_, start, end)) = self.held(Op::Linear, view.start, view.end, lag) else { return };
+        let Some((_, start, end)) = self.held(Op::Linear, view.start, view.end, state, lag) else { return };
         let length = norm(sub(end.xyz(), start.xyz()));
         if length <= TINY {
             return;

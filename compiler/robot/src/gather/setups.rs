@@ -110,7 +110,12 @@ impl Gather<'_> {
 
     /// Every setup must be begun, and from a safe place.
     pub(super) fn setups_begin_safely(&mut self) {
+        // A restart leaves out the setups that are done.
+        let restart = self.begun.iter().filter_map(|i| self.options.setups[*i].from_line).min().filter(|_| self.restarted);
         for (i, s) in self.options.setups.iter().enumerate() {
+            if s.from_line.zip(restart).is_some_and(|(begins, restart)| begins < restart) {
+                continue;
+            }
             if !self.begun.contains(&i) && !self.findings.bad() {
                 let what = format!("setup `{}` never begins: the program makes no move there", s.name);
                 self.findings.say(code::JOB_BAD_VALUE, Some(s.place), &[what]);
