@@ -187,6 +187,11 @@ fn what_a_written_program_cannot_carry() {
     told("E0606", &[file("a.p21", &plan(&[]))], "build a.p21 --cutter-compensation control -o a.nc");
     let shifted = "G21 G90\nG0 X0 Y0 Z5\nG92 X10\nG92.2\nG0 X5\nX6\nG92.3\nG0 X7\nM2\n";
     told("E0650", &[file("a.ngc", shifted)], "build a.ngc --target rs274ngc --from-line 6 -o a.nc");
+    let project = |row: &str| [file("a.ngc", PART), file("gcc-robot.toml", &format!("schema = 1\n[project]\nsources = [\"a.ngc\"]\n{row}"))];
+    for row in ["[[targets]]\ntarget = \"rs274ngc\"\ninterval = 3\n", "", "[[targets]]\ntarget = \"rs274ngc\"\noutput = \"o\"\n[[targets]]\ntarget = \"svg\"\noutput = \"o\"\n"] {
+        told("E0854", &project(row), "build");
+        assert_eq!(codes(&project(row), "build").1, Some(1), "{row}");
+    }
     let touched = "G21 G90 G54\nG0 X1 Y2 Z3\nG10 L20 P2 X0 Y0 Z0\nG55 G0 X5 Y5 Z5\nG1 X6 F100\nM2\n";
     told("E0651", &[file("a.ngc", touched)], "build a.ngc --target rs274ngc --from-line 5 --safe-z 20 -o a.nc");
     told("E0614", &[file("a.ngc", PART)], "build a.ngc --target rs274ngc --from-line 4 -o a.nc");
