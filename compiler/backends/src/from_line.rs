@@ -7,7 +7,7 @@ pub(crate) use approach::is_lathe;
 
 use std::collections::BTreeMap;
 
-use crate::sources::{SYSTEMS, Words, is_hidden};
+use crate::sources::{SYSTEMS, Words, is_hidden, sets_here};
 use gr_ir::Sources;
 use gr_ir::{Axes, Builder, FrameId, Marker, Note, Op, Override, PathMode, Pose, Program, Source, State, Turn, Units};
 use gr_text::{Diagnostic, FileId, Span, code};
@@ -409,10 +409,9 @@ fn kept_here(program: &Program, index: usize, sources: &dyn Sources) -> BTreeMap
             Op::StoredOffset { number, offset, .. } | Op::WorkOffset(number, offset) => (number, offset),
             _ => continue,
         };
-        let Some(line) = sources.line(step.source.file, step.source.line).filter(|l| Words::of(l).g(100)) else { continue };
-        if line.to_ascii_lowercase().replace([' ', '\t'], "").contains("l20") {
+        if sets_here(sources, step.source) {
             kept.insert(number, (Op::StoredOffset { number, offset, rotation: 0.0 }, step.source));
-        } else {
+        } else if Words::at(sources, step.source.file, step.source.line).is_some_and(|w| w.g(100)) {
             kept.remove(&number);
         }
     }

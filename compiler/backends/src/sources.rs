@@ -112,6 +112,21 @@ pub fn is_hidden(program: &Program, index: usize) -> bool {
     before.take_while(|s| !s.op.moves()).any(|s| matches!(s.op, Op::Note(Note::Comment, "AXIS,hide")))
 }
 
+/// The number behind a letter of a source line, where it is a plain one.
+pub(crate) fn number_of(sources: &dyn Sources, letter: char, source: Source) -> Option<u32> {
+    let line = sources.line(source.file, source.line)?;
+    let code = line.split(['(', ';']).next()?.to_ascii_lowercase();
+    let rest = code.split_once(letter)?.1.trim_start();
+    let digits: String = rest.chars().take_while(char::is_ascii_digit).collect();
+    let after = rest[digits.len()..].chars().next();
+    if after == Some('.') { None } else { digits.parse().ok() }
+}
+
+/// Whether a line sets a work offset from where the tool stands (G10 L20).
+pub(crate) fn sets_here(sources: &dyn Sources, source: Source) -> bool {
+    Words::at(sources, source.file, source.line).is_some_and(|w| w.g(100)) && number_of(sources, 'l', source) == Some(20)
+}
+
 /// Codes, times ten, of the work offsets by their numbers.
 pub(crate) const SYSTEMS: [u32; 10] = [0, 540, 550, 560, 570, 580, 590, 591, 592, 593];
 

@@ -26,20 +26,25 @@ pub fn differs(unit: &Unit, source: &Motion, written: &str, to: &'static Dialect
         Some(Diagnostic::new(code, file, span, args))
     };
     let again = |setup: &Setup| motion_of("<translation>", written.to_string(), setup).program;
-    let same = diff(&source.program, &again(&there), &tolerance).differences;
+    let read = again(&there);
+    let mut same = diff(&source.program, &read, &tolerance).differences;
+    if same.iter().any(|d| d.aspect == Aspect::Feed) {
+        // Rounding to few decimals changes the feeds of short moves; a feed of another kind, or of another size, is none.
+        let loose = Tolerance { rate: 0.5, ..tolerance };
+        same.retain(|d| d.aspect != Aspect::Feed);
+        same.extend(diff(&source.program, &read, &loose).differences.into_iter().filter(|d| d.aspect == Aspect::Feed));
+    }
     // How the path is followed, each control has its own words for, and what it lacks has been told.
     let none: &[Aspect] = if to.id == "grbl" { &[Aspect::Control, Aspect::Tool, Aspect::Event] } else { &[Aspect::Control] };
-    // A sum of times has no place: it follows from the ways, which rounding moves.
-    // Rounding to few decimals changes the feeds of short moves; a feed of another kind, or of another size, is none.
-    let loose = Tolerance { rate: 0.5, ..tolerance };
-    let placed = |d: &Difference| d.a.or(d.b).is_some();
-    // A Fanuc program has no other end than M30, which changes the pallet; a source that just stops has none.
-    let ended = |d: &Difference| d.a.is_none() && to.family == Family::Fanuc;
-    let counts = |d: &&Difference| !none.contains(&d.aspect) && placed(d) && !ended(d);
-    let path = same.iter().find(|d| d.aspect == Aspect::Path).cloned();
-    let others = || diff(&source.program, &again(&there), &loose).differences.iter().find(counts).cloned();
-    let worst = path.or_else(|| same.iter().any(|d| counts(&d)).then(others).flatten());
-    if let Some(difference) = &worst {
+    let counts = |d: &&Difference| {
+        // A sum of times has no place: it follows from the ways, which rounding moves.
+        let placed = d.a.or(d.b).is_some();
+        // A Fanuc program has no other end than M30, which changes the pallet; a source that just stops has none.
+        let ended = d.a.is_none() && to.family == Family::Fanuc;
+        !none.contains(&d.aspect) && placed && !ended
+    };
+    let worst = same.iter().find(|d| d.aspect == Aspect::Path).or_else(|| same.iter().find(counts));
+    if let Some(difference) = worst {
         return told(difference, code::EMIT_NOT_EQUAL, std::slice::from_ref(&difference.message));
     }
     let (first, why) = first(unit, source, &tolerance, &[Aspect::Path, Aspect::Feed, Aspect::Event], |change| again(&change(&there)))?;

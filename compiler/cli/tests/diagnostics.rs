@@ -183,6 +183,9 @@ fn what_a_written_program_cannot_carry() {
     told("E0605", &[file("a.ngc", "G21 G90\nG10 L2 P2 X10\nG55 G0 X1\nM2\n")], "build a.ngc --target rs274ngc -o a.nc");
     let own = [file("a.ngc", "G20 G90\nT1 M6\nG0 X1\nM2\n"), file("a.ini", "[RS274NGC]\nREMAP=M6 modalgroup=6 ngc=change\n[TRAJ]\nLINEAR_UNITS=mm\n"), file("change.ngc", "o<change> sub\nG53 G0 Z1\nM6\no<change> endsub\nM2\n")];
     told("E0609", &own, "build a.ngc -i a.ini --target rs274ngc -o a.nc");
+    // The same way, with a wait more.
+    let waits = [file("a.ngc", "G21 G90\nT1 M6\nG0 X1\nM2\n"), own[1].clone(), file("change.ngc", "o<change> sub\nM6\nG4 P1\no<change> endsub\nM2\n")];
+    told("E0609", &waits, "build a.ngc -i a.ini --target rs274ngc -o a.nc");
     told("E0608", &[file("a.ngc", "G21 G90\nG0 X1 Y1 Z1\nG28.1\nM2\n")], "build a.ngc --target rs274ngc -o a.nc");
     told("E0606", &[file("a.p21", &plan(&[]))], "build a.p21 --cutter-compensation control -o a.nc");
     let shifted = "G21 G90\nG0 X0 Y0 Z5\nG92 X10\nG92.2\nG0 X5\nX6\nG92.3\nG0 X7\nM2\n";

@@ -3,7 +3,7 @@
 use super::emit::Emitter;
 use super::{ChangeAt, Language};
 use super::write::AXES;
-use crate::sources::Words;
+use crate::sources::{Words, number_of, sets_here};
 use gr_ir::{Axes, Op, Override, PathMode, Source, Turn, View};
 use gr_text::code;
 
@@ -111,7 +111,7 @@ impl Emitter<'_> {
         if !words.is_empty() {
             let fanuc = self.options.language == Language::FanucMill;
             // P0 is the one in force, whichever that is; on a Fanuc control it is another one.
-            let here = selected && !fanuc && set.is_some() && self.number_of('p', view.source) == Some(0);
+            let here = selected && !fanuc && set.is_some() && number_of(self.sources, 'p', view.source) == Some(0);
             self.store(if here { 0 } else { index }, index, &words, view.source);
         }
         self.offsets[index] = *offset;
@@ -121,6 +121,12 @@ impl Emitter<'_> {
             // Where its origin is the machine knows: the same numbers are another place.
             self.anchored = [false; 9];
         }
+    }
+
+    /// Whether the machine coordinates are known in which the axes of a block stand.
+    fn stands_known(&self, block: Option<Words>) -> bool {
+        let mut named = (0..9).filter(|i| block.is_some_and(|w| w.has(AXES[*i].to_ascii_lowercase() as u8)));
+        self.options.stored_known && named.all(|i| self.anchored[i] && !self.loose[i])
     }
 
     /// Writes G10 L2 for a work offset, called by its number or 0.
@@ -149,8 +155,7 @@ impl Emitter<'_> {
         }
         let set = self.words(view.source).filter(|w| w.g(100));
         self.motion_unsure();
-        if set.is_some() && self.number_of('l', view.source) == Some(20) {
-            let known = self.options.stored_known && self.anchored == [true; 9] && self.loose == [false; 9];
+        if sets_here(self.sources, view.source) {
             if self.options.language != Language::FanucMill {
                 // The numbers that the place has under that offset, wherever rounding has put it.
                 let mut there = *view.state;
@@ -159,7 +164,8 @@ impl Emitter<'_> {
                 let place = there.work_frame(&self.frame.machine(&self.at));
                 let words = self.changed_or_named(&place, &place, set);
                 return self.w.block(&format!("G10 L20 P{index} {}", words.join(" ")));
-            } else if !known {
+            }
+            if !self.stands_known(set) {
                 return self.cannot("a work offset set from where the tool stands (G10 L20)", view.source);
             }
         }
@@ -179,16 +185,15 @@ impl Emitter<'_> {
     /// what the offset becomes, only the machine knows. None: the block is something else.
     fn set_here(&mut self, n: u8, offset: &Axes, view: &View<'_, '_>) -> Option<String> {
         let words = self.words(view.source)?;
-        let here = words.g(100) && self.number_of('l', view.source) == Some(20);
+        let here = sets_here(self.sources, view.source);
         if here && self.options.language == Language::FanucMill {
-            let mut named = (0..9).filter(|i| words.has(AXES[*i].to_ascii_lowercase() as u8));
-            if !self.options.stored_known || !named.all(|i| self.anchored[i] && !self.loose[i]) {
+            if !self.stands_known(Some(words)) {
                 self.cannot("a work offset set from where the tool stands (G10 L20)", view.source);
                 return Some(String::new());
             }
             return None;
         }
-        let number = self.number_of('p', view.source).filter(|p| *p == 0 || *p == u32::from(n));
+        let number = number_of(self.sources, 'p', view.source).filter(|p| *p == 0 || *p == u32::from(n));
         if !here || number.is_none() || self.frame.work != n || self.frame.work_offset == *offset && !words.names_axes() {
             return None;
         }
@@ -318,8 +323,8 @@ impl Emitter<'_> {
         let zero = offset.iter().all(|v| *v == 0.0);
         // A tool that has not been measured has a length of 0 too, so for 0 the source decides.
         // A lathe's T names the offset with its last two digits.
-        let station = self.sources.increments().then(|| self.number_of('t', view.source)).flatten().map(|t| t % 100);
-        let asked = if words.is_some_and(|w| w.g(430)) { self.number_of('h', view.source) } else { station };
+        let station = self.sources.increments().then(|| number_of(self.sources, 't', view.source)).flatten().map(|t| t % 100);
+        let asked = if words.is_some_and(|w| w.g(430)) { number_of(self.sources, 'h', view.source) } else { station };
         let named = match words {
             // The length is the program's own.
             Some(w) if w.g(431) => None,
@@ -335,7 +340,7 @@ impl Emitter<'_> {
         // Nothing is known of the lengths of a machine without a tool table; the program says which it wants.
         let unmeasured = zero && !off && named.is_none();
         let wanted = words.is_some_and(|w| w.g(430)) || station.is_some();
-        let added = words.is_some_and(|w| w.g(432)).then(|| self.number_of('h', view.source)).flatten();
+        let added = words.is_some_and(|w| w.g(432)).then(|| number_of(self.sources, 'h', view.source)).flatten();
         let said = match station {
             Some(n) if unmeasured => Some(format!("G43 H{n}")),
             _ if unmeasured => self.length_asked(view),
@@ -381,21 +386,11 @@ impl Emitter<'_> {
         let code = line.split(['(', ';']).next()?;
         let tool = u32::try_from(view.state.tool).ok().filter(|t| *t > 0);
         let has_h = code.contains(['h', 'H']);
-        match self.number_of('h', view.source).or(tool.filter(|_| has_h || self.options.language == Language::FanucMill)) {
+        match number_of(self.sources, 'h', view.source).or(tool.filter(|_| has_h || self.options.language == Language::FanucMill)) {
             Some(number) => Some(format!("G43 H{number}")),
             // Without H it is the length of the tool in the spindle.
             None => (!has_h && self.options.language == Language::Linuxcnc).then(|| "G43".to_string()),
         }
-    }
-
-    /// The number behind a letter of a source line, where it is a plain one.
-    fn number_of(&self, letter: char, source: Source) -> Option<u32> {
-        let line = self.sources.line(source.file, source.line)?;
-        let code = line.split(['(', ';']).next()?.to_ascii_lowercase();
-        let rest = code.split_once(letter)?.1.trim_start();
-        let digits: String = rest.chars().take_while(char::is_ascii_digit).collect();
-        let after = rest[digits.len()..].chars().next();
-        if after == Some('.') { None } else { digits.parse().ok() }
     }
 
     /// The tool whose offset this is: the one that the source names first, then the one in the spindle.
