@@ -23,6 +23,8 @@ const SAME_HEIGHT: f64 = 1e-6;
 pub struct Options {
     /// Height of the approach in the work frame in force, mm; none = the highest point of the program.
     pub safe_z: Option<f64>,
+    /// Axes whose numbers hold on this machine only: offsets, which no file names, changed since they were said.
+    pub unsure: [bool; 9],
 }
 
 /// A program that begins later, and what there is to say about it.
@@ -32,6 +34,8 @@ pub struct Restart {
     pub program: Program,
     /// Warnings.
     pub notes: Vec<Diagnostic>,
+    /// Where the tool is brought, axis by axis in the work frame in force, mm and rad. None: it stays there.
+    pub goal: [Option<f64>; 9],
 }
 
 /// Lets a program begin at `line` (from 1) of `file`.
@@ -93,7 +97,8 @@ pub fn from_line(
         notes.push(Diagnostic::new(code::FROM_LINE_OFFSET_KEPT, file, span, &[]));
     }
     let lathe = approach::is_lathe(program);
-    let places = places(program, found.index, lathe, sources);
+    let mut places = places(program, found.index, lathe, sources);
+    places.iter_mut().zip(options.unsure).filter(|(p, unsure)| *unsure && **p == Place::Named).for_each(|(p, _)| *p = Place::Renamed);
     let cuts = cuts_first(program, found.index, sources);
     if places[2] == Place::Machine && cuts {
         return fault(code::FROM_LINE_HEIGHT_UNKNOWN);
@@ -103,7 +108,8 @@ pub fn from_line(
     let wait = !known[2] && !lathe && !cuts && axes_used(program)[2];
     let from = From { index: found.index, line, known, wait, lathe };
     let restart = build(program, &from, &state, &pose, safe.max(pose.axes[2]), sources);
-    Ok(Restart { program: restart, notes })
+    let goal = std::array::from_fn(|i| known[i].then_some(pose.axes[i]));
+    Ok(Restart { program: restart, notes, goal })
 }
 
 fn no_height(place: (FileId, Span), top: f64) -> Diagnostic {

@@ -132,7 +132,7 @@ fn judge(name: &str, text: &str, kind: Kind, setup: &Setup) -> usize {
     let top = moves(&program).filter(|m| m.1[2] != m.2[2]).map(|m| m.1[2].max(m.2[2])).fold(f64::NEG_INFINITY, f64::max);
     let mut possible = 0;
     for line in 1..=text.lines().count() as u32 {
-        let options = from_line::Options { safe_z: None };
+        let options = from_line::Options { safe_z: None, ..from_line::Options::default() };
         let Ok(restart) = from_line::from_line(&program, FileId(0), line, &options, &texts) else {
             continue;
         };
@@ -360,7 +360,7 @@ fn what_a_restart_tells() {
     let codes = |text: &str, line: u32| -> Vec<&'static str> {
         let program = reader::read(text, &setup()).expect("it runs");
         let texts = Texts::new([(FileId(0), text)]);
-        let o = from_line::Options { safe_z: Some(200.0) };
+        let o = from_line::Options { safe_z: Some(200.0), ..from_line::Options::default() };
         let found = match from_line::from_line(&program, FileId(0), line, &o, &texts) {
             Ok(restart) => restart.notes,
             Err(found) => found,

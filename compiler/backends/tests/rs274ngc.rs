@@ -392,7 +392,7 @@ fn tiny_helices_keep_a_radius() {
 fn a_restart_restores_outputs_and_feeds_down() {
     let text = "G21 G90\nM3 S100\nM64 P2\nM67 E0 Q3\nG0 X0 Y0 Z5\nG95 F0.1\nG1 Z-4 F2\nG1 X10 F2\nG1 X20 F2\nG0 Z5\nM5\nM2\n";
     let texts = Texts::new([(FileId(0), text)]);
-    let restart = from_line::from_line(&run(text), FileId(0), 9, &from_line::Options { safe_z: Some(5.0) }, &texts).expect("a start");
+    let restart = from_line::from_line(&run(text), FileId(0), 9, &from_line::Options { safe_z: Some(5.0), ..from_line::Options::default() }, &texts).expect("a start");
     let written = emit(&restart.program, &options(Language::Linuxcnc), &texts).expect("written").text;
     assert!(written.contains("M64 P2\n") && written.contains("M68 E0 Q3\n"), "{written}");
     // No rapid goes lower than those of the program.
@@ -404,7 +404,7 @@ fn starts_from_a_line() {
     let from = |text: &str, line: u32| {
         let program = run(text);
         let texts = Texts::new([(FileId(0), text)]);
-        let o = from_line::Options { safe_z: Some(25.0) };
+        let o = from_line::Options { safe_z: Some(25.0), ..from_line::Options::default() };
         from_line::from_line(&program, FileId(0), line, &o, &texts).map(|r| {
             let slugs: Vec<_> = r.notes.iter().map(|d| d.code.def().slug).collect();
             (emit(&r.program, &options(Language::Linuxcnc), &texts).expect("written").text, slugs)
@@ -435,7 +435,7 @@ fn a_restart_goes_down_to_no_height_that_nobody_named() {
     let text = "G21 G90 G17 G49\nT1 M6\nG43.1 Z50\nG54\nS3000 M3\nG0 X5 Y6\nX7\nG0 Z5\nG1 Z-1 F100\nX20\nM5\nM2\n";
     let texts = Texts::new([(FileId(0), text)]);
     for line in 4..=10 {
-        let o = from_line::Options { safe_z: Some(25.0) };
+        let o = from_line::Options { safe_z: Some(25.0), ..from_line::Options::default() };
         let restart = from_line::from_line(&run(text), FileId(0), line, &o, &texts).expect("a start");
         let mut lowest = f64::INFINITY;
         let mut cursor = restart.program.cursor();
@@ -454,7 +454,7 @@ fn a_restart_feeds_down_where_no_feed_is_in_force() {
     for (mode, feed) in [("G95 F.1", ""), ("G93", " F2")] {
         let text = format!("G21 G90 G94\nM3 S100\nG0 X0 Y0 Z5\n{mode}\nG1 Z-4{feed}\nG94\nG1 X10 F100\nX20\nG0 Z5\nX3\nG94\nG1 X4 F60\nM5\nM2\n");
         let texts = Texts::new([(FileId(0), text.as_str())]);
-        let o = from_line::Options { safe_z: Some(25.0) };
+        let o = from_line::Options { safe_z: Some(25.0), ..from_line::Options::default() };
         let restart = from_line::from_line(&run(&text), FileId(0), 7, &o, &texts).expect("a start");
         let mut down = Vec::new();
         let mut cursor = restart.program.cursor();
@@ -477,7 +477,7 @@ fn a_restart_feeds_down_where_no_feed_is_in_force() {
 fn a_restart_goes_to_no_place_of_the_machine() {
     let text = "G21 G90 G17 G40 G49\nG28 G91 Z0\nG90\nT1 M6\nG43 H1\nS3000 M3\nG0 X10 Y10\nG0 Z5\nG1 Z-1 F100\nX20\nG53 G0 Z-7\nM5\nT2 M6\nG28\nG0 X3\nG1 Z-1 F50\nM2\n";
     let texts = Texts::new([(FileId(0), text)]);
-    let o = from_line::Options { safe_z: Some(100.0) };
+    let o = from_line::Options { safe_z: Some(100.0), ..from_line::Options::default() };
     let approach = |line: u32| {
         let restart = from_line::from_line(&run(text), FileId(0), line, &o, &texts).expect("a start");
         let written = emit(&restart.program, &options(Language::Linuxcnc), &texts).expect("written").text;
@@ -503,7 +503,7 @@ fn a_restart_on_a_lathe_comes_from_outside() {
     let bore = format!("{head}G0 X8 Z5\nG1 X10 F.1\nG1 Z-20\nG4 P.5\nX11\nG0 X8\nZ5\nM5\nM2\n");
     let ways = |text: &str, line: u32| {
         let texts = Texts::new([(FileId(0), text)]);
-        let o = from_line::Options { safe_z: Some(5.0) };
+        let o = from_line::Options { safe_z: Some(5.0), ..from_line::Options::default() };
         let restart = from_line::from_line(&run(text), FileId(0), line, &o, &texts).expect("a start");
         let mut out = Vec::new();
         let mut cursor = restart.program.cursor();
@@ -525,7 +525,7 @@ fn a_restart_on_a_lathe_comes_from_outside() {
 fn a_safe_height_is_that_of_the_tool() {
     let text = "G21 G90\nT1 M6\nG0 X10 Y10\nG43.1 Z150\nG0 Z50\nG1 Z-1 F100\nM2\n";
     let texts = Texts::new([(FileId(0), text)]);
-    let o = from_line::Options { safe_z: Some(100.0) };
+    let o = from_line::Options { safe_z: Some(100.0), ..from_line::Options::default() };
     let restart = from_line::from_line(&run(text), FileId(0), 3, &o, &texts).expect("a start");
     let first = restart.program.steps().find(|s| s.op.moves()).expect("a move");
     assert_eq!(first.end.axes[2], 250.0);
@@ -547,7 +547,7 @@ fn a_reference_move_without_a_way_point_has_none() {
 fn no_start_in_a_thread() {
     let text = "G21 G90\nM3 S100\nG0 X0 Y10 Z5\nG33 Z-25 K1\nG4 P1\nG33 Z5 K1\nG0 X9\nG1 Z-1 F100\nM2\n";
     let texts = Texts::new([(FileId(0), text)]);
-    let o = from_line::Options { safe_z: Some(25.0) };
+    let o = from_line::Options { safe_z: Some(25.0), ..from_line::Options::default() };
     let found = from_line::from_line(&run(text), FileId(0), 5, &o, &texts).map(|_| ()).expect_err("no start");
     assert_eq!(found[0].code.def().slug, "from-line/inside-cycle");
     assert!(from_line::from_line(&run(text), FileId(0), 8, &o, &texts).is_ok());
@@ -559,7 +559,7 @@ fn no_start_in_a_thread() {
 fn a_restart_in_a_loop_stays_in_it() {
     let text = "G21 G90 F100\n#1=0\nG0 X0 Y0 Z5\no1 while [#1 lt 3]\n#1=[#1+1]\nG1 X#1\no1 endwhile\nG0 X9\nM2\n";
     let texts = Texts::new([(FileId(0), text)]);
-    let o = from_line::Options { safe_z: Some(5.0) };
+    let o = from_line::Options { safe_z: Some(5.0), ..from_line::Options::default() };
     let restart = from_line::from_line(&run(text), FileId(0), 5, &o, &texts).expect("a start");
     let ends: Vec<f64> = restart.program.steps().filter(|s| s.op == gr_ir::Op::Linear).map(|s| s.end.axes[0]).collect();
     assert_eq!(ends, [1.0, 2.0, 3.0]);
@@ -576,7 +576,7 @@ fn moves_before_a_tool_change_are_the_machines() {
     let texts = Texts::new([(FileId(0), text)]);
     let written = emit(&program, &options(Language::Linuxcnc), &texts).expect("written").text;
     assert!(written.contains("G53 G0 Z0"), "{written}");
-    let o = from_line::Options { safe_z: Some(50.0) };
+    let o = from_line::Options { safe_z: Some(50.0), ..from_line::Options::default() };
     let restart = from_line::from_line(&program, FileId(0), 5, &o, &texts).expect("a start");
     let lowest = restart.program.steps().filter(|s| s.op.moves()).map(|s| s.end.axes[2]).fold(f64::INFINITY, f64::min);
     assert_eq!(lowest, 3.0);
@@ -598,7 +598,7 @@ fn no_start_inside_a_cycle() {
     let text = "motion 1\nfile 0 \"a.ngc\"\nunits mm @0:1\nreset @0:1\nfeed 2 angular=1 @0:1\nrapid x=1 y=1 z=5 @0:2\nbegin cycle code=810 \"\" @0:3\nrapid z=1 @0:4\nlinear z=-3 @0:4\nclose cycle @0:3\nend @0:6\n";
     let program = gr_ir::text::parse(text).expect("motion");
     let texts = Texts::new([(FileId(0), "G21\n\n\n\n\nM2\n")]);
-    let o = from_line::Options { safe_z: Some(25.0) };
+    let o = from_line::Options { safe_z: Some(25.0), ..from_line::Options::default() };
     let found = from_line::from_line(&program, FileId(0), 4, &o, &texts).map(|_| ()).expect_err("no start");
     assert_eq!(found[0].code.def().slug, "from-line/inside-cycle");
 }

@@ -9,7 +9,7 @@ use gr_ir::{Marker, Op, Program, Source};
 use gr_spec::{Dialect, Family};
 use gr_text::{Diagnostic, code};
 
-use crate::pipeline::{Motion, Unit, motion_of};
+use crate::pipeline::{Motion, Unit, motion_of, motion_with};
 
 /// Where the translation goes another way: read back as it is, or on such a machine.
 pub fn differs(unit: &Unit, source: &Motion, written: &str, to: &'static Dialect, length: f64) -> Option<Diagnostic> {
@@ -66,8 +66,46 @@ pub fn compared(same: Diff, a: (&Unit, &Motion), b: &Unit, tolerance: &Tolerance
 }
 
 fn lowered(unit: &Unit, setup: &Setup) -> Program {
-    gr_driver::lower(&unit.name(), unit.text.clone(), setup, None).program
+    motion_with(unit, setup).program
 }
+
+/// What a restart knows of the place of the tool only because the simulation takes it for something.
+pub enum Doubt {
+    /// Axes whose numbers were said under an offset that is another one by now.
+    Axes([bool; 9]),
+    /// The program needs the place of these axes, and such a machine has another.
+    Place { axes: String, machine: &'static str, remedy: &'static str },
+}
+
+/// Runs a program that begins later on such a machine too. `goal`: where the tool is brought; `restart`: where it is there.
+pub fn doubt(unit: &Unit, motion: &Motion, goal: &[Option<f64>; 9], restart: impl Fn(&Motion) -> Option<[Option<f64>; 9]>) -> Option<Doubt> {
+    if motion.plan.is_some() || unit.setup.dialect.family == Family::Ufmg2008 {
+        return None;
+    }
+    let mut unsure = [false; 9];
+    for machine in machines(motion) {
+        // Both returns of a cycle are clear of the part.
+        for unknown in Unknown::ALL.into_iter().filter(|u| *u != Unknown::Return && u.is(&unit.setup, motion)) {
+            let mut setup = unit.setup.clone();
+            unknown.change(&mut setup, machine);
+            // A program that ends before on such a machine is not for it.
+            let Some(there) = restart(&motion_with(unit, &setup)) else { continue };
+            let axes = |differs: fn(f64, Option<f64>) -> bool| std::array::from_fn(|i| goal[i].is_some_and(|g| differs(g, there[i])));
+            let moved: [bool; 9] = axes(|here, there| there.is_some_and(|t| (t - here).abs() > NEAR_ENOUGH));
+            if moved.contains(&true) {
+                let letters = "XYZABCUVW".chars().zip(moved).filter(|(_, m)| *m);
+                let axes = letters.map(|(letter, _)| letter.to_string()).collect::<Vec<_>>().join(" ");
+                return Some(Doubt::Place { axes, machine: unknown.machine(), remedy: unknown.remedy() });
+            }
+            let unnamed: [bool; 9] = axes(|_, there| there.is_none());
+            unsure.iter_mut().zip(unnamed).for_each(|(all, u)| *all |= u);
+        }
+    }
+    unsure.contains(&true).then_some(Doubt::Axes(unsure))
+}
+
+/// Places that differ by less, mm or rad, are the same.
+const NEAR_ENOUGH: f64 = 1e-6;
 
 /// Makes of a machine another one.
 type Change<'a> = &'a dyn Fn(&Setup) -> Setup;

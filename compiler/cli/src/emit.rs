@@ -15,6 +15,7 @@ use gr_text::{Diagnostic, FileId, code};
 
 use crate::options::UnitArg;
 use crate::commands::check::Checked;
+use crate::elsewhere::{self, Doubt};
 use crate::output::Pending;
 use crate::pipeline::{Motion, Unit, motion, run};
 use crate::sources::Sources;
@@ -363,7 +364,7 @@ fn calls(unit: &Unit, program: String, tools: Option<gr_interp::ToolTable>) -> V
 
 fn of_motion(mut motion: Motion, unit: &Unit, goal: &Goal<'_>) -> Result<Built, String> {
     if let Some((line, safe_z)) = goal.from_line {
-        restart(&mut motion, line, safe_z);
+        restart(&mut motion, unit, line, safe_z);
     }
     if motion.found.iter().any(|d| d.severity == gr_text::Severity::Error) {
         return Ok(built(motion, Vec::new(), Vec::new()));
@@ -442,12 +443,24 @@ fn built(motion: Motion, artifacts: Vec<Artifact>, more: Vec<Diagnostic>) -> Bui
 }
 
 /// Lets the program begin later.
-fn restart(motion: &mut Motion, line: u32, safe_z: Option<f64>) {
-    let options = gr_backends::from_line::Options { safe_z };
-    let made = {
-        let texts = texts(motion);
-        gr_backends::from_line::from_line(&motion.program, FileId(0), line, &options, &texts)
+fn restart(motion: &mut Motion, unit: &Unit, line: u32, safe_z: Option<f64>) {
+    let begin = |motion: &Motion, unsure| {
+        let options = gr_backends::from_line::Options { safe_z, unsure };
+        gr_backends::from_line::from_line(&motion.program, FileId(0), line, &options, &texts(motion))
     };
+    let sure = [false; 9];
+    let doubt = |goal: &[Option<f64>; 9]| elsewhere::doubt(unit, motion, goal, |there| Some(begin(there, sure).ok()?.goal));
+    let mut made = begin(motion, sure);
+    let mut doubted = made.as_ref().ok().and_then(|restart| doubt(&restart.goal));
+    if let Some(Doubt::Axes(unsure)) = doubted {
+        made = begin(motion, unsure);
+        doubted = made.as_ref().ok().and_then(|restart| doubt(&restart.goal));
+    }
+    if let Some(Doubt::Place { axes, machine, remedy }) = doubted {
+        let (file, span) = gr_backends::Sources::place(&texts(motion), Source { line: line - 1, ..Source::default() });
+        motion.found.push(Diagnostic::new(code::FROM_LINE_PLACE_UNKNOWN, file, span, &[axes, machine.into(), remedy.into()]));
+        return;
+    }
     match made {
         Ok(restart) => {
             motion.program = restart.program;
@@ -643,7 +656,7 @@ fn state_told(motion: &Motion, unit: &Unit, options: &TargetOptions, o: &rs274ng
         return None;
     }
     let to = gr_spec::Dialect::find(options.to.as_deref().unwrap_or("linuxcnc"))?;
-    let differs = |text: &str| crate::elsewhere::differs(unit, motion, text, to, allowed(options).max(1e-3) + 4.0 * o.arc_tolerance);
+    let differs = |text: &str| elsewhere::differs(unit, motion, text, to, allowed(options).max(1e-3) + 4.0 * o.arc_tolerance);
     let found = differs(text)?;
     if found.code != code::EMIT_NOT_EQUAL || o.decimals >= Some(FINEST) {
         return Some(found);

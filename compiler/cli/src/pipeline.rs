@@ -146,8 +146,17 @@ pub fn motion(unit: &Unit, machine: Option<&gr_machine::Machine>) -> Result<(Mot
     }
     let motion = gr_driver::lower(&unit.name(), unit.text.clone(), &unit.setup, Some(&unit.rules()));
     let checked = if motion.clean { unit.told(Checked::nothing()) } else { unit.check()? };
-    let increments = unit.setup.dialect.id == "fanuc-turn";
-    Ok((Motion { increments, ..plain(motion) }, checked))
+    Ok((Motion { increments: increments(&unit.setup), ..plain(motion) }, checked))
+}
+
+/// Motion of a program on another machine, unchecked.
+pub fn motion_with(unit: &Unit, setup: &Setup) -> Motion {
+    Motion { increments: increments(setup), ..plain(gr_driver::lower(&unit.name(), unit.text.clone(), setup, None)) }
+}
+
+/// Whether U V W are increments of X Y Z.
+fn increments(setup: &Setup) -> bool {
+    setup.dialect.id == "fanuc-turn"
 }
 
 /// Motion of a text of our own making.
@@ -168,7 +177,7 @@ pub fn motion_for(name: &str, text: &str, setup: &Setup, machine: &gr_machine::M
     if setup.dialect.family == Family::Ufmg2008 {
         return ufmg(name, text, setup.dialect, Some(machine));
     }
-    Motion { increments: setup.dialect.id == "fanuc-turn", ..motion_of(name, text.to_string(), setup) }
+    Motion { increments: increments(setup), ..motion_of(name, text.to_string(), setup) }
 }
 
 /// The UFMG 2008 language has commands of its own and no interpreter state.

@@ -197,6 +197,15 @@ fn what_a_written_program_cannot_carry() {
     }
     let touched = "G21 G90 G54\nG0 X1 Y2 Z3\nG10 L20 P2 X0 Y0 Z0\nG55 G0 X5 Y5 Z5\nG1 X6 F100\nM2\n";
     told("E0651", &[file("a.ngc", touched)], "build a.ngc --target rs274ngc --from-line 5 --safe-z 20 -o a.nc");
+    // The height was said in G54, and the cut is in G55.
+    let fixture = "G21 G90 G54\nG0 X0 Y0 Z30\nG1 Z1 F100\nG55\nG1 X5\nG1 X10\nM2\n";
+    let restart = "build a.ngc --target rs274ngc --from-line 6 --safe-z 60 -o a.nc";
+    told("E0652", &[file("a.ngc", fixture)], restart);
+    let stored = file("a.var", "5220 1\n5221 10\n5223 -30\n5241 10\n5243 -50\n");
+    assert!(codes(&[file("a.ngc", fixture), stored], &format!("{restart} --vars a.var")).0.is_empty());
+    // Nothing cuts before the height is said again.
+    let clear = fixture.replace("G1 X5", "G0 X5 Y6 Z30").replace("G1 X10", "G1 Z1");
+    assert!(codes(&[file("a.ngc", &clear)], &restart.replace('6', "5")).0.is_empty());
     told("E0614", &[file("a.ngc", PART)], "build a.ngc --target rs274ngc --from-line 4 -o a.nc");
     let deep = "G21 G90 F100\nG0 X0 Y0 Z5\nX9\nG1 Z-3\nX5\nG0 Z5\nX20\nG1 Z-3\nX30\nM2\n";
     let bare = "G21 G90 F100\nT1 M6\nG0 X1 Y1\nG43 H1 Z5\nG1 Z-1\nM2\n";
