@@ -190,13 +190,14 @@ impl Unknown {
     }
 
     fn change(self, setup: &mut Setup, n: &Numbers) {
+        let unit = if setup.machine_units == gr_canon::Units::Inch { 1.0 / 25.4 } else { 1.0 };
         match self {
             Unknown::Stored => {
                 // No origin is where another is.
                 setup.params.insert(5220, n.system);
                 for (k, base) in [5161u32, 5181, 5211].into_iter().chain((1..=9).map(|n| 5201 + 20 * n)).enumerate() {
                     for axis in 0..9u32 {
-                        setup.params.insert(base + axis, n.origin + n.step * k as f64 + 0.75 * f64::from(axis));
+                        setup.params.insert(base + axis, unit * (n.origin + n.step * k as f64 + 0.75 * f64::from(axis)));
                     }
                 }
                 setup.params.insert(5210, 1.0);
@@ -204,11 +205,11 @@ impl Unknown {
             Unknown::Tools => {
                 for tool in setup.tools.rows.iter_mut().skip(1).filter(|t| &*t.comment == ASSUMED) {
                     let number = f64::from(tool.number % 100);
-                    tool.offset[2] = n.length + 0.25 * number;
-                    tool.diameter = 0.02 + 0.001 * number;
+                    tool.offset[2] = unit * (n.length + 0.25 * number);
+                    tool.diameter = unit * (0.02 + 0.001 * number);
                 }
             }
-            Unknown::Start => setup.start = std::array::from_fn(|i| n.start * (1.0 + 0.125 * i as f64)),
+            Unknown::Start => setup.start = std::array::from_fn(|i| unit * n.start * (1.0 + 0.125 * i as f64)),
             Unknown::Return => {
                 setup.ini.values.insert(("rs274ngc".into(), "rs274ngc_startup_code".into()), vec!["G98".into()]);
             }
@@ -216,7 +217,7 @@ impl Unknown {
     }
 }
 
-/// Numbers of a machine, none of which can be mistaken for zero or for another.
+/// Numbers of a machine, mm, none of which can be mistaken for zero or for another.
 struct Numbers {
     /// The work offset in force.
     system: f64,

@@ -179,6 +179,10 @@ fn what_a_written_program_cannot_carry() {
     told("E0602", &[input], "build a.ngc --target rs274ngc -o a.nc");
     let arc = file("a.ngc", "G21 G90 G17 F100\nG0 X0.1234 Y0.5678 Z0\nG3 X10.7777 Y3.3333 R7.123\nM2\n");
     told("E0603", std::slice::from_ref(&arc), "build a.ngc --target rs274ngc --decimals 1 -o a.nc");
+    // Compensation makes a spiral of an arc: its radii differ by 0.9 µm.
+    let spiral = "G21 G90 G17 G54 F200\nG0 X0 Y0 Z5\nG42.1 D2.394\nG1 X107.5 Y45.4\nX205 Z1\nG3 X260 Y67 R90\nG40\nG0 Z30\nM2\n";
+    told("E0653", &[file("a.ngc", spiral)], "build a.ngc --target rs274ngc --decimals 7 --arcs r -o a.nc");
+    assert!(codes(&[file("a.ngc", spiral)], "build a.ngc --target rs274ngc --decimals 7 -o a.nc").0.is_empty());
     told("E0604", &[arc], "build a.ngc --target rs274ngc --to grbl --arcs ijk-absolute -o a.nc");
     told("E0605", &[file("a.ngc", "G21 G90\nG10 L2 P2 X10\nG55 G0 X1\nM2\n")], "build a.ngc --target rs274ngc -o a.nc");
     let own = [file("a.ngc", "G20 G90\nT1 M6\nG0 X1\nM2\n"), file("a.ini", "[RS274NGC]\nREMAP=M6 modalgroup=6 ngc=change\n[TRAJ]\nLINEAR_UNITS=mm\n"), file("change.ngc", "o<change> sub\nG53 G0 Z1\nM6\no<change> endsub\nM2\n")];
@@ -244,6 +248,11 @@ fn what_a_robot_cannot_do() {
 #[test]
 fn a_translation_holds_on_every_machine_or_says_so() {
     let program = |text: &str| [("a.ngc", text.to_string())];
+    // On inch machines too: the arc that another start has is no greater there than on others.
+    for unit in ["mm", "inch"] {
+        let found = codes(&program("G21 G90 F100\nG2 X12 Y-16 R200\nM2\n"), &format!("build a.ngc --machine-units {unit} -o o.ngc"));
+        assert_eq!(found, (vec!["E0607".into()], Some(0)), "{unit}");
+    }
     for text in [
         "G21 G90\nG10 L2 P1 X0 Y0 Z0\nG54 G0 X1 Y1 Z5\nM2\n",
         "G21 G90\nG10 L2 P2 X[#5221+5]\nG55 G0 X1\nM2\n",

@@ -155,3 +155,18 @@ fn a_retract_to_the_machine_is_no_dive() {
     let text = "G21 G43.1 Z150 F100\nM3 S100\nG0 X0 Y0 Z5\nG1 Z-12\nX20\nY20\nX10 Y10\nG53 G0 Z0\nM5\nM2\n";
     assert_eq!(found(text), Vec::<String>::new());
 }
+
+#[test]
+fn a_cycle_from_a_place_of_the_machine_starts_as_high_as_only_the_machine_knows() {
+    let holes = |before: &str| found(&format!("G21 G90 F100\nM3 S100\nG0 X1 Y1\n{before}\nG98 G81 X5 Y5 Z-5 R2\nX9\nG80\nM5\nM2\n"));
+    for before in ["G53 G0 Z0", "G28", "G91 G28 Z0\nG90", "G53 G0 Z0\nG0 X5", "G53 G0 Z0\nG0 X1\nG2 X3 I1"] {
+        assert_eq!(holes(before), Vec::<String>::new(), "{before}");
+    }
+    for before in ["G53 G0 Z0\nG0 Z0", "G53 G0 X0", "G91 G28 X0\nG90", "G28\nG1 X0 Y0 Z0"] {
+        let line = 5 + before.matches('\n').count();
+        assert_eq!(holes(before), [format!("{line}: cycle/starts-below-r")], "{before}");
+    }
+    // The next cycle starts where the first ended.
+    let two = "G21 G90 F100\nM3 S100\nG53 G0 Z0\nG99 G81 X5 Y5 Z-5 R2\nG80\nG81 X9 Z-5 R4\nG80\nM5\nM2\n";
+    assert_eq!(found(two), ["6: cycle/starts-below-r"]);
+}

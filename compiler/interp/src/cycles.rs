@@ -145,6 +145,7 @@ impl<S: Sink> Interp<'_, S> {
             return Err(normal_missing(plane));
         }
         let given = self.block.get(normal).unwrap_or(self.m.cycle_cc);
+        let parked = std::mem::replace(&mut self.m.parked, 0);
         let level = self.m.current[axes[2]];
         let first_block = self.m.cycle_il_set == 0;
         if first_block {
@@ -160,7 +161,8 @@ impl<S: Sink> Interp<'_, S> {
                 .arg(format!("{:.4}", hole.bottom)));
         }
         if old < hole.retract {
-            if first_block && self.m.incremental == 0 {
+            let known = parked >> axes[2] & 1 == 0 || !self.setup.params.is_empty();
+            if first_block && self.m.incremental == 0 && known {
                 self.warn(Fault::own(code::CYCLE_STARTS_BELOW_R).at(b'r').arg(format!("{:.4}", hole.retract)));
             }
             let mut up = self.m.current;

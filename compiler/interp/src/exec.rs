@@ -311,6 +311,10 @@ impl<S: Sink> Interp<'_, S> {
             // In inverse time the feed comes from the length.
             self.leaves_probed(motion == 0 || self.m.feed_mode != 1 && matches!(motion, 10 | 382..=385));
         }
+        let machine = self.block.g(Group::NonModal) == 530;
+        if (machine || self.m.parked != 0) && motion != 800 && !crate::check::is_cycle(motion) {
+            self.park(machine);
+        }
         if self.config.any_indexer && self.index_motion(motion)? {
             return Ok(());
         }

@@ -270,6 +270,17 @@ impl<S: Sink> Interp<'_, S> {
         self.rests_on_probed();
     }
 
+    /// A block sends axes to places, of the machine or of the work frame.
+    #[cold]
+    pub(crate) fn park(&mut self, machine: bool) {
+        let named = (0..3).filter(|i| self.block.has(AXIS_LETTERS[*i])).fold(0, |mask, i| mask | 1u8 << i);
+        if machine {
+            self.m.parked |= named;
+        } else if self.m.incremental == 0 {
+            self.m.parked &= !named;
+        }
+    }
+
     /// What follows depends on where a probe stopped, if that still shows.
     pub(crate) fn rests_on_probed(&mut self) {
         if self.m.loose != 0 {

@@ -348,6 +348,10 @@ impl<S: Sink> Interp<'_, S> {
         }
         let mut end = self.find_ends()?;
         not_with_comp(self.m.comp_side, rs274::RT_COMP_G28, "G28 or G30")?;
+        match self.has_axes() {
+            true => self.park(true),
+            false => self.m.parked = 0b111,
+        }
         self.index_before(&end);
         self.emit(Call::StraightTraverse(end));
         self.m.current = end;

@@ -151,8 +151,11 @@ pub struct Modal {
     pub turned: u8,
     /// Axes X Y Z A B C, by bits, that stand where a probe stopped: no word has sent them to a place since.
     pub loose: u8,
+    /// Axes X Y Z, by bits, that a block sent to a place of the machine (G28, G30, G53), and no word to one of the work frame
+    /// since. How high that is there, only the machine knows.
+    pub parked: u8,
     /// Always 0; keeps the size a multiple of eight.
-    pub pad: [u8; 3],
+    pub pad: [u8; 2],
 }
 
 impl Modal {

@@ -112,6 +112,9 @@ impl Emitter<'_> {
                 self.part(view, sweep, plane, (at(k), at(k + 1)), turns.signum(), depth + 1);
             }
         } else {
+            if sweep.shape.pieces(self.options.arc_tolerance) > 1 {
+                self.say(code::EMIT_ARC_PIECES, view.source, &[self.options.arc_tolerance.to_string()]);
+            }
             self.arc_as_lines(view, sweep, from, to);
         }
     }
