@@ -119,7 +119,8 @@ fn rs274(dir: &Path, code: &mut String) {
     }
     writeln!(code, "];\n/// The message texts of LinuxCNC's `rs274`, used by `gcc-robot rs274` alone.\npub mod rs274 {{").expect("string");
     for (i, (key, text)) in rows.iter().enumerate() {
-        writeln!(code, "/// {}\npub const {}: crate::Rs274 = crate::Rs274({i});", text.replace('\n', " "), constant(key)).expect("string");
+        let shown = if text.is_empty() { "No text.".to_string() } else { text.replace('\n', " ") };
+        writeln!(code, "/// {shown}\npub const {}: crate::Rs274 = crate::Rs274({i});", constant(key)).expect("string");
     }
     writeln!(code, "}}").expect("string");
 }
