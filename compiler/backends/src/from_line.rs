@@ -23,7 +23,8 @@ const SAME_HEIGHT: f64 = 1e-6;
 pub struct Options {
     /// Height of the approach in the work frame in force, mm; none = the highest point of the program.
     pub safe_z: Option<f64>,
-    /// Axes whose numbers hold on this machine only: offsets, which no file names, changed since they were said.
+    /// Axes whose numbers rest on what no file names. The tool is brought there only where the program cuts before it
+    /// names them.
     pub unsure: [bool; 9],
 }
 
@@ -97,15 +98,23 @@ pub fn from_line(
         notes.push(Diagnostic::new(code::FROM_LINE_OFFSET_KEPT, file, span, &[]));
     }
     let lathe = approach::is_lathe(program);
-    let mut places = places(program, found.index, lathe, sources);
-    places.iter_mut().zip(options.unsure).filter(|(p, unsure)| *unsure && **p == Place::Named).for_each(|(p, _)| *p = Place::Renamed);
-    let cuts = cuts_first(program, found.index, sources);
-    if places[2] == Place::Machine && cuts {
-        return fault(code::FROM_LINE_HEIGHT_UNKNOWN);
+    let places = places(program, found.index, lathe, sources);
+    let needed = needed(program, found.index, sources);
+    let used = axes_used(program);
+    let lost = |i: &usize| places[*i] == Place::Machine && needed[*i] && used[*i];
+    let lost: Vec<String> = (0..9).filter(lost).map(|i| char::from(AXIS_LETTERS[i].to_ascii_uppercase()).to_string()).collect();
+    if !lost.is_empty() {
+        return Err(vec![Diagnostic::new(code::FROM_LINE_PLACE_OF_MACHINE, place.0, place.1, &[lost.join(" ")])]);
     }
-    let known = places.map(|p| p == Place::Named || p == Place::Renamed && cuts);
+    // The tool does not go down where nobody knows what is below it.
+    let beside = (0..2).any(|i| places[i] == Place::Named && options.unsure[i] && !needed[i] && used[i]);
+    let down = beside && needed[2];
+    let known = std::array::from_fn(|i| match i {
+        2 if beside && !down => false,
+        _ => places[i] == Place::Named && (needed[i] || !options.unsure[i] || down && i < 2),
+    });
     // On a lathe no height is safe, and a cut has none that nobody named: the program begins as it begins itself.
-    let wait = !known[2] && !lathe && !cuts && axes_used(program)[2];
+    let wait = !known[2] && !lathe && !needed[2] && used[2];
     let from = From { index: found.index, line, known, wait, lathe };
     let restart = build(program, &from, &state, &pose, safe.max(pose.axes[2]), sources);
     let goal = std::array::from_fn(|i| known[i].then_some(pose.axes[i]));
@@ -294,8 +303,6 @@ struct From {
 enum Place {
     Never,
     Named,
-    /// It was named before an offset changed: the axis is where it was, and the number is another.
-    Renamed,
     /// The machine went to a place of its own.
     Machine,
 }
@@ -307,11 +314,6 @@ fn places(program: &Program, index: usize, lathe: bool, sources: &dyn Sources) -
     let mut places = [Place::Never; 9];
     for s in program.steps().take(index) {
         if !s.op.moves() {
-            for (i, place) in places.iter_mut().enumerate().filter(|(_, p)| **p == Place::Named) {
-                if (s.start.axes[i] - s.end.axes[i]).abs() > SAME_HEIGHT {
-                    *place = Place::Renamed;
-                }
-            }
             if matches!(s.op, Op::ToolChange(_)) && !lathe && places[2] != Place::Never {
                 places[2] = Place::Machine;
             }
@@ -330,18 +332,28 @@ fn places(program: &Program, index: usize, lathe: bool, sources: &dyn Sources) -
     places
 }
 
-/// Whether the program cuts, from an operation on, before it says how high.
-fn cuts_first(program: &Program, index: usize, sources: &dyn Sources) -> bool {
-    let mut moves = program.steps().skip(index).filter(|s| s.op.moves());
-    moves.find(|s| s.op.feeds() || says_height(&s.start, &s.end, s.source, sources)).is_some_and(|s| !says_height(&s.start, &s.end, s.source, sources))
+/// Axes whose place counts: from an operation on, the program cuts before it names them.
+fn needed(program: &Program, index: usize, sources: &dyn Sources) -> [bool; 9] {
+    let (mut needed, mut said) = ([false; 9], [false; 9]);
+    for s in program.steps().skip(index).filter(|s| s.op.moves()) {
+        for i in 0..9 {
+            said[i] |= says(i, &s.start, &s.end, s.source, sources);
+            needed[i] |= s.op.feeds() && !said[i];
+        }
+        if (0..9).all(|i| said[i] || needed[i]) {
+            break;
+        }
+    }
+    needed
 }
 
 const AXIS_LETTERS: [u8; 9] = *b"xyzabcuvw";
 
-fn says_height(start: &Pose, end: &Pose, source: Source, sources: &dyn Sources) -> bool {
-    let home = [280, 300];
+/// Whether a move names an axis.
+fn says(axis: usize, start: &Pose, end: &Pose, source: Source, sources: &dyn Sources) -> bool {
+    let home = |w: &Words| !w.names_axes() && [280, 300].into_iter().any(|g| w.g(g));
     let words = || Words::at(sources, source.file, source.line);
-    start.axes[2] != end.axes[2] || words().is_some_and(|w| w.has(b'z') || home.into_iter().any(|g| w.g(g)))
+    start.axes[axis] != end.axes[axis] || words().is_some_and(|w| w.has(AXIS_LETTERS[axis]) || home(&w))
 }
 
 fn build(program: &Program, from: &From, state: &State, pose: &Pose, safe: f64, sources: &dyn Sources) -> Program {
@@ -396,7 +408,7 @@ fn build(program: &Program, from: &From, state: &State, pose: &Pose, safe: f64, 
     let mut out = restore.out;
     let mut rest = program.cursor_at(index);
     while let Some(view) = rest.next() {
-        waiting &= !(view.op.moves() && says_height(view.start, view.end, view.source, sources));
+        waiting &= !(view.op.moves() && says(2, view.start, view.end, view.source, sources));
         let mut end = *view.end;
         if waiting {
             // Up there, until a block says how high.

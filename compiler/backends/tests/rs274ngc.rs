@@ -491,8 +491,10 @@ fn a_restart_goes_to_no_place_of_the_machine() {
     // Behind G53 the height is the machine's again; X and Y are the program's.
     assert!(approach(12).starts_with("Z100 / X20 Y10"), "{}", approach(12));
     assert!(!approach(12).contains("Z-7"), "{}", approach(12));
-    // Behind a G28 of all axes nothing is known.
-    assert!(approach(15).starts_with("Z100 / X3"), "{}", approach(15));
+    // Behind a G28 of all axes nothing is known, and Y is named by nobody before the cut.
+    let error = from_line::from_line(&run(text), FileId(0), 15, &o, &texts).expect_err("no start");
+    assert_eq!(error[0].code.def().slug, "from-line/place-of-machine");
+    assert!(error[0].message.contains(" in Y,"), "{}", error[0].message);
 }
 
 /// On a lathe the tool comes from outside, in a bore from the front, and goes in by feed.

@@ -69,20 +69,29 @@ fn lowered(unit: &Unit, setup: &Setup) -> Program {
     motion_with(unit, setup).program
 }
 
-/// What a restart knows of the place of the tool only because the simulation takes it for something.
-pub enum Doubt {
-    /// Axes whose numbers were said under an offset that is another one by now.
-    Axes([bool; 9]),
-    /// The program needs the place of these axes, and such a machine has another.
-    Place { axes: String, machine: &'static str, remedy: &'static str },
+/// Axes whose place a restart knows only because the simulation takes something for given that no file says.
+pub struct Doubt {
+    /// These.
+    pub axes: [bool; 9],
+    /// A machine that has them elsewhere, and what makes it known.
+    machine: &'static str,
+    remedy: &'static str,
 }
 
-/// Runs a program that begins later on such a machine too. `goal`: where the tool is brought; `restart`: where it is there.
+impl Doubt {
+    /// For the message: the axes, the machine, and what makes it known.
+    pub fn told(&self) -> [String; 3] {
+        let axes: Vec<String> = "XYZABCUVW".chars().zip(self.axes).filter(|(_, of)| *of).map(|(letter, _)| letter.to_string()).collect();
+        [axes.join(" "), self.machine.into(), self.remedy.into()]
+    }
+}
+
+/// Runs a program that begins later on such machines too. `goal`: where the tool is brought; `restart`: where it is there.
 pub fn doubt(unit: &Unit, motion: &Motion, goal: &[Option<f64>; 9], restart: impl Fn(&Motion) -> Option<[Option<f64>; 9]>) -> Option<Doubt> {
     if motion.plan.is_some() || unit.setup.dialect.family == Family::Ufmg2008 {
         return None;
     }
-    let mut unsure = [false; 9];
+    let mut doubt: Option<Doubt> = None;
     for machine in machines(motion) {
         // Both returns of a cycle are clear of the part.
         for unknown in Unknown::ALL.into_iter().filter(|u| *u != Unknown::Return && u.is(&unit.setup, motion)) {
@@ -90,18 +99,15 @@ pub fn doubt(unit: &Unit, motion: &Motion, goal: &[Option<f64>; 9], restart: imp
             unknown.change(&mut setup, machine);
             // A program that ends before on such a machine is not for it.
             let Some(there) = restart(&motion_with(unit, &setup)) else { continue };
-            let axes = |differs: fn(f64, Option<f64>) -> bool| std::array::from_fn(|i| goal[i].is_some_and(|g| differs(g, there[i])));
-            let moved: [bool; 9] = axes(|here, there| there.is_some_and(|t| (t - here).abs() > NEAR_ENOUGH));
-            if moved.contains(&true) {
-                let letters = "XYZABCUVW".chars().zip(moved).filter(|(_, m)| *m);
-                let axes = letters.map(|(letter, _)| letter.to_string()).collect::<Vec<_>>().join(" ");
-                return Some(Doubt::Place { axes, machine: unknown.machine(), remedy: unknown.remedy() });
+            let away = |i: usize| goal[i].is_some_and(|here| there[i].is_none_or(|there| (there - here).abs() > NEAR_ENOUGH));
+            if (0..9).any(away) {
+                let first = Doubt { axes: [false; 9], machine: unknown.machine(), remedy: unknown.remedy() };
+                let doubt = doubt.get_or_insert(first);
+                (0..9).for_each(|i| doubt.axes[i] |= away(i));
             }
-            let unnamed: [bool; 9] = axes(|_, there| there.is_none());
-            unsure.iter_mut().zip(unnamed).for_each(|(all, u)| *all |= u);
         }
     }
-    unsure.contains(&true).then_some(Doubt::Axes(unsure))
+    doubt
 }
 
 /// Places that differ by less, mm or rad, are the same.
@@ -200,6 +206,9 @@ impl Unknown {
                         setup.params.insert(base + axis, unit * (n.origin + n.step * k as f64 + 0.75 * f64::from(axis)));
                     }
                 }
+                for system in 0..9u32 {
+                    setup.params.insert(5230 + 20 * system, n.rotation * f64::from(1 + system));
+                }
                 setup.params.insert(5210, 1.0);
             }
             Unknown::Tools => {
@@ -223,13 +232,15 @@ struct Numbers {
     system: f64,
     origin: f64,
     step: f64,
+    /// By what work offsets are turned, degrees, each by as much again.
+    rotation: f64,
     length: f64,
     start: f64,
 }
 
-const NEAR: Numbers = Numbers { system: 2.0, origin: 1.5, step: 2.25, length: 3.5, start: 0.625 };
-const BELOW: Numbers = Numbers { system: 1.0, origin: -411.5, step: 12.25, length: 93.5, start: -41.375 };
-const ABOVE: Numbers = Numbers { system: 9.0, origin: 211.5, step: 31.25, length: 193.5, start: 141.375 };
+const NEAR: Numbers = Numbers { system: 2.0, origin: 1.5, step: 2.25, rotation: 0.0, length: 3.5, start: 0.625 };
+const BELOW: Numbers = Numbers { system: 1.0, origin: -411.5, step: 12.25, rotation: 7.5, length: 93.5, start: -41.375 };
+const ABOVE: Numbers = Numbers { system: 9.0, origin: 211.5, step: 31.25, rotation: 0.0, length: 193.5, start: 141.375 };
 
 /// Origins above and below the machine's zero tell whether heights depend on them; where the program asks what its values
 /// are, it may take another branch on others.

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use gr_backends::plot::trace::{Trace, TraceOptions};
+use gr_backends::from_line::Restart;
 use gr_backends::rs274ngc;
 use gr_backends::{Texts, joint};
 use gr_canon::{Printer, Units};
@@ -15,7 +16,7 @@ use gr_text::{Diagnostic, FileId, code};
 
 use crate::options::UnitArg;
 use crate::commands::check::Checked;
-use crate::elsewhere::{self, Doubt};
+use crate::elsewhere;
 use crate::output::Pending;
 use crate::pipeline::{Motion, Unit, motion, run};
 use crate::sources::Sources;
@@ -449,16 +450,16 @@ fn restart(motion: &mut Motion, unit: &Unit, line: u32, safe_z: Option<f64>) {
         gr_backends::from_line::from_line(&motion.program, FileId(0), line, &options, &texts(motion))
     };
     let sure = [false; 9];
-    let doubt = |goal: &[Option<f64>; 9]| elsewhere::doubt(unit, motion, goal, |there| Some(begin(there, sure).ok()?.goal));
+    let doubt = |made: &Result<Restart, _>| elsewhere::doubt(unit, motion, &made.as_ref().ok()?.goal, |there| Some(begin(there, sure).ok()?.goal));
     let mut made = begin(motion, sure);
-    let mut doubted = made.as_ref().ok().and_then(|restart| doubt(&restart.goal));
-    if let Some(Doubt::Axes(unsure)) = doubted {
-        made = begin(motion, unsure);
-        doubted = made.as_ref().ok().and_then(|restart| doubt(&restart.goal));
+    let mut doubted = doubt(&made);
+    if let Some(first) = doubted {
+        made = begin(motion, first.axes);
+        doubted = doubt(&made);
     }
-    if let Some(Doubt::Place { axes, machine, remedy }) = doubted {
+    if let Some(doubt) = doubted {
         let (file, span) = gr_backends::Sources::place(&texts(motion), Source { line: line - 1, ..Source::default() });
-        motion.found.push(Diagnostic::new(code::FROM_LINE_PLACE_UNKNOWN, file, span, &[axes, machine.into(), remedy.into()]));
+        motion.found.push(Diagnostic::new(code::FROM_LINE_PLACE_UNKNOWN, file, span, &doubt.told()));
         return;
     }
     match made {

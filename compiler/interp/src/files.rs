@@ -434,12 +434,10 @@ fn in_capitals(name: &str) -> bool {
     !name.contains(|c: char| c.is_ascii_lowercase())
 }
 
-/// `#INCLUDE name`
+/// `#INCLUDE name`; in another spelling it is a remark.
 fn included(line: &str) -> Option<&str> {
-    let rest = line.strip_prefix('#')?.trim_start();
-    let (word, name) = rest.split_at_checked(7)?;
-    let name = name.strip_prefix([' ', '\t'])?.trim();
-    (word.eq_ignore_ascii_case("INCLUDE") && !name.is_empty()).then_some(name)
+    let name = line.strip_prefix("#INCLUDE")?.strip_prefix([' ', '\t'])?.trim();
+    (!name.is_empty()).then_some(name)
 }
 
 impl Ini {
@@ -619,6 +617,8 @@ mod tests {
         let (ini, found) = read_ini("[A]\n#INCLUDE x.inc\nC=3\n", FILE, Some(Path::new("d")), Some(&mut load));
         assert_eq!((ini.all("a", "b").len(), ini.get("a", "c")), (16, Some("3")));
         assert_eq!((found.len(), found[0].code), (1, code::INI_INCLUDE), "a file that includes itself ends");
+        let (_, found) = read_ini("# include this\n#include foo\n#  INCLUDE foo\n[A]\nB=1\n", FILE, Some(Path::new("d")), Some(&mut load));
+        assert!(found.is_empty(), "{found:?}");
         let (ini, found) = read_ini("#INCLUDE x.inc\nC=3\n", FILE, None, None);
         assert_eq!((found.len(), ini.get("", "C")), (0, Some("3")));
     }

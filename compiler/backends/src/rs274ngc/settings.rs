@@ -239,10 +239,13 @@ impl Emitter<'_> {
 
     fn rotation(&mut self, angle: f64, view: &View<'_, '_>) {
         let index = usize::from(view.state.work.clamp(1, 9));
-        if angle != self.rotations[index] {
+        // What the source says is said again: the control may have another in store.
+        let set = self.words(view.source).is_some_and(|w| w.g(100) && w.has(b'r')) && !sets_here(self.sources, view.source);
+        if angle != self.rotations[index] || set && self.linuxcnc() {
             if self.linuxcnc() {
                 let degrees = self.w.number(angle.to_degrees(), 10);
-                self.w.block(&format!("G10 L2 P{index} R{degrees}"));
+                let here = set && number_of(self.sources, 'p', view.source) == Some(0);
+                self.w.block(&format!("G10 L2 P{} R{degrees}", if here { 0 } else { index }));
             } else {
                 self.cannot("a rotated work offset", view.source);
             }
@@ -454,10 +457,12 @@ impl Emitter<'_> {
         if said('r') {
             words.push(format!("R{}", self.w.length(0.5 * diameter, places).0));
         }
-        if (front != 0.0 || back != 0.0) && (said('i') || said('j')) {
-            words.push(format!("I{} J{}", self.w.number(front.to_degrees(), 9), self.w.number(back.to_degrees(), 9)));
+        for (letter, angle) in [('I', front), ('J', back)] {
+            if said(letter) && (text.is_some() || angle != 0.0) {
+                words.push(format!("{letter}{}", self.w.number(angle.to_degrees(), 9)));
+            }
         }
-        if orientation != 0 && said('q') {
+        if said('q') && (text.is_some() || orientation != 0) {
             words.push(format!("Q{orientation}"));
         }
         if words.is_empty() {
