@@ -378,9 +378,12 @@ impl View {
             return Some(planning.clone());
         }
         let own = self.text.to_string();
-        let planning = Arc::new(gr_robot::plan(&motion.program, machine, &self.lines(motion, &own), &gr_robot::Options::default()));
+        let planning = Arc::new(gr_robot::plan(&motion.program, machine, &self.lines(motion, &own), &self.robot_options()));
         *known = Some((motion.program.clone(), planning.clone()));
         Some(planning)
+    }
+    fn robot_options(&self) -> gr_robot::Options {
+        gr_robot::Options { no_tool_table: gr_interp::assumed(&self.station.setup.tools), ..gr_robot::Options::default() }
     }
     /// The lines that the motion comes from; `own`: the text of the document.
     fn lines<'a>(&self, motion: &'a Motion, own: &'a str) -> Texts<'a> {
@@ -397,7 +400,7 @@ impl View {
         match self.planning(motion).as_deref() {
             Some(Ok(planned)) => planned.warnings.clone(),
             Some(Err(found)) => found.clone(),
-            None => gr_robot::opinion::opinion(&motion.program, machine, &self.lines(motion, &self.text.to_string()), &gr_robot::Options::default()),
+            None => gr_robot::opinion::opinion(&motion.program, machine, &self.lines(motion, &self.text.to_string()), &self.robot_options()),
         }
     }
     /// Whether the plan is there, or soon is: see [`View::planning`].

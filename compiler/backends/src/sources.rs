@@ -91,6 +91,10 @@ impl Words {
         said.unwrap_or(false)
     }
 
+    /// Whether the axes are named by increments alone, as on a lathe.
+    pub fn incremental(self) -> bool {
+        self.incremental
+    }
     /// Whether any axis is named.
     pub fn names_axes(self) -> bool {
         b"xyzabcuvw".iter().any(|l| self.has(*l))
@@ -113,7 +117,7 @@ pub fn is_hidden(program: &Program, index: usize) -> bool {
 }
 
 /// The number behind a letter of a source line, where it is a plain one.
-pub(crate) fn number_of(sources: &dyn Sources, letter: char, source: Source) -> Option<u32> {
+pub fn number_of(sources: &dyn Sources, letter: char, source: Source) -> Option<u32> {
     let line = sources.line(source.file, source.line)?;
     let code = line.split(['(', ';']).next()?.to_ascii_lowercase();
     let rest = code.split_once(letter)?.1.trim_start();
@@ -123,7 +127,7 @@ pub(crate) fn number_of(sources: &dyn Sources, letter: char, source: Source) -> 
 }
 
 /// Whether a line sets a work offset from where the tool stands (G10 L20).
-pub(crate) fn sets_here(sources: &dyn Sources, source: Source) -> bool {
+pub fn sets_here(sources: &dyn Sources, source: Source) -> bool {
     Words::at(sources, source.file, source.line).is_some_and(|w| w.g(100)) && number_of(sources, 'l', source) == Some(20)
 }
 

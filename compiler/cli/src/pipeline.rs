@@ -133,6 +133,8 @@ pub struct Motion {
     pub setups: Vec<gr_robot::Setup>,
     /// U V W of the text are increments of X Y Z: a lathe's.
     pub increments: bool,
+    /// There is no tool table.
+    pub no_tool_table: bool,
 }
 
 /// Runs, lowers and checks a program.
@@ -146,7 +148,7 @@ pub fn motion(unit: &Unit, machine: Option<&gr_machine::Machine>) -> Result<(Mot
     }
     let motion = gr_driver::lower(&unit.name(), unit.text.clone(), &unit.setup, Some(&unit.rules()));
     let checked = if motion.clean { unit.told(Checked::nothing()) } else { unit.check()? };
-    Ok((Motion { increments: increments(&unit.setup), ..plain(motion) }, checked))
+    Ok((Motion { increments: increments(&unit.setup), no_tool_table: gr_interp::assumed(&unit.setup.tools), ..plain(motion) }, checked))
 }
 
 /// Motion of a program on another machine, unchecked.
@@ -161,7 +163,7 @@ fn increments(setup: &Setup) -> bool {
 
 /// Motion of a text of our own making.
 pub fn motion_of(name: &str, text: String, setup: &Setup) -> Motion {
-    plain(gr_driver::lower(name, text.into(), setup, None))
+    Motion { no_tool_table: gr_interp::assumed(&setup.tools), ..plain(gr_driver::lower(name, text.into(), setup, None)) }
 }
 
 fn plain(motion: gr_driver::Motion) -> Motion {
@@ -169,7 +171,7 @@ fn plain(motion: gr_driver::Motion) -> Motion {
     for (name, text) in motion.texts {
         sources.add(name, text);
     }
-    Motion { program: motion.program, sources, subs: motion.subs, found: Vec::new(), plan: None, setups: Vec::new(), increments: false }
+    Motion { program: motion.program, sources, subs: motion.subs, found: Vec::new(), plan: None, setups: Vec::new(), increments: false, no_tool_table: false }
 }
 
 /// Motion of a program for a machine, in whatever language it is.
@@ -190,5 +192,5 @@ fn ufmg(name: &str, text: &str, dialect: &'static gr_spec::Dialect, machine: Opt
     found.extend(more);
     let mut sources = Sources::default();
     sources.add(name, text);
-    Motion { program, sources, subs: Vec::new(), found, plan: None, setups: Vec::new(), increments: false }
+    Motion { program, sources, subs: Vec::new(), found, plan: None, setups: Vec::new(), increments: false, no_tool_table: false }
 }

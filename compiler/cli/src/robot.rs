@@ -63,7 +63,7 @@ pub fn options(motion: &Motion, goal: &Goal<'_>, name: &str) -> Result<Options, 
     }
     let setups = motion.setups.clone();
     let approach = o.approach.unwrap_or(default.approach);
-    Ok(Options { name: name.to_string(), tolerance, approach, reconfigure: o.reconfigure, setups, ..default })
+    Ok(Options { name: name.to_string(), tolerance, approach, reconfigure: o.reconfigure, setups, no_tool_table: motion.no_tool_table, ..default })
 }
 
 /// Reads the job file that the options name into the motion it is for. What is wrong comes back; it points into the
@@ -316,7 +316,7 @@ fn short(v: f64) -> String {
 
 /// What the machine has to say about a program.
 pub fn opinion(motion: &Motion, machine: &Machine) -> Vec<Diagnostic> {
-    let options = Options { setups: motion.setups.clone(), ..Options::default() };
+    let options = Options { setups: motion.setups.clone(), no_tool_table: motion.no_tool_table, ..Options::default() };
     gr_robot::opinion::opinion(&motion.program, machine, &crate::emit::texts(motion), &options)
 }
 

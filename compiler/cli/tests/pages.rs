@@ -73,20 +73,22 @@ fn table_of(schema: &serde_json::Value) -> Option<(&serde_json::Value, bool)> {
 }
 
 /// Tables of the keys of a machine file, as its schema has them.
-fn keys(schema: &serde_json::Value, name: &str, out: &mut String) {
+fn keys(schema: &serde_json::Value, whole: &serde_json::Value, name: &str, out: &mut String) {
     let (mut rows, mut below) = (String::new(), Vec::new());
     // Words of a dialect have tables of one form.
     let pattern = schema["patternProperties"].as_object().and_then(|p| p.values().next());
     if let Some(one) = pattern {
-        return keys(one, name, out);
+        return keys(one, whole, name, out);
     }
-    let needed = |key: &str| schema["required"].as_array().is_some_and(|r| r.iter().any(|k| k == key));
+    // In a file that extends another, that one may have them.
+    let needed = |key: &str| [schema, whole].iter().any(|s| s["required"].as_array().is_some_and(|r| r.iter().any(|k| k == key)));
     for (key, of) in schema["properties"].as_object().expect("keys") {
         let what = of["description"].as_str().expect("a description");
         if let Some((table, several)) = table_of(of) {
             // The reference mode's tables are those of the file.
             if !name.starts_with("[reference") {
-                below.push((key, what, table, several));
+                let whole = &whole["properties"][key];
+                below.push((key, what, table, if several { &whole["items"] } else { whole }, several));
                 continue;
             }
             rows.push_str(&format!("| `{key}` | as in the file | {what} |\n"));
@@ -97,13 +99,13 @@ fn keys(schema: &serde_json::Value, name: &str, out: &mut String) {
     if !rows.is_empty() {
         out.push_str(&format!("| key | value | |\n|---|---|---|\n{rows}"));
     }
-    for (key, what, table, several) in below {
+    for (key, what, table, whole, several) in below {
         let inner = name.trim_matches(['[', ']']);
         let path = if inner.is_empty() { key.clone() } else { format!("{inner}.{key}") };
         let path = if several { format!("[[{path}]]") } else { format!("[{path}]") };
         let words = if table["patternProperties"].is_object() { format!("[{key}.M3]") } else { path };
         out.push_str(&format!("\n**`{words}`** {what}\n\n"));
-        keys(table, &words, out);
+        keys(table, whole, &words, out);
     }
 }
 
@@ -112,7 +114,7 @@ fn keys_of_machine_files() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let schema: serde_json::Value = serde_json::from_str(include_str!("../../../spec/machines/machine.schema.json")).unwrap();
     let (page, mut now) = (root.join("docs/machines.md"), String::from("\n"));
-    keys(&schema, "", &mut now);
+    keys(&schema, &serde_json::json!({ "properties": schema["anyOf"][1]["properties"] }), "", &mut now);
     let text = std::fs::read_to_string(&page).unwrap().replace('\r', "");
     let (head, rest) = text.split_once("<!-- keys -->\n").expect("the mark");
     let (old, tail) = rest.split_once("<!-- end of keys -->").expect("the other mark");
@@ -120,6 +122,47 @@ fn keys_of_machine_files() {
         std::fs::write(&page, format!("{head}<!-- keys -->\n{now}<!-- end of keys -->{tail}")).unwrap();
     } else {
         assert!(old == now, "UPDATE_DOCS=1 brings docs/machines.md up to date:\n{now}");
+    }
+}
+
+/// Keys that a schema asks for and a value lacks, as a validator tells them.
+fn missing(schema: &serde_json::Value, value: &serde_json::Value, at: &str) -> Vec<String> {
+    let asked = schema["required"].as_array().into_iter().flatten().filter_map(|k| k.as_str());
+    let mut out: Vec<String> = asked.filter(|k| value.get(k).is_none()).map(|k| format!("{at}.{k}")).collect();
+    let ways: Vec<Vec<String>> = schema["anyOf"].as_array().into_iter().flatten().map(|s| missing(s, value, at)).collect();
+    if let Some(least) = ways.into_iter().min_by_key(Vec::len) {
+        out.extend(least);
+    }
+    for (key, of) in schema["properties"].as_object().into_iter().flatten() {
+        if let Some(v) = value.get(key) {
+            out.extend(missing(of, v, &format!("{at}.{key}")));
+        }
+    }
+    for v in value.as_array().into_iter().flatten() {
+        out.extend(missing(&schema["items"], v, at));
+    }
+    out
+}
+
+/// The schema asks for what the reader asks for: a file that extends another says only what differs.
+#[test]
+fn the_schema_agrees_with_the_reader() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let schema: serde_json::Value = serde_json::from_str(include_str!("../../../spec/machines/machine.schema.json")).unwrap();
+    let lacks = |text: &str| missing(&schema, &serde_json::to_value(toml::from_str::<toml::Value>(text).unwrap()).unwrap(), "");
+    let reads = |text: &str| gr_machine::parse(gr_text::FileId(0), text).is_ok();
+    let page = std::fs::read_to_string(root.join("docs/machines.md")).unwrap();
+    let cell = block(&page, "toml").expect("the cell").1;
+    assert!(cell.contains("[[joint]]") && !cell.contains("type ="), "{cell}");
+    let head = "format = 1\nid = \"t/m\"\n";
+    let over = |rest: &str| format!("{head}extends = \"generic/mill3\"\n{rest}");
+    let file = std::fs::read_to_string(root.join("spec/machines/generic/mill3.toml")).unwrap();
+    for good in [cell.to_string(), over(""), over("[[joint]]\nname = \"X\"\nmax = 600\n"), file.clone()] {
+        assert!(lacks(&good).is_empty() && reads(&good), "{:?}: {good}", lacks(&good));
+    }
+    let untyped = file.replacen("type = \"prismatic\"\n", "", 1);
+    for bad in [untyped, over("[[joint]]\nmax = 600\n"), format!("{head}title = \"t\"\n")] {
+        assert!(!lacks(&bad).is_empty() && !reads(&bad), "{bad}");
     }
 }
 

@@ -145,10 +145,16 @@ fn a_restart_in_a_later_setup() {
         let o = run(&["build", source.to_str().unwrap(), "--machine", CELL, "--target", "rapid", "--job", job.to_str().unwrap(), "--from-line", line]);
         (o.status.success(), text(&o.stderr))
     };
-    for line in ["5", "7"] {
-        let (made, told) = told("", line);
-        assert!(made, "{line}: {told}");
+    for line in ["5", "7", "8", "9", "10"] {
+        for place in ["", "position = [0, 50, 0]\n"] {
+            let (made, told) = told(place, line);
+            assert!(made, "{line}: {told}");
+        }
     }
+    // The way to the line is of its setup too: nothing is clamped anew behind it.
+    std::fs::write(&job, "[[setup]]\nname = \"a\"\nfrom_line = 1\n[[setup]]\nname = \"b\"\nfrom_line = 7\n").unwrap();
+    let made = run(&["build", source.to_str().unwrap(), "--machine", CELL, "--target", "rapid", "--job", job.to_str().unwrap(), "--from-line", "9"]);
+    assert!(made.status.success() && !text(&made.stdout).contains("setup b"), "{}", text(&made.stdout));
     let (made, told) = told("[[setup]]\nname = \"c\"\nfrom_line = 11\n", "7");
     assert!(!made && told.contains("E0551") && told.contains("`c` never begins"), "{told}");
 }
@@ -576,9 +582,63 @@ fn axes_of_a_mill_that_nothing_has_named() {
     let turned = "[frames.part]\nposition = [200, 100, -100]\nrotation = [0, 0, 90]\n";
     let (moves, found) = made("mill3", turned, "G0 X10 Y0 Z5\nG53 G0 Z0");
     assert_eq!((moves, found.as_str()), (vec!["G0 X200 Y110 Z-95".to_string(), "G0 X200 Y110 Z0".into()], ""));
+    // One axis of the machine alone, whichever it is in the part; G28 of one coordinate would move the other axis.
+    let (moves, found) = made("mill3", turned, "G0 X10 Y0 Z5\nG53 G0 Z0\nG53 G0 Y0");
+    assert_eq!((moves.last().map(String::as_str), found.as_str()), (Some("G0 X200 Y0 Z0"), ""));
     for base in ["mill3", "mill5-ac-table"] {
-        let (_, found) = made(base, turned, "G0 X10 Y0 Z5\nG53 G0 Z0\nG53 G0 Y0");
+        let (_, found) = made(base, turned, "G0 X10 Y0 Z5\nG53 G0 Z0\nG91 G28 Y0");
         assert!(found.contains(":4:") && found.contains("E0554") && found.matches("error").count() == 1, "{base}: {found}");
+    }
+    let tilted = "[frames.part]\nposition = [200, 100, -100]\nrotation = [20, 0, 0]\n";
+    let (_, found) = made("mill5-ac-table", tilted, "G0 X10 Y0 Z5\nG53 G0 Z0");
+    assert!(found.contains(":3:") && found.contains("E0554"), "{found}");
+}
+
+/// On a part that the machine file puts somewhere the program goes on from where the machine stands: the places of `rs274` with the same
+/// place as a stored offset.
+#[test]
+fn a_mill_goes_on_from_where_it_stands() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_string();
+    let made = |rotation: u32, program: &str, more: &[&str]| {
+        let table = format!("[frames.table]\nposition = [100, 50, -140]\nrotation = [0, 0, {rotation}]\n");
+        std::fs::write(path("m.toml"), format!("format = 1\nid = \"t/m\"\nextends = \"generic/mill3\"\n{table}")).unwrap();
+        std::fs::write(path("a.ngc"), format!("G21 G90 G54\n{program}\nM2\n")).unwrap();
+        let o = run(&[&["build", &path("a.ngc"), "--machine", &path("m.toml"), "--target", "joint-gcode", "--message-format", "short", "-q"], more].concat());
+        let place = |line: &str| -> Vec<f64> { line.split(' ').skip(1).take(3).map(|w| w[1..].parse().unwrap()).collect() };
+        let moves: Vec<Vec<f64>> = text_lines(&o.stdout).iter().filter(|l| l.starts_with("G0 ") || l.starts_with("G1 ")).map(|l| place(l)).collect();
+        (moves, text(&o.stderr))
+    };
+    let ends = |rotation: u32, program: &str, places: &[[f64; 3]]| {
+        let (moves, found) = made(rotation, program, &[]);
+        let last = &moves[moves.len().saturating_sub(places.len())..];
+        let near = |(m, p): (&Vec<f64>, &[f64; 3])| m.iter().zip(p).all(|(a, b)| (a - b).abs() < 1e-3);
+        assert!(last.len() == places.len() && last.iter().zip(places).all(near), "{program}: {moves:?} {found}");
+    };
+    // A work frame that is rotated: G53 moves the axis that it names, G28 the coordinate.
+    let rotated = "G10 L2 P1 X5 Y5 R30\nG0 X10 Y20 Z20\nG53 G0 Z0\nG53 G0 X0\nG0 X10 Y20\nG91 G28 X0";
+    ends(0, rotated, &[[103.6603, 77.3205, 0.0], [0.0, 77.3205, 0.0], [103.6603, 77.3205, 0.0], [-7.5657, 13.1042, 0.0]]);
+    // A part that is clamped turned; the coordinate that isn't named stays where it is now.
+    ends(30, "G0 X10 Y20 Z20\nG53 G0 X0\nG0 X10", &[[98.6603, 72.3205, -120.0], [0.0, 72.3205, -120.0], [73.481, 115.933, -120.0]]);
+    // Coordinates set where the machine stands, and increments from there.
+    ends(0, "G0 X10 Y20 Z20\nG53 G0 Z0\nG92 Z0\nG1 Z-5 F500", &[[110.0, 70.0, -5.0]]);
+    ends(0, "G0 X10 Y20 Z20\nG53 G0 Z-10\nG10 L20 P1 X1 Z0\nG0 X3 Z-5", &[[112.0, 70.0, -15.0]]);
+    ends(0, "G91 G28 Z0\nG0 X5 Z-5\nG90 G0 Y2", &[[5.0, 0.0, -5.0], [5.0, 52.0, -5.0]]);
+    // A cycle rises to R and no way aside, and comes back to where the tool was.
+    ends(0, "G99 G81 X5 Y6 Z-3 R150 F500", &[[0.0, 0.0, 10.0], [105.0, 56.0, 10.0], [105.0, 56.0, -143.0], [105.0, 56.0, 10.0]]);
+    ends(0, "G0 X0 Y0 Z20\nG92 Z-100\nG53 G0 Z0\nG98 G81 X5 Y6 Z-130 R-125 F500", &[[105.0, 56.0, 0.0], [105.0, 56.0, -145.0], [105.0, 56.0, -150.0], [105.0, 56.0, 0.0]]);
+    // In a job too: up, and not down to Z0 of the part.
+    std::fs::write(path("job.toml"), "[[setup]]\nname = \"a\"\nfrom_line = 1\n").unwrap();
+    let program = "G0 X10 Y20 Z20\nG1 Z0 F500\nG53 G0 Z0\nG0 X0 Y0 Z20\nG91 G28 Z0";
+    assert_eq!(made(0, program, &["--job", &path("job.toml")]), made(0, program, &[]));
+    ends(0, program, &[[110.0, 70.0, 0.0], [100.0, 50.0, -120.0], [100.0, 50.0, 0.0]]);
+    // What can't be told.
+    let cycle = "G0 X10 Y20 Z20\nG53 G0 Z0\nG98 G81 X5 Y5 Z-3 R2 F500";
+    let arc = "G0 X10 Y20 Z20\nG53 G0 X100\nG2 X5 Y5 I2 F500";
+    let reference = "G0 X10 Y20 Z20\nG28.1\nG28";
+    for (program, code) in [(cycle, "E0559"), (arc, "E0559"), (reference, "E0561")] {
+        let (moves, found) = made(0, program, &[]);
+        assert!(moves.is_empty() && found.contains(":4:") && found.contains(&format!("error[{code}]")) && found.matches("error").count() == 1, "{program}: {found}");
     }
 }
 
@@ -637,6 +697,19 @@ fn a_tool_of_a_mill_hangs_down() {
     assert!(z == Some(-140.0) && said[0].contains("makes tool 1 50.000 mm long, the machine file 60.000 mm; the machine file holds"), "{z:?} {said:?}");
     let (z, said) = cut(long, Some("T1 P1 D6\n"));
     assert!(z == Some(-200.0) && said.len() == 1 && said[0].contains("makes tool 1 0.000 mm long, the machine file 60.000 mm; the offset holds"), "{z:?} {said:?}");
+    let other = file("o.ngc", "G21 G90 G54\nT3 M6 G43 H3\nG0 X0 Y0 Z20\nG1 Z0 F100\nM2\n");
+    cut(long, None);
+    let mill = std::fs::read_to_string(folder.path().join("m.toml")).unwrap();
+    let of_mill = |table: Option<&str>| {
+        let table = table.map(|row| file("t.tbl", row));
+        let mut args = vec!["build", &other, "--machine"];
+        let path = file("m.toml", &mill);
+        args.extend([path.as_str(), "--message-format", "short", "--target", "joint-gcode"]);
+        args.extend(table.iter().flat_map(|t| ["-t", t.as_str()]));
+        text(&run(&args).stderr)
+    };
+    assert!(of_mill(None).contains(":2:") && of_mill(None).contains("E0521") && of_mill(None).contains("no tool 3"), "{}", of_mill(None));
+    assert!(!of_mill(Some("T3 P3 D6\n")).contains("error"), "{}", of_mill(Some("T3 P3 D6\n")));
     let (z, said) = cut("[0, 0, -60]", None);
     assert!(z.is_none() && said.len() == 1 && said[0].contains("a tool of 60 mm has 60"), "{z:?} {said:?}");
 }

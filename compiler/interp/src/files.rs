@@ -53,6 +53,11 @@ pub fn assumed_tools() -> ToolTable {
     table
 }
 
+/// Whether rows of a table are only assumed: there is none, though a machine file may have given some of them.
+pub fn assumed(table: &ToolTable) -> bool {
+    table.rows.iter().any(|r| &*r.comment == ASSUMED)
+}
+
 fn empty_row() -> Tool {
     Tool { number: -1, pocket: -1, ..Tool::default() }
 }

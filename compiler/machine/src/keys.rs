@@ -630,33 +630,67 @@ fn quoted(text: &str) -> String {
 enum Level {
     Root,
     Inner,
+    /// Of a file that may extend another: what that one may have is not missing. Rows are those of their name or number there.
+    Over,
     Part,
+}
+
+impl Level {
+    fn required(self, keys: &[Key]) -> Vec<&'static str> {
+        let all = || keys.iter().filter(|k| k.required).map(|k| k.name);
+        let known_by: Vec<&str> = all().filter(|n| ["name", "number"].contains(n)).collect();
+        match self {
+            Level::Inner => all().collect(),
+            Level::Over if known_by.len() == 1 => known_by,
+            _ => Vec::new(),
+        }
+    }
+}
+
+/// What a file has to have itself that extends no other, as a schema beside its own.
+fn whole(keys: &[Key], required: &[&str]) -> String {
+    let list = |words: &[&str]| words.iter().map(|w| quoted(w)).collect::<Vec<_>>().join(", ");
+    let of = |k: &Key| match k.kind {
+        Table(keys) => Some(whole(keys, &Level::Inner.required(keys))),
+        Tables(keys) => Some(whole(keys, &Level::Inner.required(keys))).map(|s| if s == "{ }" { s } else { format!("{{ \"items\": {s} }}") }),
+        _ => None,
+    };
+    let below: Vec<String> = keys.iter().filter_map(|k| of(k).filter(|s| s != "{ }").map(|s| format!("{}: {s}", quoted(k.name)))).collect();
+    let mut parts = Vec::new();
+    if !required.is_empty() {
+        parts.push(format!("\"required\": [{}]", list(required)));
+    }
+    if !below.is_empty() {
+        parts.push(format!("\"properties\": {{ {} }}", below.join(", ")));
+    }
+    if parts.is_empty() { "{ }".into() } else { format!("{{ {} }}", parts.join(", ")) }
 }
 
 fn object(out: &mut String, keys: &[Key], depth: usize, level: Level) {
     let pad = "  ".repeat(depth);
-    let required = |all: &[Key]| -> String {
-        all.iter().filter(|k| k.required).map(|k| quoted(k.name)).collect::<Vec<_>>().join(", ")
-    };
     let _ = write!(out, "{pad}\"type\": \"object\",\n{pad}\"additionalProperties\": false,\n");
     if level == Level::Root {
         let _ = write!(
             out,
-            "{pad}\"required\": [\"format\", \"id\"],\n{pad}\"anyOf\": [{{ \"required\": [\"extends\"] }}, {{ \"required\": [\"title\", \"kind\", \"kinematics\"] }}],\n"
+            "{pad}\"required\": [\"format\", \"id\"],\n{pad}\"anyOf\": [\n{pad}  {{ \"required\": [\"extends\"] }},\n{pad}  {}\n{pad}],\n",
+            whole(keys, &["title", "kind", "kinematics"])
         );
-    } else if level == Level::Inner && keys.iter().any(|k| k.required) {
-        let _ = writeln!(out, "{pad}\"required\": [{}],", required(keys));
+    } else if !level.required(keys).is_empty() {
+        let required: Vec<String> = level.required(keys).into_iter().map(quoted).collect();
+        let _ = writeln!(out, "{pad}\"required\": [{}],", required.join(", "));
     }
     let _ = writeln!(out, "{pad}\"properties\": {{");
     for (i, k) in keys.iter().enumerate() {
         let _ = writeln!(out, "{pad}  {}: {{\n{pad}    \"description\": {},", quoted(k.name), quoted(k.doc));
-        property(out, k, depth + 2);
+        property(out, k, depth + 2, if level == Level::Root { Level::Over } else { level });
         let _ = writeln!(out, "\n{pad}  }}{}", if i + 1 < keys.len() { "," } else { "" });
     }
     let _ = write!(out, "{pad}}}");
 }
 
-fn property(out: &mut String, k: &Key, depth: usize) {
+fn property(out: &mut String, k: &Key, depth: usize, level: Level) {
+    // A list of this name is replaced whole.
+    let level = if k.name == "rotary" || level == Level::Part { Level::Inner } else { level };
     let pad = "  ".repeat(depth);
     let list = |words: &[&str]| words.iter().map(|w| quoted(w)).collect::<Vec<_>>().join(", ");
     let _ = match k.kind {
@@ -684,7 +718,7 @@ fn property(out: &mut String, k: &Key, depth: usize) {
             "{pad}\"type\": \"array\",\n{pad}\"items\": {{ \"type\": \"array\", \"items\": {{ \"type\": \"number\" }}, \"minItems\": 3, \"maxItems\": 3 }},\n{pad}\"minItems\": {n},\n{pad}\"maxItems\": {n}"
         ),
         Table(keys) => {
-            object(out, keys, depth, Level::Inner);
+            object(out, keys, depth, level);
             Ok(())
         }
         Part(keys) => {
@@ -701,7 +735,7 @@ fn property(out: &mut String, k: &Key, depth: usize) {
             } else {
                 writeln!(out, "{pad}\"type\": \"array\",\n{pad}\"items\": {{")
             };
-            object(out, keys, depth + 1, Level::Inner);
+            object(out, keys, depth + 1, level);
             write!(out, "\n{pad}{}", if map { "} }" } else { "}" })
         }
     };

@@ -20,7 +20,7 @@ use gr_backends::from_line::INSERTED;
 use gr_backends::sources::Words as Letters;
 
 use crate::cell::Cells;
-use crate::settle::{leads_to, main_line};
+use crate::settle::{Increments, leads_to, main_line};
 use crate::turns::Turns;
 use crate::{Action, Curves, Options, Step, Tool, WorkFrame, Zone};
 
@@ -206,7 +206,7 @@ pub(crate) struct Gather<'a> {
     /// Made from features: every move says all.
     planned: bool,
     /// Whether lines go by increments.
-    increments: places::Increments,
+    increments: Increments,
     /// What the frame in force is placed by.
     placed: Option<Frame>,
     path_said: bool,
@@ -284,7 +284,7 @@ impl<'a> Gather<'a> {
             inserted: false,
             restarted: false,
             planned: false,
-            increments: places::Increments::default(),
+            increments: Increments::default(),
             placed: None,
             path_said: false,
             ended: false,
@@ -382,8 +382,16 @@ impl<'a> Gather<'a> {
             return;
         }
         let number = u32::try_from(view.state.tool).unwrap_or(0);
-        let file = self.machine.cell.tools.get(&number).map_or(0.0, |t| self.machine.tool_length(t));
-        if file.abs() > 1e-3 && Letters::at(self.findings.sources, view.source.file, view.source.line).is_some_and(|l| l.g(430)) {
+        let tools = &self.machine.cell.tools;
+        let file = tools.get(&number).map(|t| self.machine.tool_length(t));
+        let unknown = file.is_none() && number != 0 && !tools.is_empty() && self.options.no_tool_table;
+        let file = file.unwrap_or(0.0);
+        if !unknown && file.abs() <= 1e-3 || !Letters::at(self.findings.sources, view.source.file, view.source.line).is_some_and(|l| l.g(430)) {
+            return;
+        }
+        if unknown {
+            self.findings.once_each(code::ROBOT_UNKNOWN_TOOL, Some(self.source), &[number.to_string()]);
+        } else {
             let args = [number.to_string(), "0.000".into(), format!("{file:.3}"), "the offset holds, as on the control".into()];
             self.findings.once_each(code::ROBOT_TOOL_LENGTH, Some(self.source), &args);
         }
@@ -1066,7 +1074,7 @@ impl<'a> Gather<'a> {
 }
 
 /// Whether two turns are one but for rounding.
-fn same_turn(a: &M3, b: &M3) -> bool {
+pub(crate) fn same_turn(a: &M3, b: &M3) -> bool {
     a.iter().flatten().zip(b.iter().flatten()).all(|(x, y)| (x - y).abs() < 1e-9)
 }
 

@@ -23,6 +23,8 @@ pub struct Options {
     pub probing: bool,
     /// Setups of a job: each with its own placement of the part. None = the cell's.
     pub setups: Vec<Setup>,
+    /// There is no tool table: on a mill whose file has tools, no other has a length.
+    pub no_tool_table: bool,
 }
 
 /// A clamping of the part: where it is, and for which piece of the program.
@@ -42,7 +44,7 @@ pub struct Setup {
 
 impl Default for Options {
     fn default() -> Options {
-        Options { name: "program".into(), tolerance: 0.01, approach: 50.0, reconfigure: None, own_words: false, probing: true, setups: Vec::new() }
+        Options { name: "program".into(), tolerance: 0.01, approach: 50.0, reconfigure: None, own_words: false, probing: true, setups: Vec::new(), no_tool_table: false }
     }
 }
 

@@ -9,7 +9,7 @@ use crate::choose::{Chain, Chooser, Fault, Node, Why, chains};
 use crate::emit::Emit;
 use crate::gather::{Findings, Gather, Gathered, Item, Move, Way};
 use crate::path::Mount;
-use crate::settle::{control_tool, settled, settled_arm};
+use crate::settle::{control_tool, settled};
 use crate::solver::{Branches, Joints, Limits, Solver};
 use crate::{MAX_JOINTS, Options, Planned, Zone};
 
@@ -21,13 +21,11 @@ pub fn plan(program: &Program, machine: &Machine, sources: &dyn Sources, options
         gather.findings.say(code::ROBOT_HOME, None, &[why]);
         return Err(gather.findings.take());
     }
-    // Setups have places of their own for the part.
-    let mill = options.setups.is_empty().then(|| settled(program, machine, sources, control_tool)).flatten();
-    if let Some(untold) = mill.as_ref().and_then(|s| s.finding(sources)) {
+    let settled = settled(program, machine, sources, &options.setups, control_tool);
+    if let Some(untold) = settled.as_ref().and_then(|s| s.finding(sources)) {
         return Err(vec![untold]);
     }
-    let settled = mill.map(|s| s.program).or_else(|| settled_arm(program, machine, sources, &options.setups));
-    gather.run(settled.as_ref().unwrap_or(program));
+    gather.run(settled.as_ref().map_or(program, |s| &s.program));
     let Gather { out: gathered, findings, .. } = gather;
     let mut solver = Solver::new(machine);
     solver.words = !gathered.by_direction;

@@ -4,15 +4,18 @@
 //! the machine file gives the part. Arms stand nowhere by themselves, and have places of the machine only where their file says where
 //! the zero point of G53 is: what they don't have is told.
 
+mod stands;
+
 use gr_backends::from_line::INSERTED;
 use gr_backends::sources::{Words as Letters, is_hidden};
-use gr_ir::{ArcPlane, Axes, Builder, Marker, Op, Pose, Program, Source, Sources, State, View, plane_axes};
-use gr_machine::math::{Frame, V3, add, dot, rot_z, rotate, solve, sub};
-use gr_machine::{Kind, Kinematics, Machine};
-use gr_text::{Diagnostic, code};
+use gr_ir::{ArcPlane, Builder, FileId, Marker, Op, Program, Source, Sources, State, View, plane_axes};
+use gr_machine::math::{Frame, V3};
+use gr_machine::{Kind, Machine};
+use gr_text::{Diagnostic, Severity, code};
 
 use crate::Setup;
-use crate::words::{Asked, Slides, Words, placed, tool, work_shift};
+use crate::words::{placed, tool};
+use stands::Stands;
 
 /// What a coordinate is known by.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Default)]
@@ -34,7 +37,37 @@ pub struct Coordinates {
     planned: bool,
     /// The axis that a canned cycle goes along.
     cycle: Option<usize>,
+    increments: Increments,
     last: Brought,
+    goal: Goal,
+    /// X Y Z A B C U V W that the last move brings somewhere, by a word or because they change.
+    to: [bool; 9],
+}
+
+/// Whether lines go by increments (G91), looked for from the line on that was asked for last.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Increments(Option<(FileId, u32, bool)>);
+
+impl Increments {
+    pub fn at(&mut self, sources: &dyn Sources, source: Source) -> bool {
+        let (file, line) = (source.file, source.line);
+        if line == INSERTED {
+            return false;
+        }
+        let told = match self.0 {
+            Some((f, last, told)) if f == file && last <= line => {
+                // Between the two lines G90 or G91 may stand.
+                let said = (last + 1..=line).rev().find_map(|l| {
+                    let words = Letters::at(sources, file, l)?;
+                    (words.g(900) || words.g(910)).then(|| words.g(910))
+                });
+                said.unwrap_or(told)
+            }
+            _ => Letters::goes_by_increments(sources, file, line),
+        };
+        self.0 = Some((file, line, told));
+        told
+    }
 }
 
 /// What a move does to X, Y and Z.
@@ -52,7 +85,15 @@ impl Coordinates {
     /// Before a program.
     pub fn new(program: &Program) -> Coordinates {
         let planned = program.steps().any(|s| matches!(s.op, Op::Begin { marker: Marker::Workingstep, .. }));
-        Coordinates { by: [By::Nothing; 3], planned, cycle: None, last: Brought::default() }
+        Coordinates {
+            by: [By::Nothing; 3],
+            planned,
+            cycle: None,
+            increments: Increments::default(),
+            last: Brought::default(),
+            goal: Goal::Work,
+            to: [true; 9],
+        }
     }
 
     /// What they are known by so far.
@@ -84,16 +125,19 @@ impl Coordinates {
         let Some(letters) = letters else {
             self.by = [By::Work; 3];
             self.last = Brought { work: [true; 3], ..Brought::default() };
+            (self.goal, self.to) = (Goal::Work, [true; 9]);
             return self.by;
         };
         let goal = goal(program, view, letters);
+        // Its letters are those of the cycle that follows.
+        let letters = if self.rises_to_cycle(program, view, letters) { Letters::default() } else { letters };
+        self.bring(goal, letters, view);
         for i in 0..3 {
             let changed = view.start.axes[i] != view.end.axes[i];
             let named = letters.has(AXES[i]);
             match goal {
-                Goal::Hidden if changed => self.by[i] = By::Machine,
-                Goal::Fixed if changed || named => self.by[i] = By::Machine,
-                Goal::Home if changed || named || !letters.names_axes() => self.by[i] = By::Machine,
+                // In a rotated frame it changes others too: along those the machine stays.
+                Goal::Hidden | Goal::Fixed | Goal::Home if self.to[i] => self.by[i] = By::Machine,
                 // In a cycle the letter of its own axis is the depth, which each move takes when it gets there.
                 Goal::Work if changed || named && self.cycle != Some(i) => self.name(i, view, sources),
                 _ => {}
@@ -113,10 +157,43 @@ impl Coordinates {
         self.by
     }
 
+    /// The move to R that a canned cycle makes first where it begins below that.
+    fn rises_to_cycle(&self, program: &Program, view: &View<'_, '_>, letters: Letters) -> bool {
+        let (u, v, w) = plane_axes(view.state.plane);
+        let changed = |i: usize| view.start.axes[i] != view.end.axes[i];
+        if view.op != Op::Rapid || self.cycle.is_some() || changed(u) || changed(v) || !changed(w) || !letters.has(WORDS[u]) && !letters.has(WORDS[v]) {
+            return false;
+        }
+        let own = (view.index + 1..program.len()).map_while(|i| program.get(i).filter(|s| s.source == view.source && !s.op.moves()));
+        own.into_iter().any(|s| matches!(s.op, Op::Begin { marker: Marker::Cycle, .. }))
+    }
+
+    /// Where the move leads, and which words it brings there.
+    fn bring(&mut self, goal: Goal, letters: Letters, view: &View<'_, '_>) {
+        let changes = |i: usize, far: f64| (view.start.axes[i] - view.end.axes[i]).abs() > far;
+        let named = |i: usize| letters.has(WORDS[i]);
+        self.goal = goal;
+        self.to = match goal {
+            Goal::Work => std::array::from_fn(|i| changes(i, 0.0) || named(i) && self.cycle != Some(i)),
+            Goal::Fixed => std::array::from_fn(named),
+            Goal::Home => std::array::from_fn(|i| named(i) || !letters.names_axes()),
+            // Up alone, or to the second reference point.
+            Goal::Hidden => {
+                let all = (0..9).any(|i| i != 2 && changes(i, ROUNDING));
+                std::array::from_fn(|i| all || i == 2)
+            }
+        };
+    }
+
+    /// Whether the last move went by increments.
+    fn by_increments(&mut self, view: &View<'_, '_>, sources: &dyn Sources) -> bool {
+        Letters::at(sources, view.source.file, view.source.line).is_some_and(Letters::incremental) || self.increments.at(sources, view.source)
+    }
+
     /// A word of the work frame; an increment from a place of the machine stays one.
     fn name(&mut self, i: usize, view: &View<'_, '_>, sources: &dyn Sources) {
         let known = self.by[i] == By::Work;
-        if !known && !Letters::goes_by_increments(sources, view.source.file, view.source.line) {
+        if !known && !self.by_increments(view, sources) {
             self.by[i] = By::Work;
         }
     }
@@ -144,8 +221,12 @@ impl Coordinates {
 }
 
 const AXES: [u8; 3] = *b"xyz";
+const WORDS: [u8; 9] = *b"xyzabcuvw";
+/// Coordinates that differ by less are the same but for rounding, mm.
+const ROUNDING: f64 = 1e-9;
 
 /// Where a move leads.
+#[derive(Clone, Copy, Debug)]
 enum Goal {
     /// To a place in the work frame.
     Work,
@@ -191,83 +272,97 @@ pub(crate) fn place_of_machine(program: &Program, view: &View<'_, '_>, sources: 
     }
 }
 
-/// The program with the numbers that such coordinates have in the frame of the part. None on machines that have none: the program is
-/// good as it is.
-pub fn settled(program: &Program, machine: &Machine, sources: &dyn Sources, tool: fn(&Machine, &State) -> Frame) -> Option<Settled> {
-    if machine.kind != Kind::Mill {
-        return None;
-    }
-    let Ok(Words::Joints(slides)) = Words::of(machine) else { return None };
-    let home = crate::plan::home_joints(machine)?;
-    let start = program.start_state().machine(&program.start().axes);
-    let home = [0, 1, 2].map(|i| home.get(slides.sliding[i]).copied().unwrap_or(0.0));
-    let settle = Settle { machine, of: Of::Slides { kinematics: machine.kinematics(), slides, start: [start[0], start[1], start[2]], home, tool } };
+/// The program with the numbers that such coordinates have in the frame of the part, where the setups of a job put it: on mills, and
+/// on arms whose file has a place for G53. None where the program is good as it is.
+pub fn settled(
+    program: &Program,
+    machine: &Machine,
+    sources: &dyn Sources,
+    setups: &[Setup],
+    tool: fn(&Machine, &State) -> Frame,
+) -> Option<Settled> {
+    let mut stands = Stands::new(machine, tool)?;
     let mut coordinates = Coordinates::new(program);
-    let axes = settle.axes(&program.start().axes, coordinates.by(), program.start_state(), None).unwrap_or(program.start().axes);
-    let mut untold = None;
-    let mut out = Builder::from_state(Pose { axes, ..*program.start() }, *program.start_state());
+    let mut out = Builder::from_state(stands.begins(program.start(), program.start_state()), *program.start_state());
     out.names_of(program);
+    let (mut untold, mut any) = (None, machine.kind == Kind::Mill);
+    let mut places = Places::new(machine, setups);
     let mut cursor = program.cursor();
     while let Some(view) = cursor.next() {
-        let by = coordinates.step(program, &view, sources);
-        let axes = if view.op.moves() { settle.axes(&view.end.axes, by, view.state, None) } else { Ok(view.end.axes) };
-        if let Err(axes) = axes {
-            untold.get_or_insert((view.source, axes));
-        }
-        out.push_to(view.op, &Pose { axes: axes.unwrap_or(view.end.axes), ..*view.end }, view.source);
+        let place = places.at(program, &view);
+        any |= coordinates.step(program, &view, sources).contains(&By::Machine);
+        let told = match view.op.moves() {
+            true => stands.goes(program, &out, &view, sources, &mut coordinates, place),
+            false => stands.shifts(program, &out, &view, sources, place),
+        };
+        let (op, pose) = told.unwrap_or_else(|why| {
+            untold.get_or_insert((view.source, why));
+            (view.op, *view.end)
+        });
+        out.push_to(op, &pose, view.source);
     }
-    Some(Settled { program: out.finish(), untold })
+    any.then(|| Settled { program: out.finish(), untold })
+}
+
+/// Where the setups of a job put the part.
+struct Places<'a, 'p> {
+    setups: &'a [Setup],
+    machine: &'a Machine,
+    workingstep: Option<&'p str>,
+}
+
+impl<'a, 'p> Places<'a, 'p> {
+    fn new(machine: &'a Machine, setups: &'a [Setup]) -> Self {
+        Places { setups, machine, workingstep: None }
+    }
+
+    /// In the base, at an operation.
+    fn at(&mut self, program: &Program, view: &View<'_, 'p>) -> Frame {
+        if let Op::Begin { marker: Marker::Workingstep, text, .. } = view.op {
+            self.workingstep = Some(text);
+        }
+        setup_at(self.setups, self.workingstep, || main_line(program, view.source))
+            .and_then(|i| self.setups[i].part)
+            .unwrap_or_else(|| placed(self.machine, view.state))
+    }
 }
 
 /// A program with the numbers that its coordinates have in the frame of the part.
 pub struct Settled {
     /// The program.
     pub program: Program,
-    /// The first move with coordinates, named in the list, whose numbers can't be told: the part is turned against the machine.
-    untold: Option<(Source, [bool; 3])>,
+    /// The first move whose numbers can't be told.
+    untold: Option<(Source, Untold)>,
+}
+
+/// Why the numbers of a move can't be told.
+#[derive(Clone, Copy, PartialEq, Debug)]
+enum Untold {
+    /// The part is turned against the machine: these coordinates are none of it.
+    Turned([bool; 3]),
+    /// It goes by these coordinates, which the program has otherwise, mm: nothing has named them.
+    Rests([bool; 3], V3),
+    /// It leads by this code to a place that the program stores itself, by a run in which the part is elsewhere.
+    Stored(&'static str),
 }
 
 impl Settled {
     /// What can't be told.
     pub fn finding(&self, sources: &dyn Sources) -> Option<Diagnostic> {
-        let (source, axes) = self.untold?;
+        let (source, why) = self.untold?;
         let (file, span) = sources.place(source);
-        let names: Vec<&str> = (0..3).filter(|i| axes[*i]).map(|i| ["X", "Y", "Z"][i]).collect();
-        Some(Diagnostic::new(code::MACHINE_TURNED_PART, file, span, &[names.join(" ")]))
+        let axes = |axes: [bool; 3]| (0..3).filter(move |i| axes[*i]);
+        let names = |some: [bool; 3]| axes(some).map(|i| ["X", "Y", "Z"][i]).collect::<Vec<_>>().join(" ");
+        Some(match why {
+            Untold::Stored(word) => Diagnostic::new(code::MACHINE_STORED_PLACE, file, span, &[word.to_string()]),
+            Untold::Turned(some) => Diagnostic::new(code::MACHINE_TURNED_PART, file, span, &[names(some)]),
+            Untold::Rests(some, at) => {
+                let at = |i: usize| format!("{}{}", ["X", "Y", "Z"][i], gr_text::figures::number(at[i] + 0.0, 3));
+                let at = axes(some).map(at).collect::<Vec<_>>().join(" ");
+                Diagnostic { severity: Severity::Error, ..Diagnostic::new(code::ROBOT_UNNAMED, file, span, &[names(some), at]) }
+            }
+        })
     }
-}
-
-/// The same of an arm whose file has a place for G53, with the part where the setups of a job put it.
-pub(crate) fn settled_arm(
-    program: &Program,
-    machine: &Machine,
-    sources: &dyn Sources,
-    setups: &[Setup],
-) -> Option<Program> {
-    if machine.kind != Kind::Robot {
-        return None;
-    }
-    let settle = Settle { machine, of: Of::Place(machine.cell.machine_zero()?) };
-    let mut coordinates = Coordinates::new(program);
-    let mut out = Builder::from_state(*program.start(), *program.start_state());
-    out.names_of(program);
-    let (mut workingstep, mut any) = (None, false);
-    let mut cursor = program.cursor();
-    while let Some(view) = cursor.next() {
-        if let Op::Begin { marker: Marker::Workingstep, text, .. } = view.op {
-            workingstep = Some(text);
-        }
-        let by = coordinates.step(program, &view, sources);
-        any |= by.contains(&By::Machine);
-        // Also where nothing moves: the tool stays at a place of the machine when the program's coordinates change.
-        let part = setup_at(setups, workingstep, || main_line(program, view.source)).and_then(|i| setups[i].part);
-        out.push_to(
-            view.op,
-            &Pose { axes: settle.axes(&view.end.axes, by, view.state, part).unwrap_or(view.end.axes), ..*view.end },
-            view.source,
-        );
-    }
-    any.then(|| out.finish())
 }
 
 /// Which setup of a job holds for a workingstep, or else at a line of the main program.
@@ -284,8 +379,21 @@ pub(crate) fn setup_at(setups: &[Setup], workingstep: Option<&str>, line: impl F
 
 /// Where an operation comes from; the way to a restart belongs to what it leads to.
 pub(crate) fn leads_to(program: &Program, source: Source) -> Source {
-    let begins = || program.steps().map(|s| s.source).find(|s| s.line != INSERTED);
-    if source.line == INSERTED { begins().unwrap_or(source) } else { source }
+    if source.line != INSERTED {
+        return source;
+    }
+    // Offsets that are restored on the way keep the lines that asked for them.
+    let (mut last, mut own) = (source, source);
+    for step in program.steps() {
+        if last.line == INSERTED && step.source.line != INSERTED {
+            own = step.source;
+        }
+        last = step.source;
+        if step.op.moves() && last.line != INSERTED {
+            break;
+        }
+    }
+    own
 }
 
 /// The line of the main program that asked for an operation, itself or through calls.
@@ -293,107 +401,4 @@ pub(crate) fn main_line(program: &Program, source: Source) -> u32 {
     let source = leads_to(program, source);
     let outermost = program.call_stack(source).filter(|f| f.pass == 0).last();
     outermost.map_or(source.line, |f| f.line)
-}
-
-struct Settle<'a> {
-    machine: &'a Machine,
-    of: Of,
-}
-
-/// What the coordinates of the machine belong to.
-enum Of {
-    /// Its slides.
-    Slides {
-        kinematics: Box<dyn Kinematics>,
-        slides: Slides,
-        /// Where the program believes the slides at its start, mm.
-        start: V3,
-        /// Where they stand there.
-        home: V3,
-        tool: fn(&Machine, &State) -> Frame,
-    },
-    /// The tool point, seen from this place of the base in the directions of the part, mm.
-    Place(V3),
-}
-
-impl Settle<'_> {
-    /// Coordinates in the work frame of a place whose named ones are places of it. Those that lead to a place of the machine bring its
-    /// own coordinate there; along those that nothing has named the machine stays where it stands. Which ones they are, where their
-    /// numbers don't follow from that.
-    fn axes(&self, axes: &Axes, by: [By; 3], state: &State, part: Option<Frame>) -> Result<Axes, [bool; 3]> {
-        const TIMES: usize = 2;
-        const FAR: f64 = 100.0;
-        // An arm doesn't stand anywhere by itself.
-        let stands = matches!(self.of, Of::Slides { .. });
-        let wanted = [0, 1, 2].map(|i| by[i] == By::Machine || by[i] == By::Nothing && stands);
-        let fixed: Vec<usize> = (0..3).filter(|i| wanted[*i]).collect();
-        let mut out = *axes;
-        if fixed.is_empty() {
-            return Ok(out);
-        }
-        if self.turns_along(&fixed, state) {
-            return Err(wanted);
-        }
-        let machine = state.machine(axes);
-        // Along which direction of the machine, and how far.
-        let turn = placed(self.machine, state).then(&Frame { turn: rot_z(state.rotation), ..Frame::IDENTITY }).turn;
-        let rows: Vec<(V3, f64)> = fixed
-            .iter()
-            .map(|i| match (by[*i], &self.of) {
-                (By::Nothing, Of::Slides { start, home, .. }) => {
-                    let along = turn.map(|row| row[*i]);
-                    let gone = sub([machine[0], machine[1], machine[2]], *start);
-                    (along, dot(along, add(rotate(&placed(self.machine, state).turn, gone), *home)))
-                }
-                _ => (std::array::from_fn(|k| f64::from(u8::from(k == *i))), machine[*i]),
-            })
-            .collect();
-        for _ in 0..TIMES {
-            let Some(here) = self.slid(&out, state, part) else { return Ok(*axes) };
-            let mut slope = vec![vec![0.0; fixed.len()]; fixed.len()];
-            for (k, axis) in fixed.iter().enumerate() {
-                let mut moved = out;
-                moved[*axis] += FAR;
-                let Some(there) = self.slid(&moved, state, part) else { return Ok(*axes) };
-                for (row, (along, _)) in slope.iter_mut().zip(&rows) {
-                    row[k] = dot(*along, sub(there, here)) / FAR;
-                }
-            }
-            let left = rows.iter().map(|(along, goal)| goal - dot(*along, here)).collect();
-            let Some(by) = solve(slope, left).filter(|by| by.iter().all(|v| v.abs() < 1e6)) else { return Err(wanted) };
-            for (axis, by) in fixed.iter().zip(by) {
-                // What is there but for rounding stays as the program has it.
-                out[*axis] += if by.abs() < 1e-9 { 0.0 } else { by };
-            }
-        }
-        Ok(out)
-    }
-
-    /// Whether a part that is clamped turned would turn rotary axes of the machine, and with them what these coordinates are.
-    fn turns_along(&self, fixed: &[usize], state: &State) -> bool {
-        let Of::Slides { slides, .. } = &self.of else { return false };
-        if slides.turning.is_empty() || !matches!(self.machine.chain, gr_machine::Chain::FiveAxis(_)) {
-            return false;
-        }
-        let turn = placed(self.machine, state).turn;
-        let upright = (turn[2][2] - 1.0).abs() < 1e-12;
-        let straight = (0..3).all(|i| (turn[i][i] - 1.0).abs() < 1e-12);
-        !straight && !(upright && fixed == [2])
-    }
-
-    /// Where the words of a program are in the coordinates of the machine.
-    fn slid(&self, axes: &Axes, state: &State, part: Option<Frame>) -> Option<V3> {
-        match &self.of {
-            Of::Slides { kinematics, slides, tool, .. } => {
-                let asked = Asked::with(self.machine, axes, state, tool(self.machine, state));
-                let joints = slides.stand(self.machine, &**kinematics, &asked)?.joints;
-                Some(slides.sliding.map(|j| joints[j]))
-            }
-            Of::Place(zero) => {
-                let part = part.unwrap_or_else(|| placed(self.machine, state));
-                let tip = part.then(&work_shift(state)).apply([axes[0], axes[1], axes[2]]);
-                Some(Frame { position: *zero, ..part }.inverse().apply(tip))
-            }
-        }
-    }
 }

@@ -177,8 +177,13 @@ pub fn frame(machine: &Machine, state: &State) -> Frame {
 
 /// What the machine file places the work frame by, in the base.
 pub(crate) fn placed(machine: &Machine, state: &State) -> Frame {
+    placed_by(machine, state.work)
+}
+
+/// The same by the number of a work offset, 1 = G54.
+pub(crate) fn placed_by(machine: &Machine, work: u8) -> Frame {
     let cell = &machine.cell;
-    let named = NAMES.get(usize::from(state.work)).and_then(|n| cell.frames.get(*n)).map(|f| cell.carried(*f));
+    let named = NAMES.get(usize::from(work)).and_then(|n| cell.frames.get(*n)).map(|f| cell.carried(*f));
     named.unwrap_or_else(|| cell.part_in_base())
 }
 

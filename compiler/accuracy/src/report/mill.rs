@@ -25,7 +25,7 @@ pub fn report_of_words(
         return None;
     }
     let Ok(Words::Joints(slides)) = Words::of(machine) else { return None };
-    let settled = gr_robot::settled(program, machine, sources, tool);
+    let settled = gr_robot::settled(program, machine, sources, &[], tool);
     // Planning tells where its coordinates can't be told.
     if settled.as_ref().is_some_and(|s| s.finding(sources).is_some()) {
         return None;

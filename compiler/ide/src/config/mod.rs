@@ -105,6 +105,15 @@ fn node<'v>(mut at: &'v Value, path: &[String]) -> Option<&'v Value> {
     Some(inner(at))
 }
 
+/// What is asked of a table in a file that extends no other.
+fn whole<'v>(root: &'v Value, path: &[String]) -> Option<&'v Value> {
+    let own = root.get("anyOf")?.get(1)?;
+    path.iter().try_fold(own, |at, name| {
+        let at = at.get("properties")?.get(name)?;
+        Some(at.get("items").unwrap_or(at))
+    })
+}
+
 /// What a table holds under a name: a key of its own, or one of many alike.
 fn child<'v>(table: &'v Value, name: &str) -> Option<&'v Value> {
     table.get("properties").and_then(|p| p.get(name)).or_else(|| alike(table))
@@ -251,7 +260,10 @@ pub fn complete(schema: Schema, text: &str, offset: u32) -> Vec<Completion> {
         .filter(|(n, (start, _))| (p.lines.0..p.lines.1).contains(n) && *start != p.start)
         .filter_map(|(_, (_, l))| key_of(l))
         .collect();
-    let required: Vec<&str> = table.get("required").and_then(Value::as_array).into_iter().flatten().filter_map(Value::as_str).collect();
+    let extends = lines(text).any(|(_, l)| key_of(l) == Some("extends"));
+    let whole = (!extends).then(|| whole(schema.json(), &p.path)).flatten();
+    let named = [Some(table), whole].into_iter().flatten().filter_map(|t| t.get("required").and_then(Value::as_array));
+    let required: Vec<&str> = named.flatten().filter_map(Value::as_str).collect();
     let Some(properties) = table.get("properties").and_then(Value::as_object) else { return Vec::new() };
     let leaf = |v: &Value| inner(v).get("properties").is_none() && alike(inner(v)).is_none();
     properties

@@ -2,7 +2,7 @@
 //! word has named when something rests on them. A mill has both, see [`crate::settle`].
 
 use gr_backends::sources::{Words as Letters, stores_reference};
-use gr_ir::{FileId, Op, Program, Source, Sources, View};
+use gr_ir::{Op, Program, Sources, View};
 use gr_machine::{Kind, Machine};
 use gr_text::{Diagnostic, code};
 
@@ -15,29 +15,6 @@ pub(super) struct Unnamed(Option<Coordinates>);
 impl Unnamed {
     pub fn new(program: &Program, machine: &Machine) -> Unnamed {
         Unnamed((machine.kind == Kind::Robot).then(|| Coordinates::new(program)))
-    }
-}
-
-/// Whether lines go by increments (G91), looked for from the line on that was asked for last.
-#[derive(Default)]
-pub(super) struct Increments(Option<(FileId, u32, bool)>);
-
-impl Increments {
-    pub fn at(&mut self, sources: &dyn Sources, source: Source) -> bool {
-        let (file, line) = (source.file, source.line);
-        let told = match self.0 {
-            Some((f, last, told)) if f == file && last <= line => {
-                // Between the two lines G90 or G91 may stand.
-                let said = (last + 1..=line).rev().find_map(|l| {
-                    let words = Letters::at(sources, file, l)?;
-                    (words.g(900) || words.g(910)).then(|| words.g(910))
-                });
-                said.unwrap_or(told)
-            }
-            _ => Letters::goes_by_increments(sources, file, line),
-        };
-        self.0 = Some((file, line, told));
-        told
     }
 }
 
