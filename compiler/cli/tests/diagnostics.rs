@@ -34,8 +34,8 @@ fn plan(statements: &[&str]) -> String {
     text
 }
 
-/// Runs a command in a folder with some files: which codes it tells, and its exit status.
-fn codes(files: &[(&str, String)], command: &str) -> (Vec<String>, Option<i32>) {
+/// Runs a command in a folder with some files: what it prints, and its exit status.
+fn output(files: &[(&str, String)], command: &str) -> (String, Option<i32>) {
     let folder = tempfile::tempdir().expect("a folder");
     for (name, text) in files {
         std::fs::write(folder.path().join(name), text).expect("written");
@@ -46,10 +46,15 @@ fn codes(files: &[(&str, String)], command: &str) -> (Vec<String>, Option<i32>) 
         .current_dir(folder.path())
         .output()
         .expect("the command runs");
-    let text = String::from_utf8_lossy(&out.stderr).into_owned() + &String::from_utf8_lossy(&out.stdout);
+    (String::from_utf8_lossy(&out.stderr).into_owned() + &String::from_utf8_lossy(&out.stdout), out.status.code())
+}
+
+/// Which codes a command tells, and its exit status.
+fn codes(files: &[(&str, String)], command: &str) -> (Vec<String>, Option<i32>) {
+    let (text, status) = output(files, command);
     let mut found: Vec<String> = text.match_indices("[E").filter_map(|(i, _)| text.get(i + 1..i + 6)).map(str::to_string).collect();
     found.retain(|c| gr_spec::Code::find(c).is_some());
-    (found, out.status.code())
+    (found, status)
 }
 
 /// Exactly one finding of this code among those told, and the exit status that its severity asks for.
@@ -207,6 +212,14 @@ fn what_a_written_program_cannot_carry() {
     told("E0652", &[file("a.ngc", fixture)], restart);
     let stored = file("a.var", "5220 1\n5221 10\n5223 -30\n5241 10\n5243 -50\n");
     assert!(codes(&[file("a.ngc", fixture), stored], &format!("{restart} --vars a.var")).0.is_empty());
+    // Y was named before the shift was put away, and the cut does not name it; up there it need not be known.
+    let shifted = "G21 G90 G17 G54 F100\nG0 X0 Y0 Z5\nG92 Y10\nG0 X20 Y5\nG92.1\nG0 X30\nG1 Z-1\nX40\nG0 Z5\nM2\n";
+    told("E0652", &[file("a.ngc", shifted)], &restart.replace('6', "8"));
+    for (line, y) in [(7, true), (8, true), (9, true)] {
+        let known = [file("a.ngc", shifted), file("a.var", "5220 1\n5221 3\n5222 4\n5223 5\n")];
+        let (text, status) = output(&known, &format!("build a.ngc --target rs274ngc --from-line {line} --safe-z 60 --vars a.var"));
+        assert_eq!((text.contains(" Y-5"), status), (y, Some(0)), "{line}: {text}");
+    }
     // Nothing cuts before the height is said again.
     let clear = fixture.replace("G1 X5", "G0 X5 Y6 Z30").replace("G1 X10", "G1 Z1");
     assert!(codes(&[file("a.ngc", &clear)], &restart.replace('6', "5")).0.is_empty());
@@ -281,6 +294,8 @@ fn a_translation_holds_on_every_machine_or_says_so() {
         "G21 G90\nG0 X10\nG10 L20 P1 X0\nG0 X5\nM2\n",
         "G21 G90 G54\nG0 X1 Y2 Z3\nG10 L20 P2 X50 Z[2+3]\nG10 L2 P3 X0 Y[1+1] R20\nG10 L2 P1 X0\nG55 G0 X3 Y4 Z5\nG92 X9\nG10 L20 P3 X1 Y1\nG56 G0 X1 Y1\nG10 L2 P6 Z0\nM2\n",
         "G21 G90 G17 G40 G49 G54\nG0 X1 Y1 Z1\nM2\n",
+        // What the control may have in store is said again: a rotation of 0 too.
+        "G21 G90 G17 G54\nG10 L2 P1 X0 Y0 Z0 R0\nG0 X10 Y0 Z5\nG10 L2 P0 R0 Y3\nG0 X20 Y1\nM2\n",
         // A first block that names G0 and no axis.
         "G21\nG0 G17 G40 G49 G80 G90\nT1 M6\nG0 X1 Y1\nG43 H1 Z5\nG1 Z-1 F100\nM2\n",
         // Rotary words that are rounded, along a line and an arc.

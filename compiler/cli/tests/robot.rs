@@ -619,7 +619,7 @@ fn a_mill_goes_on_from_where_it_stands() {
     let rotated = "G10 L2 P1 X5 Y5 R30\nG0 X10 Y20 Z20\nG53 G0 Z0\nG53 G0 X0\nG0 X10 Y20\nG91 G28 X0";
     ends(0, rotated, &[[103.6603, 77.3205, 0.0], [0.0, 77.3205, 0.0], [103.6603, 77.3205, 0.0], [-7.5657, 13.1042, 0.0]]);
     // A part that is clamped turned; the coordinate that isn't named stays where it is now.
-    ends(30, "G0 X10 Y20 Z20\nG53 G0 X0\nG0 X10", &[[98.6603, 72.3205, -120.0], [0.0, 72.3205, -120.0], [73.481, 115.933, -120.0]]);
+    ends(30, "G0 X10 Y20 Z20\nG53 G0 X0\nG0 X10", &[[98.6603, 72.3205, -120.0], [0.0, 72.3205, -120.0], [73.9952, 115.0417, -120.0]]);
     // Coordinates set where the machine stands, and increments from there.
     ends(0, "G0 X10 Y20 Z20\nG53 G0 Z0\nG92 Z0\nG1 Z-5 F500", &[[110.0, 70.0, -5.0]]);
     ends(0, "G0 X10 Y20 Z20\nG53 G0 Z-10\nG10 L20 P1 X1 Z0\nG0 X3 Z-5", &[[112.0, 70.0, -15.0]]);

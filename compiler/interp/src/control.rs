@@ -128,7 +128,12 @@ impl<S: Sink> Interp<'_, S> {
                     return Ok(());
                 }
                 // The expression may still read the value that the last call gave.
-                let value = if c.arg_count > 0 { Some(self.arg(scan, c, 0)?) } else { None };
+                self.unset_read = false;
+                let value = match (c.arg_count > 0).then(|| self.arg(scan, c, 0)) {
+                    // Of a subroutine that is only read, what its own names will be nobody knows yet.
+                    Some(Err(_)) if self.unset_read => Some(0.0),
+                    value => value.transpose()?,
+                };
                 (self.return_value, self.value_returned) = (value.unwrap_or(0.0), value.is_some());
             }
             _ if self.defining_sub => return Ok(()),

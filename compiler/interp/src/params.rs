@@ -176,7 +176,10 @@ impl<S: Sink> Interp<'_, S> {
     pub(crate) fn read_named(&mut self, name: &str) -> Res<f64> {
         match self.find_named(name) {
             Some(value) => Ok(value),
-            None if self.defining_sub => Ok(0.0),
+            None if self.defining_sub => {
+                self.unset_read = true;
+                Ok(0.0)
+            }
             None if name.starts_with("_hal[") => Err(Fault::new(code::PARAMETER_HAL, rs274::RT_NAME_UNDEFINED).arg(name)),
             None => Err(Fault::new(code::PARAMETER_UNDEFINED, rs274::RT_NAME_UNDEFINED).arg(name)),
         }

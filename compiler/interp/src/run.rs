@@ -146,6 +146,8 @@ pub struct Interp<'a, S: Sink> {
     pub(crate) symbols: Symbols,
     pub(crate) skip: Option<Skip>,
     pub(crate) defining_sub: bool,
+    /// A name without a value was read in a subroutine that is only read.
+    pub(crate) unset_read: bool,
     pub(crate) sub_name: Option<u32>,
     /// The main program goes on behind a call: the controller then lets a stray `return` pass.
     pub(crate) came_back: bool,
@@ -253,6 +255,7 @@ impl<'a, S: Sink> Interp<'a, S> {
             symbols: Symbols::default(),
             skip: None,
             defining_sub: false,
+            unset_read: false,
             sub_name: None,
             came_back: false,
             main_unnamed: false,
