@@ -887,3 +887,18 @@ fn tool_lengths_without_a_table() {
     let written = write(text, &options(Language::Linuxcnc));
     assert!(written.contains("G43 H1") && written.contains("G49"), "{written}");
 }
+
+/// On a Fanuc control G53 is a rapid, whatever stands beside it: a feed move there is refused, or written where the work offsets are
+/// known. What a Fanuc program says is written as the rapid it is.
+#[test]
+fn feeds_to_places_of_the_machine_become_no_rapids() {
+    let text = "G21 G90 G17 G40 G49\nG0 X0 Y0 Z5\nG53 G1 Z-20 F100\nG0 Z5\nM2\n";
+    let refused = errors(text, Language::FanucMill);
+    assert_eq!(refused, [("emit/not-expressible", "G53 G1 Z-20 F100".to_string())]);
+    let known = Options { stored_known: true, ..options(Language::FanucMill) };
+    let written = write(text, &known);
+    assert!(written.contains("G1 Z-20. F100.") && !written.contains("G53"), "{written}");
+    let fanuc = run_as("G21 G90\nG0 X0. Y0. Z5.\nG1 X50. F100.\nG53 Z-7.\nX60.\nM30\n", "fanuc-mill").expect("it runs");
+    let moves: Vec<_> = fanuc.steps().filter(|s| s.op.moves()).map(|s| s.op == gr_ir::Op::Rapid).collect();
+    assert_eq!(moves, [true, false, true, false]);
+}

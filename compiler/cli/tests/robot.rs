@@ -634,7 +634,7 @@ fn a_mill_goes_on_from_where_it_stands() {
     ends(0, program, &[[110.0, 70.0, 0.0], [100.0, 50.0, -120.0], [100.0, 50.0, 0.0]]);
     // What can't be told.
     let cycle = "G0 X10 Y20 Z20\nG53 G0 Z0\nG98 G81 X5 Y5 Z-3 R2 F500";
-    let arc = "G0 X10 Y20 Z20\nG53 G0 X100\nG2 X5 Y5 I2 F500";
+    let arc = "G0 X10 Y20 Z20\nG53 G0 X100\nG2 X100 Y10 J-5 F500";
     let reference = "G0 X10 Y20 Z20\nG28.1\nG28";
     for (program, code) in [(cycle, "E0559"), (arc, "E0559"), (reference, "E0561")] {
         let (moves, found) = made(0, program, &[]);

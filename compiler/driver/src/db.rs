@@ -255,6 +255,8 @@ pub(crate) struct Label {
 pub(crate) enum LabelKind {
     Sub,
     Call,
+    /// A program begins (`O1000`).
+    Program,
     Number,
 }
 
@@ -396,6 +398,7 @@ fn control_label(scan: &Scan, line: u32, word: &gr_gcode::Word, shape: &mut Shap
     let kind = match control.keyword {
         Keyword::Sub => LabelKind::Sub,
         Keyword::Call => LabelKind::Call,
+        Keyword::Program => LabelKind::Program,
         _ => return,
     };
     labels.push(Label { name, line, kind });

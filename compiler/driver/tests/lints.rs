@@ -170,3 +170,22 @@ fn a_cycle_from_a_place_of_the_machine_starts_as_high_as_only_the_machine_knows(
     let two = "G21 G90 F100\nM3 S100\nG53 G0 Z0\nG99 G81 X5 Y5 Z-5 R2\nG80\nG81 X9 Z-5 R4\nG80\nM5\nM2\n";
     assert_eq!(found(two), ["6: cycle/starts-below-r"]);
 }
+
+/// Each Fanuc program of a file has block numbers of its own.
+#[test]
+fn block_numbers_of_two_programs_are_no_duplicates() {
+    let check = |text: &str| {
+        let mut session = Session::new();
+        let dialect = gr_spec::Dialect::find("fanuc-mill").expect("a dialect");
+        let file = session.open("part.nc", text, Options::new(Setup { dialect, ..Setup::default() }));
+        let found = session.check(file).diagnostics;
+        found.iter().map(|d| format!("{} {}", d.code.def().code, d.message)).collect::<Vec<_>>()
+    };
+    let text = "O0001\nG21 G90 G17\nN10 #1=0\nN20 IF [#1 GE 3] GOTO 50\nM98 P2\n#1=#1+1\nGOTO 20\nN50 M30\nO0002\nN10 G0 X1.\nN20 M99\n";
+    assert_eq!(check(text), Vec::<String>::new());
+    let found = check(&text.replace("N20 M99", "N10 M99"));
+    assert!(found.len() == 1 && found[0].starts_with("E0289"), "{found:?}");
+    // In the control's words, without O-words that the program doesn't have.
+    let found = check(&text.replace("GOTO 50", "GOTO 60"));
+    assert!(found.iter().any(|m| m.contains(" N60: no block of this program has this number")), "{found:?}");
+}

@@ -343,6 +343,11 @@ impl Scan {
         let end = self.lines.get(line as usize + 1).map_or(self.words.len(), |l| l.first_word as usize);
         &self.words[first..end]
     }
+    /// Whether a program with an O number of its own (`O100`) begins on a line.
+    pub fn begins_program(&self, line: u32) -> bool {
+        let keyword = |w: &Word| self.controls.get(w.index()).map(|c| c.keyword);
+        self.words(line).iter().any(|w| w.form == Form::Control && keyword(w) == Some(Keyword::Program))
+    }
     /// Bytes of a line, without its line end.
     pub fn line_span(&self, text: &str, line: u32) -> Span {
         let start = self.lines[line as usize].start;

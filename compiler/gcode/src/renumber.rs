@@ -73,7 +73,7 @@ fn numbers(
     for line in 0..scan.lines.len() as u32 {
         let words = scan.words(line);
         let row = &scan.lines[line as usize];
-        let begins = words.iter().any(|w| is_program(scan, w));
+        let begins = scan.begins_program(line);
         if begins {
             programs.push(Program { first: line, new: HashMap::new() });
         }
@@ -103,11 +103,6 @@ fn numbers(
         next = next.saturating_add(options.step.max(1));
     }
     programs
-}
-
-/// `O100` at the start of a program has a number of its own.
-fn is_program(scan: &Scan, word: &Word) -> bool {
-    word.form == Form::Control && scan.controls[word.index()].keyword == Keyword::Program
 }
 
 /// What names a block: GOTO, M99 P, and P and Q of the turning cycles G70 to G73.

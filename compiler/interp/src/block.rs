@@ -49,6 +49,8 @@ pub struct Block {
     pub turning: i16,
     /// Fanuc: G67.
     pub ends_modal: bool,
+    /// Fanuc: G53 without a motion of its own, which leaves the motion in force.
+    pub machine_rapid: bool,
     /// Steps of execution that are done already (a remapped block is executed in several goes).
     pub(crate) done: u32,
     /// Steps of execution that a remap takes over.
@@ -68,6 +70,7 @@ impl Default for Block {
             motion: -1,
             turning: -1,
             ends_modal: false,
+            machine_rapid: false,
             done: 0,
             remapped: 0,
         }
@@ -117,6 +120,7 @@ impl Block {
         self.motion = -1;
         self.turning = -1;
         self.ends_modal = false;
+        self.machine_rapid = false;
         self.done = 0;
         self.remapped = 0;
     }

@@ -109,6 +109,8 @@ impl<S: Sink> Interp<'_, S> {
         let motion = b.g(Group::Motion);
         let motion_only = || polar_said(rs274::RT_POLAR_MOTION_ONLY, "only for motion");
         let name = code_name(special.max(0));
+        // On a Fanuc control G92 S is the highest speed of the spindle.
+        let clamps = special == 920 && self.is_fanuc() && b.has(b's');
         let missing = || fault(code::AXIS_MISSING, rs274::RT_AXIS_MISSING_G92, &name).at(b'g');
         if motion == 800 {
             if (is_polar || axes) && !covets {
@@ -117,7 +119,7 @@ impl<S: Sink> Interp<'_, S> {
             if is_polar && special == 920 {
                 return Err(motion_only());
             }
-            if !axes && (special == 520 || special == 920) {
+            if !axes && (special == 520 || special == 920) && !clamps {
                 return Err(missing());
             }
             self.block.motion = motion;
@@ -134,7 +136,7 @@ impl<S: Sink> Interp<'_, S> {
             if is_polar && special == 920 {
                 return Err(motion_only());
             }
-            if !axes && (special == 520 || special == 920) {
+            if !axes && (special == 520 || special == 920) && !clamps {
                 return Err(missing());
             }
         } else if axes || is_polar {

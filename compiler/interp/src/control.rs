@@ -341,7 +341,9 @@ impl<S: Sink> Interp<'_, S> {
         if pass > self.setup.budgets.passes {
             return Err(self.endless("this loop has run more passes than the limit allows"));
         }
-        let name = ["o", self.symbols.name(label.name)].concat();
+        let name = self.symbols.name(label.name);
+        // A Fanuc control's loops have no O-words: `N10`, `DO 1`.
+        let name = if self.is_fanuc() { name.to_string() } else { format!("o{name}") };
         self.enter_frame(&name, parent, pass.min(u64::from(u32::MAX)) as u32);
         Ok(())
     }

@@ -315,6 +315,12 @@ impl<S: Sink> Interp<'_, S> {
         if (machine || self.m.parked != 0) && motion != 800 && !crate::check::is_cycle(motion) {
             self.park(machine);
         }
+        if self.block.machine_rapid {
+            let in_force = self.m.motion;
+            let done = self.convert_straight(0);
+            self.m.motion = in_force;
+            return done;
+        }
         if self.config.any_indexer && self.index_motion(motion)? {
             return Ok(());
         }

@@ -59,11 +59,15 @@ impl<S: Sink> Interp<'_, S> {
         }
         match self.block.turning {
             -1 => {}
-            500 => return self.clamp_spindle(),
+            500 => return self.clamp_spindle("G50"),
             _ => return self.turn_coordinates(),
         }
-        if self.block.g(Group::NonModal) == 100 {
-            return self.data_input();
+        match self.block.g(Group::NonModal) {
+            100 => return self.data_input(),
+            300 => self.reference_point()?,
+            530 => self.machine_rapid()?,
+            920 if self.block.has(b's') && !is_lathe(self.setup.dialect) => return self.clamp_spindle("G92"),
+            _ => {}
         }
         let arc = matches!(self.block.g(Group::Motion), 20 | 30) || self.block.g(Group::Motion) == -1 && matches!(self.m.motion, 20 | 30);
         let b = &self.block;
@@ -165,16 +169,52 @@ impl<S: Sink> Interp<'_, S> {
         Ok(())
     }
 
-    /// G50 S: the highest speed of surface speed control. G50 with axis words sets coordinates.
-    fn clamp_spindle(&mut self) -> Res {
+    /// G30: P2, the second reference point, is what it goes to without P. Where the third and fourth are only the machine knows.
+    fn reference_point(&mut self) -> Res {
+        match self.block.get(b'p') {
+            None => {}
+            Some(2.0) => self.block.unset(b'p'),
+            Some(p @ (3.0 | 4.0)) => return Err(self.not_carried_out(rs274::SILENT, format!("G30 P{p}")).at(b'p')),
+            Some(_) => return Err(Fault::new(code::WORD_BAD_VALUE, rs274::SILENT).arg("G30").arg('P').at(b'p')),
+        }
+        Ok(())
+    }
+
+    /// G53 is a rapid whatever the motion in force is, and leaves that in force.
+    fn machine_rapid(&mut self) -> Res {
+        if !self.has_axes() && !self.block.has_any_of(INCREMENT_MASK) {
+            return Err(Fault::new(code::AXIS_MISSING, rs274::SILENT).arg("G53").at(b'g'));
+        }
+        match self.block.g(Group::Motion) {
+            -1 if crate::check::is_cycle(self.m.motion as i16) => {
+                Err(self.not_carried_out(rs274::SILENT, "G53 while a canned cycle is in force".into()).at(b'g'))
+            }
+            -1 => {
+                self.block.g[Group::Motion as usize] = 0;
+                self.block.machine_rapid = true;
+                Ok(())
+            }
+            0 => Ok(()),
+            other => {
+                let what = format!("is a rapid of its own on this control: {} beside it would not be done", crate::check::code_name(other));
+                Err(Fault::new(code::MOTION_G53, rs274::SILENT).arg(what).at(b'g'))
+            }
+        }
+    }
+
+    /// G50 S of a lathe, G92 S of a machining center: the highest speed of surface speed control. With axis words they set coordinates.
+    fn clamp_spindle(&mut self, name: &str) -> Res {
         self.block.turning = -1;
         if self.has_axes() || self.block.has(b'h') {
-            return Err(self.not_carried_out(rs274::RT_UNKNOWN_G, "G50 with axis words".into()).at(b'g'));
+            let what = if self.block.has(b's') { "S beside axis words" } else { "axis words" };
+            return Err(self.not_carried_out(rs274::RT_UNKNOWN_G, format!("{name} with {what}")).at(b'g'));
         }
         let Some(speed) = self.block.get(b's') else {
-            return Err(Fault::new(code::WORD_MISSING, rs274::RT_UNKNOWN_G).arg("G50").arg("S").at(b'g'));
+            return Err(Fault::new(code::WORD_MISSING, rs274::RT_UNKNOWN_G).arg(name).arg("S").at(b'g'));
         };
         self.block.unset(b's');
+        self.block.g[Group::NonModal as usize] = -1;
+        self.block.g_mask &= !(1 << Group::NonModal as u32);
         self.m.spindle_clamp = speed;
         let spindle = self.m.active_spindle;
         if self.m.css[spindle.clamp(0, 7) as usize] != 0 {

@@ -163,7 +163,7 @@ impl<S: Sink> Interp<'_, S> {
     }
 
     pub(crate) fn label_fault(&self, rs: Rs274, label: Label, what: &str) -> Box<Fault> {
-        let name = self.symbols.name(label.name).to_string();
+        let name = format!("o-word label {}", self.symbols.name(label.name));
         Fault::new(code::FLOW_LABEL, rs).own_args(&[&name, what])
     }
 

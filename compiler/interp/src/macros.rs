@@ -2,12 +2,12 @@
 
 use gr_canon::Sink;
 use gr_gcode::{Control, Form, Keyword, Scan, Word};
-use gr_spec::rs274;
+use gr_spec::{code, rs274};
 
-use crate::labels::{Label, MAIN};
+use crate::labels::Label;
 use crate::run::Flow;
 use crate::statements::first_real;
-use crate::{Interp, Res};
+use crate::{Fault, Interp, Res};
 
 impl<S: Sink> Interp<'_, S> {
     pub(crate) fn macro_line(&mut self, scan: &Scan, text: &str, words: &[Word], c: &Control) -> Res {
@@ -49,7 +49,7 @@ impl<S: Sink> Interp<'_, S> {
                         self.flow = Flow::Jump;
                         Ok(())
                     }
-                    None => Err(self.label_fault(rs274::SILENT, label, "no END with this number")),
+                    None => Err(no_partner(&format!("DO {n}"), "no END with this number")),
                 }
             }
             Keyword::MacroDo => {
@@ -59,14 +59,13 @@ impl<S: Sink> Interp<'_, S> {
             }
             _ => {
                 let n = self.arg(scan, c, 0)?;
-                let label = self.macro_label(n);
                 match self.find_macro(n, false)? {
                     Some(line) => {
                         self.next = line;
                         self.flow = Flow::Jump;
                         Ok(())
                     }
-                    None => Err(self.label_fault(rs274::SILENT, label, "no DO with this number")),
+                    None => Err(no_partner(&format!("END {n}"), "no DO with this number")),
                 }
             }
         }
@@ -79,9 +78,8 @@ impl<S: Sink> Interp<'_, S> {
 
     pub(crate) fn go_to_number(&mut self, target: f64) -> Res {
         let index = self.index(self.place.file);
-        let Some(line) = index.numbers.get(&(target as i64)).copied() else {
-            let name = self.symbols.of(&format!("N{target}"));
-            return Err(self.label_fault(rs274::SILENT, Label { scope: MAIN, name }, "no block has this number"));
+        let Some(line) = index.numbered(target as i64, self.place.line) else {
+            return Err(no_partner(&format!("N{target}"), "no block of this program has this number"));
         };
         if line <= self.place.line {
             let name = self.symbols.of(&format!("N{target}"));
@@ -98,12 +96,12 @@ impl<S: Sink> Interp<'_, S> {
         let index = self.index(self.place.file);
         let here = self.place.line;
         let at = index.lines.partition_point(|l| *l < here);
-        let lines: Box<dyn Iterator<Item = u32>> = if forward {
-            Box::new(index.lines[at..].to_vec().into_iter().filter(move |l| *l > here))
+        let lines: Box<dyn Iterator<Item = &u32>> = if forward {
+            Box::new(index.lines[at..].iter().filter(|l| **l > here))
         } else {
-            Box::new(index.lines[..at].to_vec().into_iter().rev())
+            Box::new(index.lines[..at].iter().rev())
         };
-        for line in lines {
+        for line in lines.copied().take_while(|l| index.in_one_program(*l, here)) {
             let file = self.files.file(self.place.file);
             let Some((c, l)) = file.locate(line) else { continue };
             let scan = file.chunks[c].scan.clone();
@@ -121,6 +119,11 @@ impl<S: Sink> Interp<'_, S> {
         }
         Ok(None)
     }
+}
+
+/// What a statement names is not there.
+fn no_partner(name: &str, what: &str) -> Box<Fault> {
+    Fault::new(code::FLOW_LABEL, rs274::SILENT).arg(name).arg(what)
 }
 
 pub(crate) fn is_macro(keyword: Keyword) -> bool {

@@ -14,7 +14,25 @@ use crate::{Fault, Interp};
 #[derive(Debug, Default)]
 pub(crate) struct FileIndex {
     pub(crate) lines: Vec<u32>,
-    pub(crate) numbers: FxHashMap<i64, u32>,
+    /// First lines of the programs (`O1000`), ascending.
+    programs: Vec<u32>,
+    /// The first block of each number, in each program.
+    numbers: FxHashMap<(usize, i64), u32>,
+}
+
+impl FileIndex {
+    /// The program that a line stands in: 0 before the first one begins.
+    fn program(&self, line: u32) -> usize {
+        self.programs.partition_point(|first| *first <= line)
+    }
+    /// The block of a number in the program that `line` stands in: every program has block numbers of its own.
+    pub(crate) fn numbered(&self, number: i64, line: u32) -> Option<u32> {
+        self.numbers.get(&(self.program(line), number)).copied()
+    }
+    /// Whether two lines stand in one program.
+    pub(crate) fn in_one_program(&self, a: u32, b: u32) -> bool {
+        self.program(a) == self.program(b)
+    }
 }
 
 pub(crate) fn op_name(keyword: Keyword) -> &'static str {
@@ -173,8 +191,11 @@ impl<S: Sink> Interp<'_, S> {
                 if is_stop(scan, l as u32) {
                     index.lines.push(at);
                 }
+                if scan.begins_program(l as u32) {
+                    index.programs.push(at);
+                }
                 if let Some(n) = words.first().filter(|w| w.letter == b'n' && w.form == Form::Literal) {
-                    index.numbers.entry(n.value as i64).or_insert(at);
+                    index.numbers.entry((index.programs.len(), n.value as i64)).or_insert(at);
                 }
             }
         }

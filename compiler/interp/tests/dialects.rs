@@ -12,7 +12,12 @@ fn run_in(id: &str, text: &str) -> (Vec<String>, Outcome) {
     let dialect = Dialect::find(id).expect("a dialect of the tables");
     let setup = Setup { dialect, uvw: true, ..setup() };
     let (out, outcome) = run_with(&setup, text, 100);
-    let calls = out.lines().skip(6).map(|l| l.split_once("N..... ").map_or(l, |(_, call)| call).to_string()).collect();
+    // `  12 N20    CALL(…)`, or `N.....` without a number.
+    let call = |l: &'_ str| {
+        let (_, numbered) = l.trim_start().split_once(' ')?;
+        Some(numbered.strip_prefix('N')?.split_once(' ')?.1.trim_start().to_string())
+    };
+    let calls = out.lines().skip(6).map(|l| call(l).unwrap_or_else(|| l.to_string())).collect();
     (calls, outcome)
 }
 
@@ -536,4 +541,74 @@ fn a_lathe_changes_its_tool_with_t() {
         ["SELECT_TOOL", "CHANGE_TOOL", "USE_TOOL_LENGTH_OFFSET", "SELECT_TOOL", "USE_TOOL_LENGTH_OFFSET", "SELECT_TOOL", "CHANGE_TOOL", "USE_TOOL_LENGTH_OFFSET"],
         "{tools:?}"
     );
+}
+
+/// Block numbers are those of the program that they stand in: GOTO, IF … GOTO and END stay inside of it.
+#[test]
+fn fanuc_block_numbers_belong_to_their_program() {
+    let main = "O0001\nG21 G90 G17\nG0 X1.\nM98 P2\nN10 G0 X7.\nN20 G0 X50.\nM30\n";
+    let sub = "O0002\n#101=2\nN10 #101=#101+1\nG0 X#101\nIF [#101 LT 4] GOTO 10\nGOTO 20\nG0 X99.\nN20 G0 X60.\nM99\n";
+    let (calls, outcome) = run_in("fanuc-mill", &format!("{main}{sub}"));
+    assert!(outcome.findings.is_empty(), "{:?}", outcome.findings);
+    assert_eq!(moves_of(&calls), ["rapid 1 0 0", "rapid 3 0 0", "rapid 4 0 0", "rapid 60 0 0", "rapid 7 0 0", "rapid 50 0 0"]);
+    // M99 P names a block of the program that called, though its own has one too.
+    let (calls, outcome) = run_in("fanuc-mill", &format!("{main}O0002\nG0 X2.\nM99 P20\nN20 G0 X60.\nM99\n"));
+    assert!(outcome.findings.is_empty(), "{:?}", outcome.findings);
+    assert_eq!(moves_of(&calls), ["rapid 1 0 0", "rapid 2 0 0", "rapid 50 0 0"]);
+    // What only another program has is not there.
+    for (body, name) in [("GOTO 20\n", "N20"), ("WHILE [1 EQ 0] DO 1\n", "DO 1"), ("END 2\n", "END 2")] {
+        let main = main.replace("G0 X1.\n", "WHILE [1 EQ 0] DO 2\nEND 2\n");
+        let (_, outcome) = run_in("fanuc-mill", &format!("{main}O0002\n{body}M99\nO0003\nEND 1\nM99\n"));
+        let fault = &outcome.findings[0].fault;
+        assert_eq!((fault.code, &fault.args[0][..]), (code::FLOW_LABEL, name));
+    }
+}
+
+/// Series 0i/30i, machining center and lathe, machine coordinate system: G53 is a rapid for its block alone.
+#[test]
+fn a_fanuc_g53_is_a_rapid_of_its_own() {
+    let text = "G21 G90 G17\nG1 X50. F100.\nG53 Z0\nX60.\nG2 X70. I5.\nG53 Y9.\nX80. I5.\nG53 G0 X1.\nX2.\nM30\n";
+    let (calls, outcome) = run_in("fanuc-mill", text);
+    assert!(outcome.findings.is_empty(), "{:?}", outcome.findings);
+    let moves: Vec<_> = moves_of(&calls).iter().map(|m| m.split(' ').take(2).collect::<Vec<_>>().join(" ")).collect();
+    assert_eq!(moves, ["feed 50", "rapid 50", "feed 60", "arc 70", "rapid 70", "arc 80", "rapid 1", "rapid 2"], "{calls:?}");
+    let (calls, outcome) = run_in("fanuc-turn", "G21 G98\nG1 X50. F100.\nG53 X20. Z0\nX60.\nM30\n");
+    assert!(outcome.findings.is_empty(), "{:?}", outcome.findings);
+    assert_eq!(moves_of(&calls), ["feed 25 0 0", "rapid 10 0 0", "feed 30 0 0"]);
+    for (text, expected) in [
+        ("G53 G1 Z0 F100.\n", code::MOTION_G53),
+        ("G91 G53 Z0\n", code::MOTION_G53),
+        ("G53\n", code::AXIS_MISSING),
+        ("G0 Z5.\nG81 X1. Z-5. R2. F100.\nG53 Z0\n", code::CODE_NOT_CARRIED_OUT),
+    ] {
+        let (_, outcome) = run_in("fanuc-mill", &format!("G21 G90\n{text}M30\n"));
+        assert_eq!(outcome.findings[0].fault.code, expected, "{text}");
+    }
+}
+
+/// P2 is the second reference point, which G30 goes to anyhow; where the others are only the machine knows.
+#[test]
+fn fanuc_reference_points() {
+    let (with, outcome) = run_in("fanuc-mill", "G21 G91\nG30 P2 Z0\nM30\n");
+    assert!(outcome.findings.is_empty(), "{:?}", outcome.findings);
+    assert_eq!(with, run_in("fanuc-mill", "G21 G91\nG30 Z0\nM30\n").0);
+    let (_, outcome) = run_in("fanuc-turn", "G21\nG30 P2 U0 W0\nM30\n");
+    assert!(outcome.findings.is_empty(), "{:?}", outcome.findings);
+    for (p, expected) in [(3, code::CODE_NOT_CARRIED_OUT), (4, code::CODE_NOT_CARRIED_OUT), (5, code::WORD_BAD_VALUE)] {
+        let (_, outcome) = run_in("fanuc-mill", &format!("G21 G91\nG30 P{p} Z0\nM30\n"));
+        assert_eq!(outcome.findings[0].fault.code, expected, "P{p}");
+    }
+}
+
+/// G92 S of a machining center is G50 S of a lathe; with axis words it sets coordinates.
+#[test]
+fn a_fanuc_mill_clamps_the_spindle() {
+    let (calls, outcome) = run_in("fanuc-mill", "G21 G90\nG92 S3000\nG96 S100\nM3\nG92 S2500\nM5\nM30\n");
+    assert!(outcome.findings.is_empty(), "{:?}", outcome.findings);
+    let limits: Vec<_> = calls.iter().filter(|c| c.starts_with("SET_SPINDLE_MODE")).cloned().collect();
+    assert_eq!(limits[..2], ["SET_SPINDLE_MODE(0 3000.0000)", "SET_SPINDLE_MODE(0 2500.0000)"], "{calls:?}");
+    assert!(!calls.iter().any(|c| c.starts_with("SET_SPINDLE_SPEED(0, 3000")), "{calls:?}");
+    let (_, outcome) = run_in("fanuc-mill", "G21 G90\nG92 X0. S3000\nM30\n");
+    assert_eq!(outcome.findings[0].fault.code, code::CODE_NOT_CARRIED_OUT);
+    assert!(run_in("fanuc-mill", "G21 G90\nG92 X0.\nM30\n").1.findings.is_empty());
 }

@@ -261,7 +261,13 @@ impl Emitter<'_> {
             return self.thread(view, sync.per_rev, sync.spindle);
         }
         if self.words(view.source).is_some_and(|w| w.g(530)) {
-            return self.machine_move(view, "G1", &[]);
+            if self.options.language != Language::FanucMill {
+                return self.machine_move(view, "G1", &[]);
+            }
+            // There G53 is a rapid, whatever stands beside it.
+            if !self.options.stored_known {
+                return self.cannot("a feed move to a place of the machine (G53 G1; G53 is a rapid there)", view.source);
+            }
         }
         self.straight(view.start, view.end, view.state, view.source);
     }

@@ -40,9 +40,12 @@ pub(crate) fn labels(shapes: &[&Shape], starts: &[u32], stem: &str, options: &Op
     };
     if options.setup.dialect.family == Family::Fanuc && shapes.iter().any(|s| s.jumps) {
         let mut seen = BTreeSet::new();
-        for (label, line) in all().filter(|(l, _)| l.kind == LabelKind::Number) {
-            if !seen.insert(&label.name) {
-                report(code::BLOCK_DUPLICATE_NUMBER, line, b'n', &label.name);
+        for (label, line) in all() {
+            match label.kind {
+                // Every program has block numbers of its own.
+                LabelKind::Program => seen.clear(),
+                LabelKind::Number if !seen.insert(&label.name) => report(code::BLOCK_DUPLICATE_NUMBER, line, b'n', &label.name),
+                _ => {}
             }
         }
     }
@@ -61,7 +64,7 @@ fn unused_subs<'a>(
         match label.kind {
             LabelKind::Sub => _ = subs.entry(&label.name).or_insert(line),
             LabelKind::Call => _ = calls.insert(&label.name),
-            LabelKind::Number => {}
+            LabelKind::Program | LabelKind::Number => {}
         }
     }
     // A library of subroutines is called from elsewhere, and a computed label may be any.
