@@ -37,6 +37,8 @@ pub struct Restart {
     pub notes: Vec<Diagnostic>,
     /// Where the tool is brought, axis by axis in the work frame in force, mm and rad. None: it stays there.
     pub goal: [Option<f64>; 9],
+    /// Where the program itself first sends each axis in the work frame; none: nowhere by a word of its own.
+    pub named: [Option<f64>; 9],
 }
 
 /// Lets a program begin at `line` (from 1) of `file`.
@@ -99,7 +101,7 @@ pub fn from_line(
     }
     let lathe = approach::is_lathe(program);
     let places = places(program, found.index, lathe, sources);
-    let needed = needed(program, found.index, sources);
+    let Ahead { needed, named } = ahead(program, found.index, sources);
     let used = axes_used(program);
     let lost = |i: &usize| places[*i] == Place::Machine && needed[*i] && used[*i];
     let lost: Vec<String> = (0..9).filter(lost).map(|i| char::from(AXIS_LETTERS[i].to_ascii_uppercase()).to_string()).collect();
@@ -118,7 +120,7 @@ pub fn from_line(
     let from = From { index: found.index, line, known, wait, lathe };
     let restart = build(program, &from, &state, &pose, safe.max(pose.axes[2]), sources);
     let goal = std::array::from_fn(|i| known[i].then_some(pose.axes[i]));
-    Ok(Restart { program: restart, notes, goal })
+    Ok(Restart { program: restart, notes, goal, named })
 }
 
 fn no_height(place: (FileId, Span), top: f64) -> Diagnostic {
@@ -332,19 +334,33 @@ fn places(program: &Program, index: usize, lathe: bool, sources: &dyn Sources) -
     places
 }
 
-/// Axes whose place counts: from an operation on, the program cuts before it names them.
-fn needed(program: &Program, index: usize, sources: &dyn Sources) -> [bool; 9] {
-    let (mut needed, mut said) = ([false; 9], [false; 9]);
+/// What a program does with its axes from an operation on.
+struct Ahead {
+    /// It cuts before it names them: their place counts.
+    needed: [bool; 9],
+    /// Where it first sends them by a word.
+    named: [Option<f64>; 9],
+}
+
+fn ahead(program: &Program, index: usize, sources: &dyn Sources) -> Ahead {
+    let mut ahead = Ahead { needed: [false; 9], named: [None; 9] };
+    let mut said = [false; 9];
     for s in program.steps().skip(index).filter(|s| s.op.moves()) {
+        let words = Words::at(sources, s.source.file, s.source.line);
         for i in 0..9 {
-            said[i] |= says(i, &s.start, &s.end, s.source, sources);
-            needed[i] |= s.op.feeds() && !said[i];
+            if said[i] || !says(i, &s.start, &s.end, s.source, sources) {
+                continue;
+            }
+            said[i] = true;
+            let word = words.is_some_and(|w| w.has(AXIS_LETTERS[i]) && ![280, 300, 530].into_iter().any(|g| w.g(g)));
+            ahead.named[i] = word.then_some(s.end.axes[i]);
         }
-        if (0..9).all(|i| said[i] || needed[i]) {
+        (0..9).for_each(|i| ahead.needed[i] |= s.op.feeds() && !said[i]);
+        if (0..9).all(|i| said[i] || ahead.needed[i]) {
             break;
         }
     }
-    needed
+    ahead
 }
 
 const AXIS_LETTERS: [u8; 9] = *b"xyzabcuvw";

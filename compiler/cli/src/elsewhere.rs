@@ -3,6 +3,7 @@
 //! diameters of tools, another return of canned cycles. What no file says, nobody knows; source and translation are run on
 //! such a machine, and must go the same way. It is a look from outside: it shares nothing with the writer but the interpreter.
 
+use gr_backends::from_line::Restart;
 use gr_interp::{ASSUMED, Setup};
 use gr_ir::diff::{Aspect, Diff, Difference, Tolerance, diff};
 use gr_ir::{Marker, Op, Program, Source};
@@ -86,8 +87,8 @@ impl Doubt {
     }
 }
 
-/// Runs a program that begins later on such machines too. `goal`: where the tool is brought; `restart`: where it is there.
-pub fn doubt(unit: &Unit, motion: &Motion, goal: &[Option<f64>; 9], restart: impl Fn(&Motion) -> Option<[Option<f64>; 9]>) -> Option<Doubt> {
+/// Runs a program that begins later on such machines too: `here`, and how `restart` begins it there.
+pub fn doubt(unit: &Unit, motion: &Motion, here: &Restart, restart: impl Fn(&Motion) -> Option<Restart>) -> Option<Doubt> {
     if motion.plan.is_some() || unit.setup.dialect.family == Family::Ufmg2008 {
         return None;
     }
@@ -99,7 +100,12 @@ pub fn doubt(unit: &Unit, motion: &Motion, goal: &[Option<f64>; 9], restart: imp
             unknown.change(&mut setup, machine);
             // A program that ends before on such a machine is not for it.
             let Some(there) = restart(&motion_with(unit, &setup)) else { continue };
-            let away = |i: usize| goal[i].is_some_and(|here| there[i].is_none_or(|there| (there - here).abs() > NEAR_ENOUGH));
+            let other = |a: f64, b: f64| (a - b).abs() > NEAR_ENOUGH;
+            let away = |i: usize| match here.goal[i] {
+                Some(goal) => there.goal[i].is_none_or(|t| other(t, goal)),
+                // It stays where it is, and a step (G91) from there is one from another place.
+                None => here.named[i].zip(there.named[i]).is_some_and(|(h, t)| other(h, t)),
+            };
             if (0..9).any(away) {
                 let first = Doubt { axes: [false; 9], machine: unknown.machine(), remedy: unknown.remedy() };
                 let doubt = doubt.get_or_insert(first);

@@ -450,7 +450,7 @@ fn restart(motion: &mut Motion, unit: &Unit, line: u32, safe_z: Option<f64>) {
         gr_backends::from_line::from_line(&motion.program, FileId(0), line, &options, &texts(motion))
     };
     let sure = [false; 9];
-    let doubt = |made: &Result<Restart, _>| elsewhere::doubt(unit, motion, &made.as_ref().ok()?.goal, |there| Some(begin(there, sure).ok()?.goal));
+    let doubt = |made: &Result<Restart, _>| elsewhere::doubt(unit, motion, made.as_ref().ok()?, |there| begin(there, sure).ok());
     let mut made = begin(motion, sure);
     let mut doubted = doubt(&made);
     if let Some(first) = doubted {

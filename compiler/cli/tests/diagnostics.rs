@@ -220,6 +220,9 @@ fn what_a_written_program_cannot_carry() {
         let (text, status) = output(&known, &format!("build a.ngc --target rs274ngc --from-line {line} --safe-z 60 --vars a.var"));
         assert_eq!((text.contains(" Y-5"), status), (y, Some(0)), "{line}: {text}");
     }
+    // Steps from where nobody knows, though every axis is named before it cuts.
+    let steps = "G21 G91 F100\nG0 X5 Y5 Z5\nG1 X5 Y5 Z-2\nG0 Z9\nM2\n";
+    told("E0652", &[file("a.ngc", steps)], &restart.replace('6', "3"));
     // Nothing cuts before the height is said again.
     let clear = fixture.replace("G1 X5", "G0 X5 Y6 Z30").replace("G1 X10", "G1 Z1");
     assert!(codes(&[file("a.ngc", &clear)], &restart.replace('6', "5")).0.is_empty());
