@@ -3,10 +3,15 @@
 //! diameters of tools, another return of canned cycles. What no file says, nobody knows; source and translation are run on
 //! such a machine, and must go the same way. It is a look from outside: it shares nothing with the writer but the interpreter.
 
+use gr_backends::Sources;
 use gr_backends::from_line::Restart;
+use gr_backends::sources::Words;
 use gr_interp::{ASSUMED, Setup};
 use gr_ir::diff::{Aspect, Diff, Difference, Tolerance, diff};
-use gr_ir::{Marker, Op, Program, Source};
+use gr_ir::{Marker, Op, Program, Source, plane_axes};
+use gr_machine::math::Frame;
+use gr_machine::{Kind, Machine};
+use gr_robot::Coordinates;
 use gr_spec::{Dialect, Family};
 use gr_text::{Diagnostic, code};
 
@@ -114,6 +119,64 @@ pub fn doubt(unit: &Unit, motion: &Motion, here: &Restart, restart: impl Fn(&Mot
         }
     }
     doubt
+}
+
+/// Where a coordinate that a program names depends on where the machine stands or on its work offsets, by `#5422` and the like: on the
+/// machine of a machine file both are others than in the program's run.
+pub fn rests(unit: &Unit, motion: &Motion, machine: &Machine) -> Option<Diagnostic> {
+    let asks = |text: &str| text.lines().any(|l| l.contains('#') && l.contains(['5', '<', '[']));
+    if motion.plan.is_some() || !motion.sources.iter().any(|(_, f)| asks(&f.text)) || stands_as_run(machine) {
+        return None;
+    }
+    let mut setup = unit.setup.clone();
+    Unknown::Start.change(&mut setup, &BELOW);
+    let unit_of_length = if setup.machine_units == gr_canon::Units::Inch { 1.0 / 25.4 } else { 1.0 };
+    for base in [5161u32, 5181].into_iter().chain((1..=9).map(|n| 5201 + 20 * n)) {
+        (0..9u32).for_each(|axis| *setup.params.entry(base + axis).or_default() += unit_of_length * (BELOW.origin + f64::from(axis)));
+    }
+    let texts = crate::emit::texts(motion);
+    let (here, there) = (named(&motion.program, &texts), named(&motion_with(unit, &setup).program, &texts));
+    let line = |n: &(Source, [Option<f64>; 3])| (n.0.file, n.0.line);
+    let other = |a: &(Source, [Option<f64>; 3]), b: &(Source, [Option<f64>; 3])| {
+        let apart = |i: usize| a.1[i].zip(b.1[i]).is_some_and(|(a, b)| (a - b).abs() > NEAR_ENOUGH);
+        line(a) != line(b) || (0..3).any(apart)
+    };
+    let differs = here.iter().zip(&there).find(|(a, b)| other(a, b)).map(|(a, _)| a);
+    // One of them may end earlier.
+    let (source, _) = differs.or_else(|| here.get(there.len())).or_else(|| here.last().filter(|_| there.len() > here.len()))?;
+    let (file, span) = gr_backends::Sources::place(&texts, *source);
+    Some(Diagnostic::new(code::MACHINE_ASKED_PLACE, file, span, &[]))
+}
+
+/// A mill that begins at its zero point, with the part there too.
+fn stands_as_run(machine: &Machine) -> bool {
+    let home = machine.cell.home.iter().chain(&machine.start_joints).flatten().all(|v| *v == 0.0);
+    machine.kind == Kind::Mill && home && (1..=9).all(|n| gr_robot::words::placed_by(machine, n) == Frame::IDENTITY)
+}
+
+/// Where words of the work frame bring X, Y and Z, line by line as they are run, mm.
+fn named(program: &Program, texts: &dyn Sources) -> Vec<(Source, [Option<f64>; 3])> {
+    let mut said = Coordinates::new(program);
+    let mut out: Vec<(Source, [Option<f64>; 3])> = Vec::new();
+    let mut cursor = program.cursor();
+    let mut cycle = None;
+    while let Some(view) = cursor.next() {
+        match view.op {
+            Op::Begin { marker: Marker::Cycle, .. } => cycle = Some(plane_axes(view.state.plane).2),
+            Op::Close(Marker::Cycle) => cycle = None,
+            _ => {}
+        }
+        said.step(program, &view, texts);
+        let Some(words) = Words::at(texts, view.source.file, view.source.line).filter(|_| view.op.moves()) else { continue };
+        let b = said.brought();
+        let ends = std::array::from_fn(|i| (b.work[i] && words.has(b"xyz"[i]) && cycle != Some(i)).then_some(view.end.axes[i]));
+        // Of several moves of a line the last one goes where it says.
+        match out.last_mut().filter(|(s, _)| *s == view.source) {
+            Some((_, last)) => *last = ends,
+            None => out.push((view.source, ends)),
+        }
+    }
+    out
 }
 
 /// Places that differ by less, mm or rad, are the same.

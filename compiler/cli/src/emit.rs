@@ -364,6 +364,7 @@ fn calls(unit: &Unit, program: String, tools: Option<gr_interp::ToolTable>) -> V
 }
 
 fn of_motion(mut motion: Motion, unit: &Unit, goal: &Goal<'_>) -> Result<Built, String> {
+    let rests = goal.machine.filter(|_| crate::robot::is_for_machine(goal)).and_then(|m| elsewhere::rests(unit, &motion, m));
     if let Some((line, safe_z)) = goal.from_line {
         restart(&mut motion, unit, line, safe_z);
     }
@@ -374,6 +375,9 @@ fn of_motion(mut motion: Motion, unit: &Unit, goal: &Goal<'_>) -> Result<Built, 
         let found = gr_robot::opinion::missing_axes(&motion.program, machine, &texts(&motion));
         if !found.is_empty() {
             return Ok(built(motion, Vec::new(), found));
+        }
+        if let Some(rests) = rests {
+            return Ok(built(motion, Vec::new(), vec![rests]));
         }
     }
     if let Err(found) = crate::robot::take_job(&mut motion, goal) {

@@ -244,7 +244,7 @@ fn compensated(
 pub fn is_planned(goal: &Goal<'_>) -> bool {
     // A mill's motion is corrected before its joints are planned.
     let mill = goal.machine.is_some_and(|m| m.kind == Kind::Mill);
-    is_language(goal.target) || !mill && (goal.target == "setpoints" || goal.target == "joint-gcode" && plans_joints(goal))
+    is_language(goal.target) || !mill && is_for_machine(goal)
 }
 
 /// A program as motion, corrected for the machine's known geometry.
@@ -358,6 +358,11 @@ fn own_plan(motion: &Motion, goal: &Goal<'_>, texts: &dyn Sources, name: &str, s
 fn too_many(found: &gr_robot::joints::TooMany, texts: &dyn Sources) -> Diagnostic {
     let (file, span) = texts.place(found.source.unwrap_or_default());
     Diagnostic::new(gr_text::code::ROBOT_TOO_MANY_POINTS, file, span, &[found.most.to_string()])
+}
+
+/// Whether the target has the motion of the machine file's machine.
+pub fn is_for_machine(goal: &Goal<'_>) -> bool {
+    is_language(goal.target) || goal.target == "setpoints" || goal.target == "joint-gcode" && plans_joints(goal)
 }
 
 /// Whether joint-gcode goes through the planner: every robot but the planar arm, which has its own way, and mills.

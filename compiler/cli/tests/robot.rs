@@ -636,10 +636,14 @@ fn a_mill_goes_on_from_where_it_stands() {
     let cycle = "G0 X10 Y20 Z20\nG53 G0 Z0\nG98 G81 X5 Y5 Z-3 R2 F500";
     let arc = "G0 X10 Y20 Z20\nG53 G0 X100\nG2 X100 Y10 J-5 F500";
     let reference = "G0 X10 Y20 Z20\nG28.1\nG28";
-    for (program, code) in [(cycle, "E0559"), (arc, "E0559"), (reference, "E0561")] {
+    let asked = "#1=#5422 G53 G0 Z0\n#1=#5422 G0 X0 Y0 Z20\nG0 X1 Y1 Z[#1+5]\nG1 Z[#5422-2] F500";
+    let branch = "G53 G0 Z0\no1 if [#<_z> LT 5]\nG0 X0 Y0 Z20\no1 endif\nG0 X3 Y3 Z9";
+    for (program, code) in [(cycle, "E0559"), (arc, "E0559"), (reference, "E0561"), (asked, "E0562"), (branch, "E0562")] {
         let (moves, found) = made(0, program, &[]);
         assert!(moves.is_empty() && found.contains(":4:") && found.contains(&format!("error[{code}]")) && found.matches("error").count() == 1, "{program}: {found}");
     }
+    // What the program has named is there on any machine, and the number of a work offset is what it is.
+    ends(0, "G0 X10 Y20 Z20\n#1=#5422\n#2=[540+10*[#5220-1]]\nG53 G0 Z0\nG0 G[#2/10] Z#1", &[[110.0, 70.0, 0.0], [110.0, 70.0, -120.0]]);
 }
 
 /// A file has the name of the program in it; programs of one build have different names on the controller.

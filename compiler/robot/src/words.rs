@@ -181,7 +181,7 @@ pub(crate) fn placed(machine: &Machine, state: &State) -> Frame {
 }
 
 /// The same by the number of a work offset, 1 = G54.
-pub(crate) fn placed_by(machine: &Machine, work: u8) -> Frame {
+pub fn placed_by(machine: &Machine, work: u8) -> Frame {
     let cell = &machine.cell;
     let named = NAMES.get(usize::from(work)).and_then(|n| cell.frames.get(*n)).map(|f| cell.carried(*f));
     named.unwrap_or_else(|| cell.part_in_base())
