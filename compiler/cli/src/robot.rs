@@ -434,6 +434,10 @@ pub fn setpoints(motion: &Motion, goal: &Goal<'_>, texts: &dyn Sources, name: &s
     }
     let seconds = made.rows.len().saturating_sub(1) as f64 * interval;
     let mut summary = format!("{}  {} set-points, {} with acceleration\n", summary(&planned), made.rows.len(), duration(seconds));
+    if let Some((least, source)) = made.unreached.least {
+        let (cuts, of) = (made.unreached.cuts, made.unreached.of);
+        summary += &format!("  {cuts} of {of} cuts don't get up to their feed; least: {} % of it (line {})\n", short(100.0 * least), source.line + 1);
+    }
     if let Some(c) = corrected {
         summary += &c.summary;
         artifacts.push(c.table);

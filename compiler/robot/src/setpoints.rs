@@ -94,6 +94,17 @@ impl Fault {
     }
 }
 
+/// Cuts that don't reach their feed.
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
+pub struct Unreached {
+    /// How many.
+    pub cuts: usize,
+    /// Of so many.
+    pub of: usize,
+    /// The slowest: the share of its feed that it reaches, and where.
+    pub least: Option<(f64, Source)>,
+}
+
 /// A stream of set-points.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Setpoints {
@@ -105,6 +116,8 @@ pub struct Setpoints {
     pub rows: Vec<Setpoint>,
     /// What else is done, in order.
     pub events: Vec<Event>,
+    /// Cuts that don't get up to their feed, because a joint can't gain speed fast enough or not go as fast.
+    pub unreached: Unreached,
     kinds: Vec<JointKind>,
     names: Vec<String>,
 }
@@ -113,6 +126,10 @@ pub struct Setpoints {
 const RISE: f64 = 0.25;
 /// A joint that is still too fast at this share of its acceleration jumps.
 const SLOWEST: f64 = 0.005;
+/// Up to this share of a limit it is kept.
+const NEARLY: f64 = 1.0 + 1e-6;
+/// A cut that gets up to this share of its feed has reached it.
+const REACHED: f64 = 0.999;
 
 /// A move as joints over its own time.
 struct Piece {
@@ -154,20 +171,48 @@ struct Ramp {
 pub fn setpoints(program: &RobotProgram, options: &SetpointOptions) -> Result<Setpoints, Fault> {
     let mut made = Maker::new(program, options);
     made.pieces();
-    let mut slower = 1.0;
+    let mut pace = Pace::full(made.list.len());
     loop {
-        let out = made.stream(slower).map_err(Fault::TooMany)?;
-        let (over, row, joint) = made.over(&out.rows);
-        if over <= 1.0 + 1e-6 {
+        let mut out = made.stream(&pace).map_err(Fault::TooMany)?;
+        let over = made.over(&out.rows, &pace);
+        if over.pieces.iter().chain(&over.corners).all(|(share, _)| *share <= NEARLY) {
+            out.unreached = made.unreached(&pace);
             return Ok(out);
         }
-        if slower < SLOWEST {
-            let limit = made.acceleration[joint];
-            let source = made.source_at(slower, row as f64 * options.interval);
-            return Err(Fault::Acceleration { joint, value: over * limit, limit, source });
+        let slower = |share: f64| share.min(4.0) * 1.02;
+        for (corner, (share, _)) in pace.corners.iter_mut().zip(over.corners).filter(|(_, (share, _))| *share > NEARLY) {
+            *corner /= slower(share);
         }
-        slower /= over.min(4.0) * 1.02;
+        for (k, (share, joint)) in over.pieces.into_iter().enumerate().filter(|(_, (share, _))| *share > NEARLY) {
+            if pace.pieces[k] < SLOWEST {
+                let limit = made.acceleration[joint];
+                let source = made.list[k..].iter().find_map(|p| p.source);
+                return Err(Fault::Acceleration { joint, value: share * limit, limit, source });
+            }
+            pace.pieces[k] /= slower(share);
+        }
     }
+}
+
+/// How much slower it goes than the joints allow piece by piece, as shares of their accelerations: a tight spot slows what runs
+/// through it and nothing else.
+struct Pace {
+    pieces: Vec<f64>,
+    /// Where each piece begins, and the end.
+    corners: Vec<f64>,
+}
+
+impl Pace {
+    fn full(pieces: usize) -> Pace {
+        Pace { pieces: vec![1.0; pieces], corners: vec![1.0; pieces + 1] }
+    }
+}
+
+/// Greatest share of an acceleration limit, and of which joint.
+struct Over {
+    pieces: Vec<(f64, usize)>,
+    /// Where the machine goes over from the piece before without a stop.
+    corners: Vec<(f64, usize)>,
 }
 
 /// Time at feed and of rapids with the accelerations of the machine file, s; none where it has none. Moves begin and end as
@@ -182,7 +227,7 @@ pub(crate) fn paced(program: &RobotProgram) -> Option<[f64; 2]> {
     }
     (made.speed, made.share, made.rounds) = (crate::plan::speeds(&program.machine), 1.0, true);
     made.pieces();
-    let join = made.joins(1.0);
+    let join = made.joins(&Pace::full(made.list.len()));
     let mut out = [0.0; 2];
     for (k, p) in made.list.iter().enumerate() {
         let leg = made.leg(k, &join, 1.0);
@@ -461,14 +506,16 @@ impl<'a> Maker<'a> {
     }
 
     /// Rates at which pieces go over into each other, the first and the last from and to rest.
-    fn joins(&self, slower: f64) -> Vec<f64> {
+    fn joins(&self, pace: &Pace) -> Vec<f64> {
         let n = self.list.len();
         let mut join = vec![0.0; n + 1];
         for k in 1..n {
             let waits = self.waits.binary_search_by_key(&k, |w| w.0).is_ok();
-            join[k] = if waits { 0.0 } else { self.junction(&self.list[k - 1], &self.list[k]) * libm::sqrt(slower) };
+            let slower = pace.corners[k] * pace.pieces[k - 1].min(pace.pieces[k]);
+            let rate = self.junction(&self.list[k - 1], &self.list[k]) * libm::sqrt(slower);
+            join[k] = if waits || pace.corners[k] < SLOWEST { 0.0 } else { rate };
         }
-        let gain = |k: usize| 2.0 * self.list[k].change * slower * self.list[k].seconds;
+        let gain = |k: usize| 2.0 * self.list[k].change * pace.pieces[k] * self.list[k].seconds;
         for k in 0..n {
             join[k + 1] = join[k + 1].min(libm::sqrt(join[k] * join[k] + gain(k)));
         }
@@ -489,9 +536,9 @@ impl<'a> Maker<'a> {
     }
 
     /// The law: ramps of the rate over real time; and when each piece before which the machine stands is waited for.
-    fn law(&self, slower: f64) -> (Vec<Ramp>, Vec<f64>) {
+    fn law(&self, pace: &Pace) -> (Vec<Ramp>, Vec<f64>) {
         let n = self.list.len();
-        let join = self.joins(slower);
+        let join = self.joins(pace);
         let mut law = Law { ramps: Vec::new(), at: 0.0, time: 0.0, sum: 0.0 };
         let mut done = 0.0;
         let mut reached = Vec::with_capacity(n + 1);
@@ -500,7 +547,7 @@ impl<'a> Maker<'a> {
             let waited = self.waited(k);
             let settle = if join[k] == 0.0 { self.options.smoothing } else { 0.0 };
             law.ramp(waited + settle, 0.0, 0.0);
-            let leg = self.leg(k, &join, slower);
+            let leg = self.leg(k, &join, pace.pieces[k]);
             law.ramp(leg.up, leg.start, leg.change);
             if leg.run > 0.0 {
                 law.ramp(leg.run / leg.peak, leg.peak, 0.0);
@@ -516,13 +563,20 @@ impl<'a> Maker<'a> {
         (law.ramps, reached)
     }
 
-    /// The source of what is done at a time.
-    fn source_at(&self, slower: f64, t: f64) -> Option<Source> {
-        let (law, _) = self.law(slower);
-        let time = own_time(&law, t);
-        let starts = self.starts();
-        let k = starts.partition_point(|s| *s <= time).saturating_sub(1);
-        self.list.get(k..)?.iter().find_map(|p| p.source)
+    /// Cuts that don't reach their feed.
+    fn unreached(&self, pace: &Pace) -> Unreached {
+        let join = self.joins(pace);
+        let mut out = Unreached::default();
+        for (k, p) in self.list.iter().enumerate().filter(|(_, p)| p.path.is_some() && !p.rapid) {
+            let peak = self.leg(k, &join, pace.pieces[k]).peak;
+            out.of += 1;
+            let Some(source) = p.source.filter(|_| peak < REACHED) else { continue };
+            out.cuts += 1;
+            if out.least.is_none_or(|(least, _)| peak < least) {
+                out.least = Some((peak, source));
+            }
+        }
+        out
     }
 
     /// When each piece begins, in its own time.
@@ -536,8 +590,8 @@ impl<'a> Maker<'a> {
         self.list.iter().map(start).collect()
     }
 
-    fn stream(&self, slower: f64) -> Result<Setpoints, TooMany> {
-        let (law, reached) = self.law(slower);
+    fn stream(&self, pace: &Pace) -> Result<Setpoints, TooMany> {
+        let (law, reached) = self.law(pace);
         let total = law.last().map_or(0.0, |r| r.at + r.seconds);
         let dt = self.options.interval;
         let count = libm::ceil(total / dt);
@@ -565,7 +619,7 @@ impl<'a> Maker<'a> {
             Event { row: (libm::ceil(t / dt + 0.25).max(0.0) as usize).min(rows.len() - 1), step: *step }
         };
         let events = self.events.iter().map(due).collect();
-        Ok(Setpoints { interval: dt, joints: self.solver.count, rows, events, kinds, names })
+        Ok(Setpoints { interval: dt, joints: self.solver.count, rows, events, unreached: Unreached::default(), kinds, names })
     }
 
     /// Joints at a real time.
@@ -577,21 +631,35 @@ impl<'a> Maker<'a> {
         self.at(p, ((time - starts[k]) / p.seconds).clamp(0.0, 1.0))
     }
 
-    /// Greatest share of an acceleration limit, where and of which joint; speeds keep theirs by the rate. A jump may
-    /// fall between two set-points: their second difference has it.
-    fn over(&self, rows: &[Setpoint]) -> (f64, usize, usize) {
-        let mut worst = (0.0, 0, 0);
+    /// Where accelerations are over their limits; speeds keep theirs by the rate. A jump may fall between two set-points: their second
+    /// difference has it.
+    fn over(&self, rows: &[Setpoint], pace: &Pace) -> Over {
+        let dt = self.options.interval;
+        let n = self.list.len();
+        let mut over = Over { pieces: vec![(0.0, 0); n], corners: vec![(0.0, 0); n + 1] };
+        let (law, _) = self.law(pace);
+        let (starts, join) = (self.starts(), self.joins(pace));
+        let piece = |t: f64| starts.partition_point(|s| *s <= own_time(&law, t.max(0.0))).clamp(1, n.max(1)) - 1;
         for (k, row) in rows.iter().enumerate() {
-            for i in 0..self.solver.count {
+            let share = |i: usize| {
                 let at = |k: usize| rows.get(k).map_or(row.position[i], |r| r.position[i]);
-                let between = (at(k + 1) - 2.0 * row.position[i] + at(k.saturating_sub(1))) / (self.options.interval * self.options.interval);
-                let share = row.acceleration[i].abs().max(between.abs()) / self.acceleration[i];
-                if share > worst.0 {
-                    worst = (share, k, i);
+                let between = (at(k + 1) - 2.0 * row.position[i] + at(k.saturating_sub(1))) / (dt * dt);
+                row.acceleration[i].abs().max(between.abs()) / self.acceleration[i]
+            };
+            let most = (0..self.solver.count).map(|i| (share(i), i)).fold((0.0, 0), |a, b| if b.0 > a.0 { b } else { a });
+            if most.0 > NEARLY && n > 0 {
+                // What runs there; smoothed, what has run before counts too.
+                let t = k as f64 * dt;
+                let (first, last) = (piece(t - dt - self.options.smoothing), piece(t + dt));
+                let raise = |slot: &mut (f64, usize)| *slot = if most.0 > slot.0 { most } else { *slot };
+                if (first + 1..=last).any(|c| join[c] > 0.0) {
+                    over.corners[first + 1..=last].iter_mut().for_each(raise);
+                } else {
+                    over.pieces[first..=last].iter_mut().for_each(raise);
                 }
             }
         }
-        worst
+        over
     }
 }
 

@@ -140,6 +140,23 @@ fn setpoints_keep_limits() {
     }
 }
 
+/// A tight spot slows what runs through it and nothing else.
+#[test]
+fn setpoints_keep_the_feed_elsewhere() {
+    // The corner at X40 is tight at both feeds; the slow line that follows is none.
+    let program = planned("T1 M6\nG0 X10 Y10 Z0\nG1 X40 F6000\nG1 Y40 F12000\nG1 X80 F900\nG1 Y40.3 F12000\nG0 Z30\nM30\n");
+    let made = setpoints(&program, &SetpointOptions::default()).unwrap();
+    let frame = program.frames[0].frame.inverse();
+    let kinematics = program.machine.kinematics();
+    let tip = |q: &[f64; gr_robot::MAX_JOINTS]| frame.apply(kinematics.forward_frame(&q[..6]).unwrap().then(&program.tools[0].frame).position);
+    let places: Vec<[f64; 3]> = made.rows.iter().map(|r| tip(&r.position)).collect();
+    let slow = places.windows(2).filter(|w| w.iter().all(|p| (p[1] - 40.0).abs() < 1e-3 && p[0] > 50.0 && p[0] < 70.0));
+    let speeds: Vec<f64> = slow.map(|w| (w[1][0] - w[0][0]) / made.interval).collect();
+    assert!(speeds.len() > 100 && speeds.iter().all(|v| (v - 15.0).abs() < 0.01), "{} {:?}", speeds.len(), speeds.first());
+    let unreached = made.unreached;
+    assert!((unreached.cuts, unreached.of) == (1, 4) && unreached.least.is_some_and(|(share, s)| share < 0.9 && s.line == 5), "{unreached:?}");
+}
+
 const WORDS: &str = "T1 M6\nM3 S8000\nM7\nM19 R90 P1 Q3\nM3 S8000\nG0 X10 Y10 Z30\nM62 P1\nM67 E1 Q0.5\nM68 E0 Q-2\nM66 P2 L3 Q5\nM66 E1 L0\nM101 P1 Q2\nM102\nM50 P0\nM53 P0\nM52 P1\nG1 Z2 F600\nM0\nM1\nM60\nG4 P1.5\n(MSG, look)\nM49\nM48\nG1 X20\nM30\n";
 
 /// What is no motion keeps all its arguments, and LinuxCNC takes them.
