@@ -452,7 +452,7 @@ pub fn setpoints(motion: &Motion, goal: &Goal<'_>, texts: &dyn Sources, name: &s
 fn corners_kept(program: &gr_robot::RobotProgram, texts: &dyn Sources) -> Option<Diagnostic> {
     use gr_robot::{Action, Zone};
     let rounded = program.steps.iter().find(|s| match s.action {
-        Action::Joint { zone, .. } | Action::Linear { zone, .. } | Action::Arc { zone, .. } => zone != Zone::Stop,
+        Action::Joint { zone, .. } | Action::Linear { zone, .. } | Action::Arc { zone, .. } => matches!(zone, Zone::Blend(size) if size > 0.0),
         _ => false,
     })?;
     let (file, span) = texts.place(rounded.source?);

@@ -503,6 +503,61 @@ fn a_robot_restarts_where_the_program_goes_on() {
     assert_eq!(moves[..3], ["G0 X0 Y0 Z60", "G0 X20 Y20 Z60", "G0 X20 Y20 Z42"], "{mill}");
 }
 
+/// On five-axis mills too the way to a restart begins where the machine stands, rotary axes as well.
+#[test]
+fn a_five_axis_mill_restarts() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_string();
+    for (base, [tilt, turn], home) in [
+        ("mill5-b-head-c-table", ["B", "C"], [0, 0]),
+        ("mill5-ac-table", ["A", "C"], [10, 20]),
+        ("mill5-bc-table", ["B", "C"], [-5, 40]),
+        ("mill5-cb-head", ["B", "C"], [10, 0]),
+    ] {
+        let joints = if base == "mill5-cb-head" { [home[1], home[0]] } else { home };
+        let file = format!("format = 1\nid = \"shop/m\"\ntitle = \"m\"\nextends = \"generic/{base}\"\n[home]\njoints = [30, 20, 0, {}, {}]\n", joints[0], joints[1]);
+        std::fs::write(path("m.toml"), file).unwrap();
+        let lines = [
+            "G21 G90 G17 G54".to_string(),
+            "T1 M6 G43.1 Z40".into(),
+            "S1000 M3".into(),
+            format!("G0 X0 Y0 Z-30 {tilt}0 {turn}0"),
+            format!("G0 X0 Y0 Z-40 {tilt}10 {turn}30"),
+            "G1 Z-60 F300".into(),
+            "G91 G1 X10".into(),
+            "G90 G0 Z-30".into(),
+            format!("G0 X5 Y5 {tilt}20 {turn}40"),
+            "G1 Z-60 F300".into(),
+            "G1 X20".into(),
+            "G0 Z-30".into(),
+            "M2".into(),
+        ];
+        std::fs::write(path("a.ngc"), lines.join("\n")).unwrap();
+        let made = |more: &[&str]| -> Vec<String> {
+            let o = run(&[&["build", &path("a.ngc"), "--machine", &path("m.toml"), "--target", "joint-gcode", "--allow", "E0281", "-q"], more].concat());
+            assert!(o.status.success(), "{base} {more:?}: {}", text(&o.stderr));
+            text_lines(&o.stdout).into_iter().filter(|l| l.starts_with("G0 ") || l.starts_with("G1 ")).collect()
+        };
+        let whole = made(&[]);
+        for line in ["5", "6", "7", "8", "9", "10", "11"] {
+            let part = made(&["--from-line", line, "--safe-z", "-10"]);
+            // The cut of line 11 and the rapid after it are the same, and the way there is not long.
+            let last = |of: &[String]| of[of.len() - 2..].to_vec();
+            assert_eq!(last(&part), last(&whole), "{base} {line}");
+            assert!(part.len() < 250, "{base} {line}: {}", part.len());
+            // The way up names Z alone.
+            let home = [format!("{tilt}{}", home[0]), format!("{turn}{}", home[1])];
+            assert!(part[0].starts_with("G0 X30 Y20 Z") && home.iter().all(|word| part[0].contains(word)), "{base} {line}: {}", part[0]);
+            if line == "7" {
+                let begins = part.iter().position(|l| l.starts_with("G1 ")).unwrap();
+                let cuts = |of: &[String]| of.iter().filter(|l| l.starts_with("G1 ")).cloned().collect::<Vec<_>>();
+                // Its own way in is a cut of the restart's; the step of the line goes on from where the program stood.
+                assert!(part[begins..].iter().any(|l| *l == cuts(&whole)[1]), "{base}: {part:?}");
+            }
+        }
+    }
+}
+
 /// Part 1 of UFSC 2016 on the IRB 140, from the command line as the page says: the rows of table 5.3, and the printed points.
 #[test]
 fn ufsc2016_from_the_command_line() {
@@ -592,6 +647,23 @@ fn axes_of_a_mill_that_nothing_has_named() {
     let tilted = "[frames.part]\nposition = [200, 100, -100]\nrotation = [20, 0, 0]\n";
     let (_, found) = made("mill5-ac-table", tilted, "G0 X10 Y0 Z5\nG53 G0 Z0");
     assert!(found.contains(":3:") && found.contains("E0554"), "{found}");
+}
+
+/// An axis that G53 has placed stays where a rotary axis turns, and the tool point goes up or down: no cut is meant so.
+#[test]
+fn no_cut_turns_under_an_axis_of_the_machine() {
+    let folder = tempfile::tempdir().unwrap();
+    let source = folder.path().join("a.ngc").to_str().unwrap().to_string();
+    let made = |program: &str| {
+        std::fs::write(&source, format!("G21 G90\nG0 X0 Y0 Z10 B10 C0\nG53 G0 Z50\n{program}\nM2\n")).unwrap();
+        let o = run(&["build", &source, "--machine", "generic/mill5-b-head-c-table", "--target", "joint-gcode", "--message-format", "short", "-q"]);
+        (text_lines(&o.stdout).into_iter().filter(|l| l.starts_with("G0 ")).collect::<Vec<_>>(), text(&o.stderr))
+    };
+    let (_, found) = made("G1 X20 F300\nG91 G1 Z-5\nG90\nG1 X0 B0");
+    assert!(found.contains(":7:") && found.contains("E0559") && found.contains(" Z") && found.matches("error").count() == 1, "{found}");
+    // Up there a rapid may turn, and a cut that names Z too.
+    let (moves, found) = made("G0 B0\nG1 X20 Z5 B20 F300");
+    assert!(found.is_empty() && moves.last().is_some_and(|l| l.contains(" Z50 B0")), "{found} {moves:?}");
 }
 
 /// On a part that the machine file puts somewhere the program goes on from where the machine stands: the places of `rs274` with the same

@@ -970,16 +970,18 @@ impl<'a> Gather<'a> {
             (_, b) => b,
         };
         let mut done = 0;
+        let within = inside(m.zone, m.length);
         for pair in points.windows(2) {
             for k in 1..=each {
                 done += 1;
+                let zone = if done == total { m.zone } else { within };
                 let share = k as f64 / each as f64;
                 let axes: [f64; 9] = std::array::from_fn(|i| pair[0][i] + (pair[1][i] - pair[0][i]) * share);
                 let whole = done as f64 / total as f64;
                 let pose = Pose { axes, tool_axis: axis(whole), spin: view.end.spin };
                 let Some(turn) = self.turn(&pose, view.state) else { return };
                 let turn = self.turn_index(turn);
-                self.push(Move { position: pose.xyz(), turn, length: m.length / total as f64, ..m });
+                self.push(Move { position: pose.xyz(), turn, length: m.length / total as f64, zone, ..m });
             }
         }
     }
@@ -1064,7 +1066,9 @@ impl<'a> Gather<'a> {
             let probe = m.probe.is_some();
             let this = if probe { (0.0, false, false) } else { (m.length, m.rapid, m.way == Way::Joint) };
             let (length, rapid, joint) = std::mem::replace(&mut next, this);
-            if let Zone::Blend(size) = m.zone {
+            if let Zone::Blend(size) = m.zone
+                && size > 0.0
+            {
                 let fits = m.rapid == rapid && (m.way == Way::Joint) == joint;
                 let size = size.min(m.length / 2.0).min(length / 2.0);
                 m.zone = if fits && size > 1e-6 { Zone::Blend(size) } else { Zone::Stop };
@@ -1113,6 +1117,14 @@ fn through(zone: Zone) -> Zone {
     match zone {
         Zone::Stop => Zone::Blend(0.1),
         z => z,
+    }
+}
+
+/// Between the parts of one motion that turns the tool nothing stops either, and no corner is cut where none is asked for.
+fn inside(zone: Zone, length: f64) -> Zone {
+    match zone {
+        Zone::Blend(_) if length > TINY => zone,
+        _ => Zone::Blend(0.0),
     }
 }
 

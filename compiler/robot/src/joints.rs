@@ -260,6 +260,13 @@ impl Run<'_> {
             }
             let next = if k == looks {
                 (to.joints, to.branch)
+            } else if self.solver.five_axis().is_some() {
+                // Rotary axes go evenly, also one that the tool's direction leaves free.
+                let mut guide = self.here.joints;
+                (0..self.solver.count).for_each(|i| guide[i] += (to.joints[i] - guide[i]) * b);
+                let mut r = self.solver.near(&mount.flange(&path.at(b)), &guide).unwrap_or(guide);
+                unwrap(&mut r, &guide, &self.limits.turns, self.solver.count);
+                (r, to.branch)
             } else {
                 // Not out of reach: the plan has been here.
                 let _ = self.solver.all(&mount.flange(&path.at(b)), &mut all);

@@ -31,7 +31,7 @@ struct Rotary {
 }
 
 /// Further than this the rotary axes don't go in one move: it has been cut before, rad.
-const ROTARY: f64 = 0.2;
+pub(crate) const ROTARY: f64 = 0.2;
 
 impl Rotary {
     fn new(g: &Gathered, solver: &Solver, start: &Frame, m: &Move) -> Option<Rotary> {

@@ -29,6 +29,7 @@ pub fn plan(program: &Program, machine: &Machine, sources: &dyn Sources, options
     let Gather { out: gathered, findings, .. } = gather;
     let mut solver = Solver::new(machine);
     solver.words = !gathered.by_direction;
+    solver.leans = gathered.frames.iter().any(|f| !solver.follows_words(&f.frame.turn));
     let mut planner = Planner {
         machine,
         options,

@@ -72,7 +72,8 @@ pub struct WorkFrame {
 pub enum Zone {
     /// The tool stops there (G61, G61.1, before dwells and signals).
     Stop,
-    /// It may cut the corner within this many mm; at most half of both neighboring moves.
+    /// It may cut the corner within this many mm; at most half of both neighboring moves. 0: the next move is the rest of the same
+    /// motion of the program, cut only because the tool turns in it.
     Blend(f64),
 }
 

@@ -122,6 +122,8 @@ pub struct Setpoints {
     names: Vec<String>,
 }
 
+/// A jump of a joint's speed smaller than this share of its greatest is rounding.
+const NO_JUMP: f64 = 1e-6;
 /// A joint without an acceleration in the machine file reaches its speed in this time, s.
 const RISE: f64 = 0.25;
 /// A joint that is still too fast at this share of its acceleration jumps.
@@ -384,7 +386,11 @@ impl<'a> Maker<'a> {
             source: None,
         };
         let path = Path::new(g, &self.solver, &Frame { turn: g.turns[0], position: here.position }, &m);
-        let times = (0..self.solver.count).map(|i| (to.joints[i] - here.joints[i]).abs() / self.speed[i]);
+        // The parts of one motion that turns the tool of a mill go by one clock: their rotary axes go evenly. How fast its other axes
+        // can follow, the rate says.
+        let turns = self.program.machine.kind == gr_machine::Kind::Mill && here.quaternion != to.quaternion;
+        let counts = |i: &usize| !turns || self.limits.turns[*i];
+        let times = (0..self.solver.count).filter(counts).map(|i| (to.joints[i] - here.joints[i]).abs() / self.speed[i]);
         let least = times.fold(0.0, f64::max);
         let turned = turned_on_the_spot(&self.program.machine, &here.joints, &to.joints);
         let asked = if path.length > ON_THE_SPOT { path.length } else { turned };
@@ -464,10 +470,11 @@ impl<'a> Maker<'a> {
             }
         }
         let small = 1e-4;
-        let (first, last) = (self.at(p, small), self.at(p, 1.0 - small));
+        let [a, b, c, d] = [small, 2.0 * small, 1.0 - 2.0 * small, 1.0 - small].map(|share| self.at(p, share));
+        // Of three values each, so that what only bends there is no jump.
         for i in 0..self.solver.count {
-            p.ends[0][i] = (first[i] - p.from[i]) / (small * p.seconds);
-            p.ends[1][i] = (p.to[i] - last[i]) / (small * p.seconds);
+            p.ends[0][i] = (4.0 * a[i] - 3.0 * p.from[i] - b[i]) / (2.0 * small * p.seconds);
+            p.ends[1][i] = (3.0 * p.to[i] - 4.0 * d[i] + c[i]) / (2.0 * small * p.seconds);
         }
     }
 
@@ -498,7 +505,7 @@ impl<'a> Maker<'a> {
         let mut rate = a.rate.min(b.rate);
         for i in 0..self.solver.count {
             let jump = (a.ends[1][i] - b.ends[0][i]).abs();
-            if jump > 0.0 {
+            if jump > NO_JUMP * self.speed[i] {
                 rate = rate.min(libm::sqrt(self.acceleration[i] * time / jump));
             }
         }

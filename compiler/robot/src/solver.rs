@@ -1,7 +1,7 @@
 //! Joint values for a flange: all configurations at once, without a heap where the machine has a closed form for an
 //! arm, and one configuration followed along a path.
 
-use gr_machine::math::Frame;
+use gr_machine::math::{Frame, M3, product};
 use gr_machine::{Chain, Control, FiveAxis, Kinematics, KinematicsError, Machine, Opw, Serial, Violation};
 
 use crate::{MAX_JOINTS, Singularity};
@@ -40,6 +40,9 @@ pub(crate) struct Solver {
     pub control: Control,
     /// The program names the rotary axes of the five-axis machine itself.
     pub words: bool,
+    /// A part is clamped so that its rotary axes can't bring the tool to what the words say about the tool's own axis too: there only
+    /// the tool's direction counts, as a round cutter has no other.
+    pub leans: bool,
     /// Angle of the line elbow–wrist on the forearm, reach of the arm, for closeness.
     fore: (f64, f64, f64),
 }
@@ -60,7 +63,7 @@ impl Solver {
             }
             _ => (0.0, 0.0, 0.0),
         };
-        Solver { count: any.joint_count(), control: any.control(), arm, any, words: false, fore }
+        Solver { count: any.joint_count(), control: any.control(), arm, any, words: false, leans: false, fore }
     }
 
     /// All configurations.
@@ -81,10 +84,15 @@ impl Solver {
             return Ok(());
         }
         if let (Arm::Five(k), true) = (&self.arm, self.words) {
-            let q = k.exact(flange).ok_or(KinematicsError::Direction)?;
-            out.joints[0][..5].copy_from_slice(&q);
-            out.good = 1;
-            return Ok(());
+            match k.exact(flange) {
+                Some(q) => {
+                    out.joints[0][..5].copy_from_slice(&q);
+                    out.good = 1;
+                    return Ok(());
+                }
+                None if self.leans => {}
+                None => return Err(KinematicsError::Direction),
+            }
         }
         for s in self.any.inverse_frame(flange)? {
             let bit = 1u8 << (s.branch & 7);
@@ -98,6 +106,12 @@ impl Solver {
             }
         }
         Ok(())
+    }
+
+    /// Whether rotary axes can do all that words say in a part that is turned like this.
+    pub fn follows_words(&self, part: &M3) -> bool {
+        // Angles of no particular kind: what they can do is no chance.
+        self.five_axis().is_none_or(|k| k.exact(&Frame::turned(product(part, &k.turn([0.3, 0.4])))).is_some())
     }
 
     /// The machine, where it is one with five axes.
@@ -115,7 +129,12 @@ impl Solver {
     pub fn near(&self, flange: &Frame, from: &Joints) -> Result<Joints, KinematicsError> {
         let mut out = [0.0; MAX_JOINTS];
         if let Arm::Five(k) = &self.arm {
-            let q = if self.words { k.exact(flange).ok_or(KinematicsError::Direction)? } else { k.next_to(flange, [from[3], from[4]])? };
+            let near = |q: &[f64; 5]| (3..5).all(|i| whole_turns_off(q[i] - from[i]).abs() <= crate::path::ROTARY);
+            let q = match self.words.then(|| k.exact(flange)) {
+                Some(Some(q)) if !self.leans || near(&q) => q,
+                Some(None) if !self.leans => return Err(KinematicsError::Direction),
+                _ => k.next_to(flange, [from[3], from[4]])?,
+            };
             out[..5].copy_from_slice(&q);
             return Ok(out);
         }

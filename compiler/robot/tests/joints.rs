@@ -367,6 +367,69 @@ fn a_tilt_goes_through_zero() {
     }
 }
 
+/// A cut in which the tool turns is one motion: set-points don't stand still in it, however far it turns.
+#[test]
+fn setpoints_turn_without_a_stop() {
+    for (id, [tilt, turn]) in MILLS {
+        for (cut, seconds) in [(format!("G1 X-50 {tilt}-31 F1000"), 6.0), (format!("G1 {turn}90 F1800"), 3.0), (format!("G1 X60 {turn}180 F200"), 3.0)] {
+            let text = format!("T1 M6 G43.1 Z50\nG0 X50 Y0 Z0 {tilt}-1 {turn}0\n{cut}\nM2\n");
+            let program = milled(&text, id);
+            let made = setpoints(&program, &SetpointOptions::default()).unwrap();
+            let joint = program.machine.joints.iter().position(|j| j.word == Some(if cut.contains(turn) { turn } else { tilt })).unwrap();
+            let [first, last]: [f64; 2] = if cut.contains(tilt) { [-1.0, -31.0] } else { [0.0, if cut.contains("90") { 90.0 } else { 180.0 }] };
+            // Behind the run-up and before the run-down it goes as fast as the feed asks for.
+            let share = |k: usize| (made.rows[k].position[joint].to_degrees() - first) / (last - first);
+            let speeds: Vec<f64> = (0..made.rows.len()).filter(|k| (0.15..0.85).contains(&share(*k))).map(|k| made.rows[k].velocity[joint].to_degrees() / (last - first)).collect();
+            assert!(speeds.len() as f64 * made.interval > 0.69 * seconds, "{id} {cut}: {}", speeds.len());
+            assert!(speeds.iter().all(|v| (v * seconds - 1.0).abs() < 1e-3), "{id} {cut}: {:?}", speeds.iter().map(|v| v * seconds).fold((9.0f64, 0.0f64), |(a, b), v| (a.min(v), b.max(v))));
+        }
+    }
+}
+
+/// With the tool upright the rotary axis that its direction leaves free goes as evenly as the program says.
+#[test]
+fn a_free_axis_goes_evenly() {
+    for (id, [_, turn]) in MILLS {
+        let program = milled(&format!("G0 X0 Y0 Z-50 {turn}0\nG1 X100 {turn}35 F9000\nM2\n"), id);
+        let path = joint_path(&program, &JointOptions::default()).unwrap();
+        let at = program.machine.joints.iter().position(|j| j.word == Some(turn)).unwrap();
+        let points: Vec<&JointPoint> = path.points().collect();
+        let cut = points.windows(2).filter(|w| !w[1].rapid);
+        let speeds: Vec<f64> = cut.map(|w| (w[1].joints[at] - w[0].joints[at]).to_degrees() / w[1].seconds).collect();
+        assert!(speeds.len() > 3 && speeds.iter().all(|v| (v - 52.5).abs() < 1e-6), "{id}: {speeds:?}");
+    }
+}
+
+/// On a part that is clamped tilted a round cutter needs its direction only: which way it is turned about its own axis is nobody's matter.
+#[test]
+fn a_tilted_part_needs_the_tools_direction_only() {
+    for (id, [tilt, turn]) in MILLS {
+        for rotation in ["[0, 20, 0]", "[20, 0, 0]", "[10, -15, 40]"] {
+            let file = format!("format = 1\nid = \"shop/m\"\ntitle = \"m\"\nextends = \"{id}\"\n[frames.table]\nposition = [10, -20, -30]\nrotation = {rotation}\n");
+            let machine = gr_machine::parse(FileId(0), &file).unwrap();
+            let text = format!("T1 M6 G43.1 Z50\nG0 X5 Y0 Z10 {tilt}0 {turn}0\nG1 X10 F300\nG1 Y10 {tilt}10 {turn}30 F500\nG0 Z20\nM2\n");
+            let program = gr_driver::lower("part.ngc", text.as_str().into(), &gr_interp::Setup { tools: gr_interp::assumed_tools(), ..gr_interp::Setup::default() }, None).program;
+            let made = plan(&program, &machine, &Texts::new([(FileId(0), text.as_str())]), &Options { own_words: true, ..Options::default() });
+            let made = made.unwrap_or_else(|e| panic!("{id} {rotation}: {:?}", e.iter().map(|d| &d.message).collect::<Vec<_>>())).program;
+            let path = joint_path(&made, &JointOptions::default()).unwrap();
+            let straight = gr_machine::builtin(id).unwrap();
+            let place = machine.cell.part_in_base();
+            for (line, words, tip) in [(2, [0.0, 0.0], [10.0, 0.0, 10.0]), (3, [10.0, 30.0], [10.0, 10.0, 10.0])] {
+                let at = path.points().filter(|p| p.source.is_some_and(|s| s.line == line)).last().unwrap();
+                let flange = machine.kinematics().forward_frame(&at.joints[..5]).unwrap();
+                let mut joints = [0.0; 5];
+                for (letter, word) in [tilt, turn].iter().zip(words) {
+                    joints[straight.joints.iter().position(|j| j.word == Some(*letter)).unwrap()] = f64::to_radians(word);
+                }
+                let says = gr_machine::math::rotate(&place.turn, straight.kinematics().forward_frame(&joints).unwrap().axis(2));
+                let real = flange.then(&made.tools[0].frame).position;
+                assert!(norm(sub(flange.axis(2), says)) < 1e-9, "{id} {rotation} line {line}: {:?} {says:?}", flange.axis(2));
+                assert!(norm(sub(real, place.apply(tip))) < 1e-6, "{id} {rotation} line {line}: {real:?}");
+            }
+        }
+    }
+}
+
 /// A rotary axis goes to the angle that the program names, not to one that looks the same.
 #[test]
 fn a_rotary_axis_ends_at_its_limit() {

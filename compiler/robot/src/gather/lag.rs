@@ -61,8 +61,8 @@ impl Gather<'_> {
             self.nowhere(add(start.xyz(), lag), start.xyz());
             return None;
         }
-        // An increment goes on from where the tool stands.
-        let increments = self.increments.at(self.findings.sources, self.source);
+        // An increment goes on from where the tool stands; the way to a restart has none.
+        let increments = !self.inserted && self.increments.at(self.findings.sources, self.source);
         self.tell_offset(start.xyz(), lag, named.map(|n| !n || increments));
         let (mut from, mut to) = (*start, *end);
         for i in 0..3 {

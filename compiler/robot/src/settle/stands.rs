@@ -59,6 +59,9 @@ struct Level {
     real: f64,
 }
 
+/// A tool point that goes less far without a word stays, mm.
+const LED: f64 = 1e-6;
+
 type Told<'p> = Result<(Op<'p>, Pose), Untold>;
 
 impl<'a> Stands<'a> {
@@ -82,7 +85,8 @@ impl<'a> Stands<'a> {
         self.place = placed(self.machine, state);
         let mut axes = start.axes;
         match (&self.of, &self.last) {
-            (Of::Slides { .. }, Last::Home(home)) => {
+            (Of::Slides { slides, .. }, Last::Home(home)) => {
+                self.turn_home(&slides.turning, &mut axes, state);
                 if let Some(at) = self.unslid(*home, &axes, state) {
                     axes[..3].copy_from_slice(&at);
                 }
@@ -90,6 +94,15 @@ impl<'a> Stands<'a> {
             _ => self.last = Last::Moved(start.axes, *state, self.place),
         }
         Pose { axes, ..*start }
+    }
+
+    /// The rotary words of a machine that stands at home.
+    fn turn_home(&self, turning: &[(usize, usize)], axes: &mut Axes, state: &State) {
+        let Some(home) = crate::plan::home_joints(self.machine) else { return };
+        let words = || turning.iter().filter(|(_, word)| (3..6).contains(word));
+        words().for_each(|(_, word)| axes[*word] = 0.0);
+        let zero = self.rotary(axes, state, &self.place).unwrap_or_default();
+        words().for_each(|(joint, word)| axes[*word] = home[*joint] - zero[*word - 3]);
     }
 
     /// A move, from where the machine stands.
@@ -138,7 +151,13 @@ impl<'a> Stands<'a> {
                 let stays = |by: By| by == By::Machine || by == By::Nothing && matches!(self.of, Of::Slides { .. });
                 let held: Vec<usize> = (0..3).filter(|i| !to[*i] && stays(by[*i])).collect();
                 if !held.is_empty() && (turns || self.other_point(state)) {
+                    let kept = end;
                     self.hold(&mut end, &held, state)?;
+                    // The slides stay and the tool point doesn't: no cut is meant so.
+                    let led = [0, 1, 2].map(|i| held.contains(&i) && (end[i] - kept[i]).abs() > LED);
+                    if turns && view.op.feeds() && held.len() < 3 && led.contains(&true) {
+                        return Err(Untold::Rests(led, [end[0], end[1], end[2]]));
+                    }
                 }
             }
             Goal::Home if self.placed() && self.stored(program, sources) => {
