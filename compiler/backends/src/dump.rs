@@ -1,7 +1,7 @@
 //! The motion IR as JSON (everything, with its sources) and as CSV (one row per move, for tables and plots).
 //! Both are written as they are read; nothing is held in memory.
 
-use gr_ir::geometry::flatten;
+use gr_ir::geometry::{Length, flatten, length};
 use gr_ir::measure::Rates;
 use gr_ir::timing::Clock;
 use gr_ir::{Arc, ArcPlane, Axes, FeedMode, Note, Op, Override, PathMode, Program, Source, Stop, Turn, Units, View};
@@ -320,7 +320,7 @@ pub struct CsvOptions {
 /// Writes one row per move: number, kind, X … W (mm, degrees), feed, elapsed time, tool, spindle, source.
 pub fn csv(program: &Program, options: &CsvOptions, out: &mut dyn Write) -> Result<()> {
     out.write_all(
-        b"op,kind,x_mm,y_mm,z_mm,a_deg,b_deg,c_deg,u_mm,v_mm,w_mm,feed,feed_unit,time_s,tool,spindle,file,line\n",
+        b"op,kind,x_mm,y_mm,z_mm,a_deg,b_deg,c_deg,u_mm,v_mm,w_mm,feed,feed_unit,time_s,tool,spindle,spindle_unit,file,line\n",
     )?;
     let mut buffer = String::new();
     let mut ns = 0;
@@ -354,19 +354,24 @@ fn row(out: &mut String, view: &View<'_, '_>, axes: &Axes, ns: u64, options: &Cs
         out.push(',');
         push_number(out, if (3..6).contains(&i) { v.to_degrees() } else { *v });
     }
-    let (factor, unit) = match view.state.feed_mode {
-        FeedMode::PerTime => (60.0, "mm/min"),
-        FeedMode::PerRev => (1.0, "mm/rev"),
-        FeedMode::Inverse => (60.0, "1/min"),
+    let turns = matches!(length(&view.op, view.start, view.end), Length::Angular(_));
+    let (feed, unit) = match (view.state.feed_mode, turns) {
+        (FeedMode::PerTime, false) => (view.state.feed * 60.0, "mm/min"),
+        (FeedMode::PerTime, true) => (view.state.feed_angular.to_degrees() * 60.0, "deg/min"),
+        (FeedMode::PerRev, false) => (view.state.feed, "mm/rev"),
+        (FeedMode::PerRev, true) => (view.state.feed_angular.to_degrees(), "deg/rev"),
+        (FeedMode::Inverse, _) => (view.state.feed * 60.0, "1/min"),
     };
     out.push(',');
-    push_number(out, libm::round(view.state.feed * factor * 1e9) / 1e9);
+    push_number(out, libm::round(feed * 1e9) / 1e9);
     let spindle = view.state.spindle(0);
-    let speed = spindle.speed * f64::from(spindle.turn as i8);
+    // Surface speed in mm/s.
+    let (factor, spindle_unit) = if spindle.surface.is_some() { (0.06, "m/min") } else { (1.0, "rpm") };
+    let speed = libm::round(spindle.speed * factor * 1e9) / 1e9 * f64::from(spindle.turn as i8);
     let source = view.source;
     out.push_str(&format!(",{unit},{:.6},{},", ns as f64 / 1e9, view.state.tool));
     push_number(out, speed);
-    out.push_str(&format!(",{},{}\n", source.file.0, u64::from(source.line) + 1));
+    out.push_str(&format!(",{spindle_unit},{},{}\n", source.file.0, u64::from(source.line) + 1));
 }
 
 fn kind(op: &Op<'_>) -> &'static str {

@@ -172,12 +172,18 @@ fn speed(t: &ToolUse) -> String {
     }
 }
 
+/// In one radian.
+const DEGREES: f64 = 180.0 / std::f64::consts::PI;
+
 fn feed(t: &ToolUse) -> String {
-    match (t.feed.0, t.feed_per_rev.0) {
-        (_, None) => format!("{} mm/min", range(&t.feed, 60.0)),
-        (None, _) => format!("{} mm/rev", range(&t.feed_per_rev, 1.0)),
-        _ => format!("{} mm/min, {} mm/rev", range(&t.feed, 60.0), range(&t.feed_per_rev, 1.0)),
-    }
+    let all = [
+        (&t.feed, 60.0, "mm/min"),
+        (&t.feed_per_rev, 1.0, "mm/rev"),
+        (&t.feed_angular, DEGREES * 60.0, "°/min"),
+        (&t.feed_angular_per_rev, DEGREES, "°/rev"),
+    ];
+    let used: Vec<String> = all.iter().filter(|(r, ..)| r.0.is_some()).map(|(r, k, unit)| format!("{} {unit}", range(r, *k))).collect();
+    if used.is_empty() { "-".into() } else { used.join(", ") }
 }
 
 /// What the person must know beyond numbers.
@@ -283,7 +289,7 @@ impl Sheet {
         rows
     }
 
-    /// For other programs: mm, rpm, mm/min, s.
+    /// For other programs: mm, rpm, mm/min, degrees per minute, s.
     pub fn json(&self) -> String {
         let r = &self.report;
         let tools: Vec<_> = r.tools.iter().map(tool_json).collect();
@@ -411,7 +417,8 @@ fn tool_json(t: &ToolUse) -> serde_json::Value {
         "note": t.note, "changes": t.changes, "line": u64::from(t.first.line) + 1, "diameter_mm": t.diameter.map(rounded),
         "offset_z_mm": range_json(&t.offset_z, 1.0), "rpm": range_json(&t.rpm, 1.0),
         "surface_m_min": range_json(&t.surface, 0.06), "feed_mm_min": range_json(&t.feed, 60.0),
-        "feed_mm_rev": range_json(&t.feed_per_rev, 1.0),
+        "feed_mm_rev": range_json(&t.feed_per_rev, 1.0), "feed_deg_min": range_json(&t.feed_angular, DEGREES * 60.0),
+        "feed_deg_rev": range_json(&t.feed_angular_per_rev, DEGREES),
         "flood": t.coolant.0, "mist": t.coolant.1, "work_offsets": work,
         "extent": extent_json(&t.cut), "seconds": seconds(&t.totals), "feed_mm": t.totals.feed_nm as f64 / 1e6,
     })

@@ -1,5 +1,7 @@
 //! Dumps, pictures and the setup sheet of one hand-made program.
 
+mod reader;
+
 use gr_backends::{dump, plot, sheet};
 use gr_canon::{At, Call, FileId, FrameId, Plane, Sink};
 use gr_ir::{Axes, Lowering, Program};
@@ -200,4 +202,47 @@ fn a_trace_says_where_each_point_comes_from() {
 fn data_cannot_end_its_element() {
     let page = plot::html(&plot::Trace::new(&part(), &Default::default()), &plot::Options { text: "(</script>)".into(), ..Default::default() });
     assert!(page.contains("(\\u003c/script>)") && page.matches("</script>").count() == 2);
+}
+
+/// A table of moves: the columns feed, feed_unit, spindle, spindle_unit of each feed move.
+fn rates(text: &str, dialect: &str) -> Vec<String> {
+    let dialect = gr_spec::Dialect::find(dialect).expect("a dialect");
+    let program = reader::read(text, &gr_interp::Setup { dialect, tools: gr_interp::assumed_tools(), ..Default::default() }).expect("it runs");
+    let mut bytes = Vec::new();
+    dump::csv(&program, &dump::CsvOptions::default(), &mut bytes).expect("memory");
+    let text = String::from_utf8(bytes).expect("text");
+    let rows = text.lines().map(|l| l.split(',').collect::<Vec<_>>()).filter(|l| l[1] == "linear");
+    rows.map(|l| format!("{} {} {} {}", l[11], l[12], l[15], l[16])).collect()
+}
+
+#[test]
+fn rotary_moves_have_their_feed_in_degrees() {
+    let text = "G20 G90\nM3 S100\nG1 X1 F20\nA90 F360\nX2 A100 F10\nG95 F2\nA0\nM2\n";
+    assert_eq!(rates(text, "linuxcnc"), [
+        "508 mm/min 100 rpm",
+        "360 deg/min 100 rpm",
+        "254 mm/min 100 rpm",
+        "2 deg/rev 100 rpm"
+    ]);
+    let sheet = sheet::sheet(&reader::read(text, &gr_interp::Setup::default()).expect("it runs"), &sheet::Options::default());
+    assert!(sheet.text().contains("254 - 508 mm/min, 360 °/min, 2 °/rev"), "{}", sheet.text());
+    let value: serde_json::Value = serde_json::from_str(&sheet.json()).expect("valid JSON");
+    assert_eq!(value["tools"][0]["feed_deg_min"], serde_json::json!([360.0, 360.0]));
+}
+
+/// The controller goes on with the number that S had; a Fanuc control with the rpm that the spindle has just then.
+#[test]
+fn g97_without_s_is_no_surface_speed() {
+    let text = "G21 G90 F100\nM3 S500\nG96 D2000 S100\nG1 X10\nG97\nX20\nG96 S60\nX50\nG97 S7\nX60\nM2\n";
+    let expected = ["100 m/min", "100 rpm", "60 m/min", "7 rpm"];
+    assert_eq!(rates(text, "linuxcnc"), expected.map(|e| format!("100 mm/min {e}")));
+    // 157.0796 m/min at a diameter of 50 mm are 1000 rpm; G50 limits what they are at 10 mm.
+    let turned = "G21 G99\nG50 S3000\nG97 S500 M3\nG0 X50. Z5.\nG96 S157.07963267948966\nG1 Z0 F0.2\nG97\nZ-5.\nG96 S150\nX10.\nG97\nZ-7.\nM30\n";
+    let expected = ["157.079632679 m/min", "1000 rpm", "150 m/min", "3000 rpm"];
+    let found: Vec<String> = rates(turned, "fanuc-turn").iter().map(|r| r.replace("0.2 mm/rev ", "")).collect();
+    assert_eq!(found.len(), expected.len());
+    for (found, expected) in found.iter().zip(expected) {
+        let (a, b): (f64, f64) = (found.split(' ').next().unwrap().parse().unwrap(), expected.split(' ').next().unwrap().parse().unwrap());
+        assert!((a - b).abs() < 1e-6 && found.ends_with(expected.split(' ').next_back().unwrap()), "{found} {expected}");
+    }
 }

@@ -137,8 +137,9 @@ pub enum Call {
     /// LinuxCNC 2.10, G64 R: 0 trapezoidal or 1 smooth planner, and how sharp the smooth one may corner (0.1 … 1;
     /// −1 with the other).
     SetPlannerMode(i32, f64),
-    /// Spindle number and 0 = constant rpm, else constant surface speed with this rpm limit.
-    SetSpindleMode(i32, f64),
+    /// Spindle number and 0 = constant rpm, else constant surface speed with this rpm limit. Where G97
+    /// ends surface speed without a new S: the number that now counts as rpm.
+    SetSpindleMode(i32, f64, Option<f64>),
     /// Spindle number, rpm (or surface speed).
     SetSpindleSpeed(i32, f64),
     /// M3.
@@ -294,6 +295,10 @@ pub enum Mark {
     CycleEnd,
     /// The next values are stand-ins for something known only at run time (M66, probe, HAL).
     RuntimeValue(Box<str>),
+    /// The tool that was just changed to finds its own length in force.
+    LengthInForce,
+    /// A block that an error gave up had this word: `g` or `m`, and its number times ten (G43.1 = 431).
+    Meant(u8, i32),
 }
 
 /// Takes the canonical stream.

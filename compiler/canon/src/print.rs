@@ -347,7 +347,7 @@ fn simple(call: &Call, out: &mut Vec<u8>) {
             out.extend_from_slice(b")\n");
         }
         Call::SetNaivecamTolerance(t) => line(out, "SET_NAIVECAM_TOLERANCE", "", [Arg::Num(*t)]),
-        Call::SetSpindleMode(s, v) => line(out, "SET_SPINDLE_MODE", " ", [int(s), Arg::Num(*v)]),
+        Call::SetSpindleMode(s, v, _) => line(out, "SET_SPINDLE_MODE", " ", [int(s), Arg::Num(*v)]),
         Call::SetSpindleSpeed(s, v) => line(out, "SET_SPINDLE_SPEED", ", ", [int(s), Arg::Num(*v)]),
         Call::StartSpindleClockwise(s) => line(out, "START_SPINDLE_CLOCKWISE", "", [int(s)]),
         Call::StartSpindleCounterclockwise(s) => line(out, "START_SPINDLE_COUNTERCLOCKWISE", "", [int(s)]),
@@ -457,7 +457,7 @@ mod tests {
             Call::NurbsFeed(Box::new(Nurbs { order: 3, points: vec![[0.0; 3]; 4], ..Nurbs::default() })),
             Call::SetMotionControlMode(PathMode::Continuous(0.1)),
             Call::StartSpeedFeedSynch(0, 1.5, false),
-            Call::SetSpindleMode(0, 0.0),
+            Call::SetSpindleMode(0, 0.0, None),
             Call::WaitSpindleOrientComplete(0, 2.0),
             Call::UseToolLengthOffset(p),
             Call::SetToolTableEntry(1, 2, p, 3.0, 10.0, 20.0, 4),

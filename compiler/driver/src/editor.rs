@@ -209,7 +209,7 @@ fn modes(m: &Modal) -> Vec<Call> {
     let mut calls = vec![
         Call::UseLengthUnits(m.units()),
         Call::SelectPlane(m.plane()),
-        Call::SetSpindleMode(spindle, surface),
+        Call::SetSpindleMode(spindle, surface, None),
         Call::SetSpindleSpeed(spindle, m.speed[s]),
         Call::SetFeedMode(spindle, i32::from(m.feed_mode == 2)),
         Call::SetFeedRate(m.feed),

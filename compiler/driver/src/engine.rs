@@ -178,7 +178,7 @@ pub(crate) fn start(options: &Options, percent: bool) -> (Boundary, Environment)
     let _ = interp.open(FileId(0));
     let state = interp.state();
     let params = interp.params().clone();
-    (Boundary::new(state, Flags::default(), percent), Environment { params })
+    (Boundary::new(state, Flags::at_start(&options.setup), percent), Environment { params })
 }
 
 /// One file that calls nothing.
@@ -365,6 +365,9 @@ impl<S: Sink> Sink for Watch<'_, S> {
             self.db.unwind_if_revision_cancelled();
         }
         self.inner.call(at, call);
+    }
+    fn mark(&mut self, at: &At<'_>, mark: &Mark) {
+        self.inner.mark(at, mark);
     }
     fn give_way(&mut self) {
         self.db.unwind_if_revision_cancelled();

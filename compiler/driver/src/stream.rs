@@ -124,7 +124,7 @@ pub(crate) fn stream_of<S: Sink>(mut files: Loaded, setup: &Setup, rules: Option
     let mut left = None;
     if opened.is_ok() {
         let start = *run.modal();
-        run.sink().lints = rules.map(|rules| Lints::new(rules, &start, Flags::default()));
+        run.sink().lints = rules.map(|rules| Lints::new(rules, &start, Flags::at_start(setup)));
         end = run.run_open();
         let tee = run.sink();
         left = tee.lints.take().map(|lints| (lints, tee.doubt));
@@ -193,6 +193,9 @@ impl<S: Sink> Sink for Tee<'_, S> {
         self.sink.frame(id, frame);
     }
     fn mark(&mut self, at: &At<'_>, mark: &Mark) {
+        if let Some(lints) = &mut self.lints {
+            lints.mark(at, mark);
+        }
         self.sink.mark(at, mark);
     }
     fn print(&mut self, text: &str) {

@@ -189,3 +189,93 @@ fn block_numbers_of_two_programs_are_no_duplicates() {
     let found = check(&text.replace("GOTO 50", "GOTO 60"));
     assert!(found.iter().any(|m| m.contains(" N60: no block of this program has this number")), "{found:?}");
 }
+
+fn found_with(name: &str, text: &str, setup: Setup) -> Vec<String> {
+    let mut session = Session::new();
+    let file = session.open(name, text, Options::new(setup));
+    let line = |at: u32| text[..at as usize].matches('\n').count() + 1;
+    session.check(file).diagnostics.iter().map(|d| format!("{}: {} {}", line(d.primary().1.start), d.code.def().code, d.message)).collect()
+}
+
+#[test]
+fn a_length_that_is_in_force_needs_no_g43() {
+    let missing = |text: &str, setup: &Setup| -> Vec<usize> {
+        let text = format!("G21 G90 F100\n{text}M5\nM2\n");
+        let found = found_with("part.ngc", &text, setup.clone());
+        found.iter().filter(|f| f.contains("E0281")).filter_map(|f| f.split(':').next()?.parse().ok()).collect()
+    };
+    let assumed = Setup { tools: gr_interp::assumed_tools(), ..Setup::default() };
+    let cut = "S500 M3\nG0 X0 Y0 Z5\nG1 Z-1\nG0 Z5\n";
+    let after = |before: &str| missing(&format!("{before}{cut}"), &assumed).len();
+    // Of a table that is only assumed the number alone is known.
+    assert_eq!(after("T1 M6\n"), 1);
+    assert_eq!(after("G43 H1\nT1 M6\n"), 0);
+    assert_eq!(after("G43 H2\nT1 M6\n"), 1);
+    for length in ["G43 H1", "G43", "G43 H5", "G43.1 Z7"] {
+        assert_eq!(after(&format!("T1 M6\n{length}\n{cut}T1 M6\n")), 0, "{length}: the same tool again");
+        assert_eq!(after(&format!("T1 M6\n{length}\n{cut}T2 M6\n")), 1, "{length}: another");
+    }
+    assert_eq!(after(&format!("T1 M6\nG43 H1\n{cut}T2 M6\nT1 M6\n")), 0);
+    assert_eq!(after(&format!("T1 M6\nG43 H1\n{cut}G49\nT1 M6\n")), 1);
+    assert_eq!(after("G43 H1\nT0 M6\nG49\n"), 0);
+    // A table tells lengths.
+    let (tools, _) = gr_interp::read_tools("T1 P1 Z0 D6\nT2 P2 D1\nT3 P3 Z5\nT4 P4 Z5\n", gr_text::FileId(0));
+    let known = Setup { tools, ..Setup::default() };
+    assert_eq!(missing(&format!("T1 M6\n{cut}T2 M6\n{cut}T3 M6\n{cut}G43 H3\nT4 M6\n{cut}T2 M6\n{cut}"), &known), [15, 26]);
+    // The tool in the spindle is named, not the one that is made ready.
+    let found = found_with("part.ngc", &format!("G21 F100\nT1 M6\nT2\n{cut}M5\nM2\n"), assumed);
+    assert!(found.len() == 1 && found[0].contains("length of tool 1 "), "{found:?}");
+}
+
+#[test]
+fn a_unit_that_the_machine_starts_with_is_stated() {
+    let found = |code: &str, own: bool| {
+        let (ini, _) = gr_interp::read_ini(&format!("[RS274NGC]\nRS274NGC_STARTUP_CODE={code}\n"), gr_text::FileId(0), None, None);
+        found_with("part.ngc", "G18\nG0 X1\nM2\n", Setup { ini, startup_code: own, ..Setup::default() }).len()
+    };
+    assert_eq!([found("G21 G90", true), found("G90 G20", true), found("G90", true), found("G21", false)], [0, 0, 1, 1]);
+}
+
+/// One mistake, one message: what stands in a block beside an error was meant.
+#[test]
+fn a_block_with_an_error_has_no_echo() {
+    let found = |text: &str| found_with("part.ngc", text, Setup { tools: gr_interp::assumed_tools(), ..Setup::default() });
+    for text in [
+        "G21 G90 G999\nG0 X1\nM2\n",
+        "G21 G90 X1..2\nG0 X1\nM2\n",
+        "G21 F100\nS100 M3 G999\nG1 X1\nM3\nG1 X2\nM5\nM2\n",
+        "G21 F100\nT1 M6\nG43 H1 G999\nS100 M3\nG1 X1\nM5\nM2\n",
+    ] {
+        let found = found(text);
+        assert!(found.len() == 1 && !found[0].contains("E028"), "{text}{found:?}");
+    }
+    assert_eq!(found("G999 G90\nG0 X1\nM2\n").len(), 2);
+}
+
+#[test]
+fn the_lead_of_a_thread_is_no_feed() {
+    let found = |text: &str| {
+        let dialect = gr_spec::Dialect::find("fanuc-turn").expect("a dialect");
+        found_with("part.nc", text, Setup { dialect, tools: gr_interp::assumed_tools(), ..Setup::default() })
+    };
+    let thread = "O1\nG21 G40 G99 G18\nT0101\nG97 S500 M3\nG0 X30. Z10.\nG32 Z-30. F12.\nG0 X40.\nG1 X35. F0.2\nM5\nM30\n";
+    assert_eq!(found(thread), Vec::<String>::new());
+    let after = found(&thread.replace(" F0.2", ""));
+    assert!(after.len() == 1 && after[0].starts_with("8: E0286"), "{after:?}");
+}
+
+#[test]
+fn rotary_axes_have_limits() {
+    let ini = "[TRAJ]\nLINEAR_UNITS=inch\n[AXIS_A]\nMIN_LIMIT=-90\nMAX_LIMIT=90\n[AXIS_U]\nMAX_LIMIT=1\n";
+    let (ini, _) = gr_interp::read_ini(ini, gr_text::FileId(0), None, None);
+    let setup = Setup { ini, machine_units: gr_canon::Units::Inch, ..Setup::default() };
+    let text = "G20 G90 G17 F100\nG0 A80\nA100\nG1 A0\nG92 A-50\nG3 X1 Y0 I.5 A-30\nG1 A-40 U.9\nG1 A-41 U1.1\nM2\n";
+    let beyond = |line: u32, axis: &str, to: &str, limit: &str| {
+        format!("{line}: E0285 this move takes {axis} to {to}, beyond the machine's limit {limit}")
+    };
+    // A reads -50 where it is 0.
+    let text = text.replace("A-30", "A50").replace("A-40", "A40").replace("A-41", "A39");
+    let expected = [beyond(3, "A", "100°", "90°"), beyond(6, "A", "100°", "90°"), beyond(8, "U", "27.94 mm", "25.4 mm")];
+    let found = found_with("part.ngc", &text, setup);
+    assert!(found.iter().all(|f| expected.contains(f)) && found.len() == 3, "{found:#?}");
+}

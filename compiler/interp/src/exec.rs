@@ -431,7 +431,7 @@ impl<S: Sink> Interp<'_, S> {
             self.emit(Call::StopSpindleTurning(s));
             self.m.turning[s as usize] = 0;
             self.m.speed_override[s as usize] = 1;
-            self.emit(Call::SetSpindleMode(s, 0.0));
+            self.emit(Call::SetSpindleMode(s, 0.0, None));
         }
         self.m.motion = 10;
         if self.m.mist != 0 {

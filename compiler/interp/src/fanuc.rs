@@ -218,7 +218,7 @@ impl<S: Sink> Interp<'_, S> {
         self.m.spindle_clamp = speed;
         let spindle = self.m.active_spindle;
         if self.m.css[spindle.clamp(0, 7) as usize] != 0 {
-            self.emit_queued(Call::SetSpindleMode(spindle, if speed > 0.0 { speed } else { 1e30 }));
+            self.emit_queued(Call::SetSpindleMode(spindle, if speed > 0.0 { speed } else { 1e30 }, None));
         }
         Ok(())
     }

@@ -1,11 +1,12 @@
 //! What goes wrong, and what came of a run.
 
-use gr_canon::{FileId, FrameId, Sink};
-use gr_gcode::Scan;
+use gr_canon::{FileId, FrameId, Mark, Sink};
+use gr_gcode::{Form, Scan};
 use gr_spec::{Rs274, code, rs274};
 use gr_text::Span;
 
 use crate::block::Group;
+use crate::run::Reading;
 use crate::{End, Fault, Interp};
 
 /// A fault or doubt, with its place.
@@ -54,6 +55,7 @@ impl<S: Sink> Interp<'_, S> {
     pub(crate) fn fails(&mut self, fault: Box<Fault>) -> bool {
         let own = fault.rs.is_none();
         self.found(fault);
+        self.tell_what_was_meant();
         // What the block was about to set is not set.
         self.settings.clear();
         if self.setup.keep_going && !self.stands_in() {
@@ -61,6 +63,19 @@ impl<S: Sink> Interp<'_, S> {
         }
         self.unwind();
         own || !self.setup.keep_going || self.findings.len() >= 100
+    }
+
+    /// One mistake, one message: what the block would have switched is not to be missed further down.
+    fn tell_what_was_meant(&mut self) {
+        let Reading { scan, line, .. } = &self.reading;
+        if *line as usize >= scan.lines.len() {
+            return;
+        }
+        let meant = |w: &gr_gcode::Word| matches!(w.letter, b'g' | b'm') && w.form == Form::Literal && w.value.abs() < 1e6;
+        let words: Vec<_> = scan.words(*line).iter().filter(|w| meant(w)).map(|w| (w.letter, (w.value * 10.0).round() as i32)).collect();
+        for (letter, number) in words {
+            self.mark(&Mark::Meant(letter, number));
+        }
     }
 
     /// One mistake, one message: blocks behind a move that failed count on its code, and on its end point.

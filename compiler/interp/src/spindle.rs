@@ -1,6 +1,6 @@
 //! M-codes and the spindle words: outputs, inputs, tool change, spindles, coolant, overrides, saved modes.
 
-use gr_canon::{Call, Sink};
+use gr_canon::{Call, Sink, Units};
 use gr_spec::{Rs274, code, rs274};
 
 use crate::block::Group;
@@ -34,14 +34,30 @@ impl<S: Sink> Interp<'_, S> {
     pub(crate) fn convert_spindle_mode(&mut self) {
         let s = self.m.active_spindle;
         let css = self.block.g(Group::SpindleMode) == 960;
-        self.m.css[s as usize] = u8::from(css);
+        let changed = std::mem::replace(&mut self.m.css[s as usize], u8::from(css)) != u8::from(css);
         let limit = match self.block.get(b'd') {
             _ if !css => 0.0,
             Some(d) => d.abs(),
             None if self.m.spindle_clamp > 0.0 => self.m.spindle_clamp,
             None => 1e30,
         };
-        self.emit_queued(Call::SetSpindleMode(s, limit));
+        // G96 has an S always.
+        let held = (changed && !css && !self.block.has(b's')).then(|| self.speed_held(s as usize)).filter(|n| *n != 0.0);
+        self.emit_queued(Call::SetSpindleMode(s, limit, held));
+    }
+
+    /// The S that counts after G97 without one: the number as it stands. A Fanuc control goes on at the rpm it has just then.
+    fn speed_held(&mut self, s: usize) -> f64 {
+        if self.is_fanuc() {
+            // m/min or feet/min at the radius of X.
+            let around = std::f64::consts::TAU * self.m.current[0].abs();
+            let rpm = self.m.speed[s] * if self.m.units() == Units::Inch { 12.0 } else { 1000.0 } / around;
+            let rpm = if self.m.spindle_clamp > 0.0 { rpm.min(self.m.spindle_clamp) } else { rpm };
+            if rpm.is_finite() {
+                self.m.speed[s] = rpm;
+            }
+        }
+        self.m.speed[s]
     }
 
     /// S.

@@ -75,8 +75,10 @@ pub struct Modal {
     pub spindle_clamp: f64,
     /// Fanuc: motion code that G80 goes back to.
     pub before_cycle: i32,
-    /// Keeps what follows in place.
-    pub pad_before: i32,
+    /// Tool whose length is in force, 0 = none or of no one tool.
+    pub length_of: i32,
+    /// Tool that was in the spindle when that length was put in force, 0 = none.
+    pub length_set_with: i32,
     /// Canned cycle repeats.
     pub cycle_l: i32,
     /// Tool orientation 0 … 9 for lathe compensation.
@@ -155,7 +157,7 @@ pub struct Modal {
     /// since. How high that is there, only the machine knows.
     pub parked: u8,
     /// Always 0; keeps the size a multiple of eight.
-    pub pad: [u8; 2],
+    pub pad: [u8; 6],
 }
 
 impl Modal {

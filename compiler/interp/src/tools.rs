@@ -1,6 +1,6 @@
 //! Tools: T, M6, M61, length offsets, G10 L0, L1, L10, L11.
 
-use gr_canon::{Axes, Call, Sink, Version};
+use gr_canon::{Axes, Call, Mark, Sink, Version};
 use gr_spec::{code, rs274};
 
 use crate::block::{AXES, AXIS_LETTERS, Group, letters};
@@ -109,11 +109,32 @@ impl<S: Sink> Interp<'_, S> {
         self.emit(Call::ChangeTool(pocket));
         // The machine puts the tool into the spindle's row; the interpreter hears of it with the next block.
         let tool = usize::try_from(pocket).ok().and_then(|i| self.world_tools.get(i)).cloned();
+        let before = self.in_spindle();
         self.world_tools.load(tool.unwrap_or_else(no_tool));
+        if self.length_in_force(before) {
+            self.mark(&Mark::LengthInForce);
+        }
         self.m.pocket = pocket;
         self.m.tool_changed = 1;
         self.set_tool_parameters();
         Ok(())
+    }
+
+    /// Number of the tool that the machine has in the spindle, 0 = none.
+    fn in_spindle(&self) -> i32 {
+        self.world_tools.get(0).map_or(0, |t| t.number.max(0))
+    }
+
+    /// Whether the tool that is now in the spindle, after tool `before`, needs no G43: the offset in force was set for it, or
+    /// is what the table has of it. Of rows that are only assumed nobody knows a length.
+    fn length_in_force(&self, before: i32) -> bool {
+        let (m, now) = (&self.m, if self.m.selected_tool == 0 { 0 } else { self.in_spindle() });
+        if now == 0 {
+            return m.tool_offset == [0.0; 9];
+        }
+        let kept = m.length_of == now || (before == now && m.length_set_with == now);
+        let known = self.world_tools.get(0).filter(|t| &*t.comment != crate::ASSUMED);
+        kept || known.is_some_and(|t| self.program_axes(&t.offset) == m.tool_offset)
     }
 
     fn hidden_move(&mut self, to: Axes) {
@@ -167,6 +188,7 @@ impl<S: Sink> Interp<'_, S> {
         not_with_comp(self.m.comp_side, rs274::RT_COMP_TOOL_OFFSET, "a change of the tool offset")?;
         let h = self.block.get(b'h').map(to_int);
         let mut offset: Axes = [0.0; 9];
+        let mut length_of = 0;
         match g {
             430 => {
                 let index = match h {
@@ -177,7 +199,8 @@ impl<S: Sink> Interp<'_, S> {
                     None if self.m.tool_changed != 0 => self.m.pocket,
                     None => 0,
                 };
-                offset = self.program_axes(&self.tool(index).offset);
+                let tool = self.tool(index);
+                (offset, length_of) = (self.program_axes(&tool.offset), tool.number.max(0));
             }
             431 => {
                 offset = self.m.tool_offset;
@@ -191,6 +214,7 @@ impl<S: Sink> Interp<'_, S> {
             _ => {}
         }
         self.emit(Call::UseToolLengthOffset(offset));
+        let loaded = self.in_spindle();
         let m = &mut self.m;
         let mut change: Axes = std::array::from_fn(|i| m.tool_offset[i] - offset[i]);
         let [x, y, ..] = &mut change;
@@ -199,6 +223,8 @@ impl<S: Sink> Interp<'_, S> {
             m.current[i] += change[i];
         }
         m.tool_offset = offset;
+        m.length_of = length_of;
+        m.length_set_with = if g == 490 { 0 } else { loaded };
         // 2.10 shows the offset that applies, not the loaded tool's.
         if self.setup.version == Version::V2_10 {
             let stored = self.machine_axes(&offset);

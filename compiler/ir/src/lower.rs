@@ -210,9 +210,6 @@ impl Lowering {
 
     fn switch(call: &Call) -> Option<Op<'static>> {
         Some(match *call {
-            Call::SetSpindleMode(spindle, limit) => {
-                Op::SpindleMode { spindle, surface: (limit != 0.0).then_some(limit) }
-            }
             Call::StartSpindleClockwise(spindle) => Op::SpindleTurn { spindle, turn: Turn::Cw },
             Call::StartSpindleCounterclockwise(spindle) => Op::SpindleTurn { spindle, turn: Turn::Ccw },
             Call::StopSpindleTurning(spindle) => Op::SpindleTurn { spindle, turn: Turn::Stop },
@@ -281,6 +278,13 @@ impl Sink for Lowering {
         match *call {
             Call::SetFeedRate(rate) => return self.feed(rate, s),
             Call::SetSpindleSpeed(spindle, speed) => return self.spindle_speed(spindle, speed, s),
+            Call::SetSpindleMode(spindle, limit, held) => {
+                self.out.push(Op::SpindleMode { spindle, surface: (limit != 0.0).then_some(limit) }, s);
+                if let Some(speed) = held {
+                    self.spindle_speed(spindle, speed, s);
+                }
+                return;
+            }
             _ => {}
         }
         if let Some(op) = self.setting(call).or_else(|| Self::switch(call)).or_else(|| Self::note(call)) {
@@ -295,6 +299,8 @@ impl Sink for Lowering {
             Mark::CycleBegin(code) => Op::Begin { marker: Marker::Cycle, code: *code, text: "" },
             Mark::CycleEnd => Op::Close(Marker::Cycle),
             Mark::RuntimeValue(what) => Op::RunTime(what),
+            // For lints.
+            Mark::LengthInForce | Mark::Meant(..) => return,
         };
         self.out.push(op, source(at));
     }

@@ -176,6 +176,10 @@ pub struct ToolUse {
     pub feed: Range,
     /// Feeds, mm per revolution.
     pub feed_per_rev: Range,
+    /// Feeds per minute of moves of rotary axes alone, rad/s.
+    pub feed_angular: Range,
+    /// The same per revolution, rad.
+    pub feed_angular_per_rev: Range,
     /// Tool offsets used (Z, mm).
     pub offset_z: Range,
     /// Work offsets used, 1 = G54: bit n.
@@ -384,7 +388,7 @@ impl Run {
         }
         self.out.cut.join(&extent);
         tool.cut.join(&extent);
-        conditions(tool, view.state);
+        conditions(tool, view);
     }
 
     fn machine_extent(&mut self, view: &View<'_, '_>, start: &crate::Pose, extent: &Extent) {
@@ -407,11 +411,15 @@ fn shifted(state: &State, p: [f64; 3]) -> [f64; 3] {
     [m[0], m[1], m[2]]
 }
 
-fn conditions(tool: &mut ToolUse, state: &State) {
-    match state.feed_mode {
-        FeedMode::PerTime => tool.feed.add(state.feed),
-        FeedMode::PerRev => tool.feed_per_rev.add(state.feed),
-        FeedMode::Inverse => {}
+fn conditions(tool: &mut ToolUse, view: &View<'_, '_>) {
+    let state = view.state;
+    let turns = matches!(length(&view.op, view.start, view.end), Length::Angular(_));
+    match (state.feed_mode, turns) {
+        (FeedMode::PerTime, false) => tool.feed.add(state.feed),
+        (FeedMode::PerTime, true) => tool.feed_angular.add(state.feed_angular),
+        (FeedMode::PerRev, false) => tool.feed_per_rev.add(state.feed),
+        (FeedMode::PerRev, true) => tool.feed_angular_per_rev.add(state.feed_angular),
+        (FeedMode::Inverse, _) => {}
     }
     for spindle in state.spindles.iter().filter(|s| s.turn != Turn::Stop) {
         match spindle.surface {

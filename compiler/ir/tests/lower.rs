@@ -39,7 +39,7 @@ fn part() -> Program {
         Call::StartChange,
         Call::ChangeTool(1),
         Call::UseToolLengthOffset(at(0.0, 0.0, 4.0)),
-        Call::SetSpindleMode(0, 0.0),
+        Call::SetSpindleMode(0, 0.0, None),
         Call::SetSpindleSpeed(0, 1200.0),
         Call::StartSpindleClockwise(0),
         Call::FloodOn,

@@ -10,7 +10,7 @@ const MOST: f64 = 10.0;
 
 #[inline]
 pub(super) fn check(lints: &mut Lints<'_>, at: &At<'_>) {
-    if lints.feed_per_revolution && lints.feed * lints.unit() > MOST && !lints.flags.has(Flags::REVOLUTION_TOLD) {
+    if lints.feed_per_revolution && !lints.thread && lints.feed * lints.unit() > MOST && !lints.flags.has(Flags::REVOLUTION_TOLD) {
         lints.flags.set(Flags::REVOLUTION_TOLD, true);
         let feed = format!("F{}", lints.feed);
         lints.report(code::FEED_PER_REVOLUTION_TOO_LARGE, at, None, &[feed]);

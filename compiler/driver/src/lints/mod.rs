@@ -19,8 +19,8 @@ mod tool;
 mod travel;
 mod units;
 
-use gr_canon::{At, Call, FileId, FrameId, Mark, Plane, Sink, Units};
-use gr_interp::Modal;
+use gr_canon::{At, Axes, Call, FileId, FrameId, Mark, Plane, Sink, Units};
+use gr_interp::{Modal, Setup};
 use gr_spec::{Code, Severity};
 
 pub(crate) use end::left_on;
@@ -48,8 +48,15 @@ impl Flags {
     pub(crate) const BARE_CUT: u32 = 1 << 5;
     /// A feed per revolution too large was reported; until F or the mode changes.
     pub(crate) const REVOLUTION_TOLD: u32 = 1 << 6;
-    /// First bit of the six that say: beyond the low/high limit of X, Y, Z was reported.
+    /// First bit of the eighteen that say: beyond the low/high limit of an axis was reported.
     pub(crate) const BEYOND: u32 = 1 << 8;
+
+    /// Before a program.
+    pub(crate) fn at_start(setup: &Setup) -> Flags {
+        let mut flags = Flags::default();
+        flags.set(Flags::UNITS_DONE, units::said_at_start(setup));
+        flags
+    }
 
     pub(crate) fn has(self, bit: u32) -> bool {
         self.0 & bit != 0
@@ -143,9 +150,9 @@ pub(crate) struct Lints<'a> {
     /// Position in the active work frame and program units.
     position: [f64; 3],
     /// G5x, G92 and tool offsets, summed when needed.
-    origin: [f64; 3],
-    g92: [f64; 3],
-    tool_offset: [f64; 3],
+    origin: Axes,
+    g92: Axes,
+    tool_offset: Axes,
     rotation: f64,
     turning: u8,
     /// Line of the last spindle stop, and whether a spindle turned then.
@@ -154,9 +161,14 @@ pub(crate) struct Lints<'a> {
     mist: bool,
     flood: bool,
     feed_per_revolution: bool,
+    /// A thread is cut: motion follows the spindle by a lead of its own.
+    thread: bool,
     feed: f64,
     units: Units,
     plane: Plane,
+    /// Tool that T named last.
+    selected: i32,
+    /// Tool that M6 brought last.
     tool: i32,
 }
 
@@ -164,14 +176,15 @@ pub(crate) struct Lints<'a> {
 /// holds calls back (the stream lags behind) and after an error dropped them.
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) struct Seen {
-    points: [[f64; 3]; 4],
+    position: [f64; 3],
+    offsets: [Axes; 3],
     rotation: f64,
     feed: f64,
     turning: u8,
-    switches: [bool; 4],
+    switches: [bool; 5],
     units: Units,
     plane: Plane,
-    tool: i32,
+    tools: [i32; 2],
 }
 
 fn xyz(axes: &[f64]) -> [f64; 3] {
@@ -187,9 +200,9 @@ impl<'a> Lints<'a> {
             found: Vec::new(),
             summary: Summary::default(),
             position: xyz(&state.current),
-            origin: xyz(&state.origin),
-            g92: xyz(&state.g92),
-            tool_offset: xyz(&state.tool_offset),
+            origin: state.origin,
+            g92: state.g92,
+            tool_offset: state.tool_offset,
             rotation: state.rotation,
             turning: state.turning.iter().enumerate().fold(0, |a, (i, t)| a | (u8::from(*t != 0) << i)),
             last_stop: None,
@@ -197,9 +210,11 @@ impl<'a> Lints<'a> {
             mist: state.mist != 0,
             flood: state.flood != 0,
             feed_per_revolution: state.feed_mode == 2,
+            thread: false,
             feed: state.feed,
             units: state.units(),
             plane: state.plane(),
+            selected: state.selected_tool,
             tool: state.selected_tool,
         }
     }
@@ -207,23 +222,27 @@ impl<'a> Lints<'a> {
     /// What the stream has said so far.
     pub(crate) fn seen(&self) -> Seen {
         Seen {
-            points: [self.position, self.origin, self.g92, self.tool_offset],
+            position: self.position,
+            offsets: [self.origin, self.g92, self.tool_offset],
             rotation: self.rotation,
             feed: self.feed,
             turning: self.turning,
-            switches: [self.compensation, self.mist, self.flood, self.feed_per_revolution],
+            switches: [self.compensation, self.mist, self.flood, self.feed_per_revolution, self.thread],
             units: self.units,
             plane: self.plane,
-            tool: self.tool,
+            // Only a tool whose length is missing matters.
+            tools: [self.selected, if self.flags.has(Flags::LENGTH_OPEN) { self.tool } else { self.selected }],
         }
     }
 
     /// Goes on from what the stream had said.
     pub(crate) fn resume(&mut self, seen: &Seen) {
-        [self.position, self.origin, self.g92, self.tool_offset] = seen.points;
-        [self.compensation, self.mist, self.flood, self.feed_per_revolution] = seen.switches;
+        self.position = seen.position;
+        [self.origin, self.g92, self.tool_offset] = seen.offsets;
+        [self.compensation, self.mist, self.flood, self.feed_per_revolution, self.thread] = seen.switches;
+        [self.selected, self.tool] = seen.tools;
         (self.rotation, self.feed, self.turning) = (seen.rotation, seen.feed, seen.turning);
-        (self.units, self.plane, self.tool) = (seen.units, seen.plane, seen.tool);
+        (self.units, self.plane) = (seen.units, seen.plane);
     }
 
     fn report(&mut self, code: Code, at: &At<'_>, letter: Option<u8>, args: &[String]) {
@@ -263,14 +282,13 @@ impl Sink for Lints<'_> {
     fn call(&mut self, at: &At<'_>, call: &Call) {
         match call {
             Call::StraightFeed(end) => {
-                let end = xyz(end);
                 travel::check(self, at, end);
-                self.cut(at, end);
+                self.cut(at, xyz(end));
             }
             Call::StraightTraverse(end) => {
-                let end = xyz(end);
                 units::check(self, at);
                 travel::check(self, at, end);
+                let end = xyz(end);
                 stock::rapid(self, at, end);
                 self.position = end;
             }
@@ -278,15 +296,26 @@ impl Sink for Lints<'_> {
         }
     }
 
-    fn mark(&mut self, _at: &At<'_>, _mark: &Mark) {}
+    fn mark(&mut self, _at: &At<'_>, mark: &Mark) {
+        match mark {
+            Mark::LengthInForce => self.flags.set(Flags::LENGTH_OPEN, false),
+            Mark::Meant(b'g', 200 | 210) => self.flags.set(Flags::UNITS_DONE, true),
+            Mark::Meant(b'g', 430..=432 | 490) => self.flags.set(Flags::LENGTH_OPEN, false),
+            Mark::Meant(b'm', 30 | 40) => {
+                self.flags.set(Flags::STOPPED_TOLD, true);
+                self.flags.set(Flags::BARE_CUT, true);
+            }
+            _ => {}
+        }
+    }
 }
 
 impl Lints<'_> {
     fn rare(&mut self, at: &At<'_>, call: &Call) {
         match call {
-            Call::ArcFeed { first_end, second_end, first_axis, second_axis, rotation, axis_end, .. } => {
+            Call::ArcFeed { first_end, second_end, first_axis, second_axis, rotation, axis_end, rest } => {
                 let end = self.arc_end(*first_end, *second_end, *axis_end);
-                travel::check_arc(self, at, end, [*first_axis, *second_axis], *rotation);
+                travel::check_arc(self, at, end, rest, [*first_axis, *second_axis], *rotation);
                 self.cut(at, end);
             }
             Call::NurbsFeed(curve) => {
@@ -301,7 +330,7 @@ impl Lints<'_> {
                 }
             }
             Call::RigidTap(end, _) => {
-                travel::check(self, at, *end);
+                travel::check_xyz(self, at, *end);
                 // The tap comes back to where it started.
             }
             Call::StraightProbe(end, _) => self.position = xyz(end),
@@ -309,27 +338,28 @@ impl Lints<'_> {
                 let factor = self.unit();
                 self.units = *units;
                 let factor = factor / self.unit();
-                for v in [&mut self.position, &mut self.origin, &mut self.g92, &mut self.tool_offset] {
-                    v.iter_mut().for_each(|x| *x *= factor);
+                self.position.iter_mut().for_each(|x| *x *= factor);
+                for offset in [&mut self.origin, &mut self.g92, &mut self.tool_offset] {
+                    let [x, y, z, _, _, _, u, v, w] = offset;
+                    [x, y, z, u, v, w].into_iter().for_each(|x| *x *= factor);
                 }
                 self.flags.set(Flags::UNITS_DONE, true);
                 self.frame_changed();
             }
             Call::SelectPlane(plane) => self.plane = *plane,
             Call::SetG5xOffset(_, offset) => {
-                let old = std::mem::replace(&mut self.origin, xyz(offset));
+                let old = std::mem::replace(&mut self.origin, *offset);
                 self.moved_frame(old, self.origin);
             }
             Call::SetG92Offset(offset) => {
-                let old = std::mem::replace(&mut self.g92, xyz(offset));
+                let old = std::mem::replace(&mut self.g92, *offset);
                 self.moved_frame(old, self.g92);
             }
             Call::UseToolLengthOffset(offset) => {
-                let new = xyz(offset);
-                for (position, (old, new)) in self.position.iter_mut().zip(self.tool_offset.iter().zip(new)) {
+                for (position, (old, new)) in self.position.iter_mut().zip(self.tool_offset.iter().zip(offset)) {
                     *position += old - new;
                 }
-                self.tool_offset = new;
+                self.tool_offset = *offset;
                 self.flags.set(Flags::LENGTH_OPEN, false);
             }
             Call::SetXyRotation(angle) => {
@@ -348,7 +378,9 @@ impl Lints<'_> {
             }
             Call::SetMotionControlMode(mode) => path::check(self, at, *mode),
             Call::ChangeTool(_) => tool::changed(self),
-            Call::SelectTool(tool) => self.tool = *tool,
+            Call::SelectTool(tool) => self.selected = *tool,
+            Call::StartSpeedFeedSynch(_, _, velocity) => self.thread = !velocity,
+            Call::StopSpeedFeedSynch => self.thread = false,
             Call::MistOn => self.mist = true,
             Call::MistOff => self.mist = false,
             Call::FloodOn => self.flood = true,
@@ -366,7 +398,7 @@ impl Lints<'_> {
         }
     }
 
-    fn moved_frame(&mut self, old: [f64; 3], new: [f64; 3]) {
+    fn moved_frame(&mut self, old: Axes, new: Axes) {
         if old != new {
             for (position, (old, new)) in self.position.iter_mut().zip(old.iter().zip(new)) {
                 *position += old - new;

@@ -7,6 +7,7 @@ use super::{Flags, Lints};
 
 pub(super) fn changed(lints: &mut Lints<'_>) {
     lints.flags.set(Flags::LENGTH_OPEN, true);
+    lints.tool = lints.selected;
     lints.flags.set(Flags::DRY_TOLD, false);
 }
 

@@ -1,26 +1,30 @@
 //! Moves beyond the travel limits of the INI file.
 
-use gr_canon::{At, Plane, Units};
+use gr_canon::{At, Axes, Plane, Units};
 use gr_interp::Ini;
 use gr_spec::code;
 
 use super::{Flags, Lints};
 
-/// Limits of X, Y and Z in mm; infinite where the INI file says nothing.
+/// Limits of the axes in mm and degrees; infinite where the INI file says nothing.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) struct Limits {
-    low: [f64; 3],
-    high: [f64; 3],
+    low: Axes,
+    high: Axes,
     any: bool,
 }
 
 impl Default for Limits {
     fn default() -> Limits {
-        Limits { low: [f64::NEG_INFINITY; 3], high: [f64::INFINITY; 3], any: false }
+        Limits { low: [f64::NEG_INFINITY; 9], high: [f64::INFINITY; 9], any: false }
     }
 }
 
-const NAMES: [&str; 3] = ["X", "Y", "Z"];
+const NAMES: [&str; 9] = ["X", "Y", "Z", "A", "B", "C", "U", "V", "W"];
+
+fn is_rotary(axis: usize) -> bool {
+    (3..6).contains(&axis)
+}
 
 impl Limits {
     /// Reads `[AXIS_X] MIN_LIMIT`, `MAX_LIMIT` and so on.
@@ -29,6 +33,7 @@ impl Limits {
         let mut limits = Limits::default();
         for (i, name) in NAMES.iter().enumerate() {
             let section = format!("AXIS_{name}");
+            let unit = if is_rotary(i) { 1.0 } else { unit };
             if let Some(v) = ini.number(&section, "MIN_LIMIT") {
                 (limits.low[i], limits.any) = (v * unit, true);
             }
@@ -45,22 +50,35 @@ const SLACK: f64 = 1e-6;
 
 /// The end point of a move.
 #[inline]
-pub(super) fn check(lints: &mut Lints<'_>, at: &At<'_>, end: [f64; 3]) {
+pub(super) fn check(lints: &mut Lints<'_>, at: &At<'_>, end: &Axes) {
     if lints.rules.limits.any {
         let point = machine(lints, end);
-        compare(lints, at, point, point);
+        compare(lints, at, &point, &point);
     }
 }
 
+/// The end point of a move of X, Y and Z alone.
+pub(super) fn check_xyz(lints: &mut Lints<'_>, at: &At<'_>, end: [f64; 3]) {
+    if lints.rules.limits.any {
+        let point = machine(lints, &with(end, &[0.0; 6]));
+        compare(lints, at, &point[..3], &point[..3]);
+    }
+}
+
+fn with([x, y, z]: [f64; 3], rest: &[f64; 6]) -> Axes {
+    let [a, b, c, u, v, w] = *rest;
+    [x, y, z, a, b, c, u, v, w]
+}
+
 /// End point and far sides of an arc.
-pub(super) fn check_arc(lints: &mut Lints<'_>, at: &At<'_>, end: [f64; 3], centre: [f64; 2], rotation: i32) {
+pub(super) fn check_arc(lints: &mut Lints<'_>, at: &At<'_>, end: [f64; 3], rest: &[f64; 6], centre: [f64; 2], rotation: i32) {
     if !lints.rules.limits.any {
         return;
     }
     // A turned frame shows its extremes elsewhere: then only the end point is compared.
     let (low, high) = if lints.rotation == 0.0 { extremes(lints, end, centre, rotation) } else { (end, end) };
-    let (low, high) = (machine(lints, low), machine(lints, high));
-    compare(lints, at, low, high);
+    let (low, high) = (machine(lints, &with(low, rest)), machine(lints, &with(high, rest)));
+    compare(lints, at, &low, &high);
 }
 
 /// Lowest and highest coordinates along an arc.
@@ -89,25 +107,26 @@ fn extremes(lints: &Lints<'_>, end: [f64; 3], centre: [f64; 2], rotation: i32) -
     (low, high)
 }
 
-/// Program frame and units to machine frame in mm.
-fn machine(lints: &Lints<'_>, p: [f64; 3]) -> [f64; 3] {
-    let mut q = [0, 1, 2].map(|i: usize| p[i] + lints.g92[i]);
+/// Program frame and units to machine frame in mm and degrees.
+fn machine(lints: &Lints<'_>, p: &Axes) -> Axes {
+    let mut q: Axes = std::array::from_fn(|i| p[i] + lints.g92[i]);
     if lints.rotation != 0.0 {
         let (sin, cos) = libm::sincos(lints.rotation.to_radians());
-        q = [q[0] * cos - q[1] * sin, q[0] * sin + q[1] * cos, q[2]];
+        (q[0], q[1]) = (q[0] * cos - q[1] * sin, q[0] * sin + q[1] * cos);
     }
-    [0, 1, 2].map(|i: usize| (q[i] + lints.origin[i] + lints.tool_offset[i]) * lints.unit())
+    std::array::from_fn(|i| (q[i] + lints.origin[i] + lints.tool_offset[i]) * if is_rotary(i) { 1.0 } else { lints.unit() })
 }
 
-fn compare(lints: &mut Lints<'_>, at: &At<'_>, low: [f64; 3], high: [f64; 3]) {
+fn compare(lints: &mut Lints<'_>, at: &At<'_>, low: &[f64], high: &[f64]) {
     let limits = lints.rules.limits;
-    for i in 0..3 {
+    for i in 0..low.len() {
+        let unit = if is_rotary(i) { "°" } else { " mm" };
         let sides = [(low[i] < limits.low[i] - SLACK, low[i], limits.low[i]), (high[i] > limits.high[i] + SLACK, high[i], limits.high[i])];
         for (side, (beyond, value, limit)) in sides.into_iter().enumerate() {
             let bit = Flags::BEYOND << (2 * i + side);
             if beyond && !lints.flags.has(bit) {
                 let letter = NAMES[i].as_bytes()[0].to_ascii_lowercase();
-                let args = [NAMES[i].to_string(), format!("{} mm", round(value)), format!("{} mm", round(limit))];
+                let args = [NAMES[i].to_string(), format!("{}{unit}", round(value)), format!("{}{unit}", round(limit))];
                 lints.report(code::TRAVEL_BEYOND_LIMIT, at, Some(letter), &args);
             }
             lints.flags.set(bit, beyond);
