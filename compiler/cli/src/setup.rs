@@ -167,7 +167,10 @@ pub fn assembled(args: &SetupArgs, lints: &LintArgs, from: &Path, sources: &mut 
         reader.vars(&path, &mut setup);
     }
     setup.block_delete = args.block_delete || section.is_some_and(|s| s.block_delete);
-    subs(args, project.as_ref(), &mut setup);
+    reader.named_as(args.subs.is_empty(), "subs");
+    for folder in subs(args, project.as_ref(), &mut setup) {
+        reader.no_folder(&folder);
+    }
     reader.blamed = None;
     // A reference mode has its own language.
     let reference = section.and_then(|s| s.reference).filter(|r| *r == crate::emit::Reference::Ufmg2008).map(|_| "ufmg2008");
@@ -254,8 +257,8 @@ fn machine_tools(machine: &gr_machine::Machine, setup: &mut Setup) {
     }
 }
 
-/// Folders with subroutines come first on the INI file's own search path.
-fn subs(args: &SetupArgs, project: Option<&Project>, setup: &mut Setup) {
+/// Folders with subroutines come first on the INI file's own search path. Those that there are not are given back.
+fn subs(args: &SetupArgs, project: Option<&Project>, setup: &mut Setup) -> Vec<PathBuf> {
     let mut folders: Vec<PathBuf> = args.subs.clone();
     folders.extend(project.iter().flat_map(|p| p.file.project.subs.iter().map(|s| p.path_of(s))));
     let mut path: Vec<String> =
@@ -264,6 +267,8 @@ fn subs(args: &SetupArgs, project: Option<&Project>, setup: &mut Setup) {
     if !path.is_empty() {
         setup.ini.values.insert(("rs274ngc".into(), "subroutine_path".into()), vec![path.join(":")]);
     }
+    folders.retain(|f| !f.is_dir());
+    folders
 }
 
 impl Station {
@@ -449,6 +454,14 @@ impl Reader<'_> {
         let place = text.find(name).map_or(Span::default(), |at| Span::new(at as u32, (at + name.len()) as u32));
         let args = [name.to_string(), "TOOL_TABLE".into(), "there is no such file".into()];
         self.show(&[Diagnostic::new(code::INI_VALUE, file, place, &args)]);
+    }
+    /// A folder that is named and that is not there.
+    fn no_folder(&mut self, path: &Path) {
+        let name = path.display().to_string();
+        match self.blamed {
+            Some((file, span)) => self.show(&[Diagnostic::new(code::FILE_MISSING, file, span, std::slice::from_ref(&name))]),
+            None => complain(self.renderer, self.sources, &name, code::FILE_MISSING, std::slice::from_ref(&name)),
+        }
     }
     /// Remapped codes whose subroutine is nowhere.
     fn remaps(&mut self, setup: &Setup) {

@@ -387,6 +387,25 @@ fn watching() {
     assert!(running && seen == [true, true, true], "{running} {seen:?}");
 }
 
+#[test]
+fn a_folder_of_subroutines_that_is_not_there_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    std::fs::write(at.join("a.ngc"), "G21 G90\nG0 X1\nM2\n").unwrap();
+    let check = |args: &[&str]| {
+        let out = in_folder(at, &[&["check", "a.ngc"], args].concat());
+        (code(&out), String::from_utf8_lossy(&out.stderr).into_owned() + &String::from_utf8_lossy(&out.stdout))
+    };
+    let (status, text) = check(&["--subs", "lib"]);
+    assert!(status != 0 && text.contains("E0820") && text.contains("lib"), "{status} {text}");
+    std::fs::write(at.join("gcc-robot.toml"), "schema = 1\n[project]\nsubs = [\"lib\"]\n").unwrap();
+    let (status, text) = check(&[]);
+    assert!(status != 0 && text.contains("E0820") && text.contains("gcc-robot.toml:3"), "{status} {text}");
+    std::fs::create_dir(at.join("lib")).unwrap();
+    assert_eq!(check(&["--subs", "lib"]).0, 0);
+    assert_eq!(check(&[]).0, 0);
+}
+
 /// A source that comes to a watched project is built too.
 #[test]
 fn watching_a_project() {

@@ -101,9 +101,19 @@ impl<S: Sink> Interp<'_, S> {
             -1 if matches!(motion, 20 | 30) && b.has(b'p') => Some(("P with an arc", b'p')),
             _ if b.g(Group::ToolLength) == 431 && (b.has(b'x') || b.has(b'y')) => Some(("G43.1 with an axis other than Z", b'g')),
             _ if b.get(b't').is_some_and(|t| t > 255.0) => Some(("T above 255", b't')),
+            // Its greatest number of a line.
+            _ if self.line_number().is_some_and(|n| n > 10_000_000.0) => Some(("N above 10000000", b'n')),
             _ => None,
         };
         refused.map_or(Ok(()), |(what, letter)| Err(self.not_in_dialect(what, OTHER_CODE).at(letter)))
+    }
+
+    /// N of the present line.
+    fn line_number(&self) -> Option<f64> {
+        let reading = &self.reading;
+        let known = (reading.line as usize) < reading.scan.lines.len();
+        let words = if known { reading.scan.words(reading.line) } else { &[] };
+        words.iter().find(|w| w.letter == b'n').map(|w| w.value)
     }
 
     /// The same for an M-code.

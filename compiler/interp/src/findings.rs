@@ -118,7 +118,7 @@ impl<S: Sink> Interp<'_, S> {
         let span = span.map(|s| Span::new(s.start.saturating_sub(start), s.end.saturating_sub(start)));
         let blamed = self.blamed.take();
         let p = blamed.unwrap_or(self.place);
-        let text = if blamed.is_some() { "" } else { self.line_text() };
+        let text = self.line_text();
         let text = text.char_indices().nth(254).map_or(text, |(i, _)| &text[..i]);
         let text = text.split('\0').next().unwrap_or(text);
         // Blanks at the end of a line are not read; a call that the controller made up keeps its own, and a line that is

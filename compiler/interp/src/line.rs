@@ -146,7 +146,7 @@ impl<S: Sink> Interp<'_, S> {
                     Some(from) if !self.setup.keep_going => self.place = from,
                     from => self.blamed = from,
                 }
-                return Err(Fault::new(code::SUB_NOT_FOUND, rs274::RT_O_EOF_SUB).arg(name));
+                return Err(Fault::new(code::SUB_NOT_FOUND, rs274::RT_O_EOF_SUB).arg(self.full_name(skip.label)).named(name));
             }
             self.flow = Flow::End(End::Percent);
             return Ok(());

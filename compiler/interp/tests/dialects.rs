@@ -246,6 +246,7 @@ fn dialects_are_closed_lists() {
         ("grbl", "G10 L20 P7 X0"),
         ("grbl", "G43.1 X1"),
         ("grbl", "T300"),
+        ("grbl", "N10000001 G0 X1"),
     ] {
         let (_, outcome) = run_in(id, &format!("{line}\nM30\n"));
         let fault = &outcome.findings[0].fault;
@@ -611,4 +612,26 @@ fn a_fanuc_mill_clamps_the_spindle() {
     let (_, outcome) = run_in("fanuc-mill", "G21 G90\nG92 X0. S3000\nM30\n");
     assert_eq!(outcome.findings[0].fault.code, code::CODE_NOT_CARRIED_OUT);
     assert!(run_in("fanuc-mill", "G21 G90\nG92 X0.\nM30\n").1.findings.is_empty());
+}
+
+/// The words that a table lists for a code of LinuxCNC are words that the code uses.
+#[test]
+fn words_of_the_table_are_used() {
+    let mut wrong = Vec::new();
+    for id in ["linuxcnc-2.9", "linuxcnc-2.10"] {
+        let dialect = Dialect::find(id).expect("a dialect");
+        let version = if id == "linuxcnc-2.10" { gr_canon::Version::V2_10 } else { gr_canon::Version::V2_9 };
+        for row in dialect.codes.iter() {
+            for letter in row.args.iter().flat_map(|a| a.letters.chars()) {
+                // A spindle goes with its speed.
+                let speed = if letter == '$' { "S1 " } else { "" };
+                let text = format!("G21 G90\n{} {speed}{letter}1\nM2\n", row.code);
+                let (_, outcome) = run_with(&Setup { dialect, version, ..setup() }, &text, 100);
+                if outcome.findings.iter().any(|f| f.fault.code == code::WORD_UNUSED) {
+                    wrong.push(format!("{id}: {} {letter}", row.code));
+                }
+            }
+        }
+    }
+    assert_eq!(wrong, Vec::<String>::new());
 }

@@ -121,6 +121,13 @@ fn scope(subs: &[Sub], line: u32, count: u32) -> (u32, u32) {
     sub.map_or((0, count), |s| (s.first, s.last + 1))
 }
 
+/// `M99 P` of a subprogram: block `n` that it names is one of the program that called it.
+fn returns(doc: Doc<'_>, subs: &[Sub], line: u32, n: i64) -> bool {
+    let called = || subs.iter().any(|s| !s.heads_file && (s.first..=s.last).contains(&line));
+    let is = |w: &Word| w.value as i64 == n;
+    doc.line(line).is_some_and(|l| l.has_code(b'm', 990) && l.literal(b'p').is_some_and(is) && !l.literal(b'n').is_some_and(is)) && called()
+}
+
 /// Names and where they stand, on some lines.
 fn all(doc: Doc<'_>, lines: Range<u32>, subs: &[Sub]) -> Vec<(Name, Occurrence, u32)> {
     let mut found = Vec::new();
@@ -324,15 +331,23 @@ fn one_line(doc: Doc<'_>, line: &LineOf<'_>, subs: &[Sub]) -> Vec<(Name, Occurre
 /// Where a name occurs in a file. `line` is where it was asked for: local names stay within their subroutine.
 pub fn occurrences(doc: Doc<'_>, name: &Name, line: Option<u32>) -> Vec<Occurrence> {
     let subs = subs(doc);
+    let local = match name {
+        Name::Parameter(p) => is_local(p),
+        // Each program of a Fanuc control has block numbers of its own.
+        Name::Line(n) => doc.dialect.family == gr_spec::Family::Fanuc && !line.is_some_and(|l| returns(doc, &subs, l, *n)),
+        _ => false,
+    };
     let (from, to) = match (name, line) {
         (Name::Block(_, from, to), _) => (*from, *to),
-        (Name::Parameter(p), Some(line)) if is_local(p) => scope(&subs, line, doc.count()),
+        (_, Some(line)) if local => scope(&subs, line, doc.count()),
         _ => (0, doc.count()),
     };
     let words = matches!(name, Name::Line(_) | Name::Tool(_) | Name::Sub(Label::Number(_)));
     let mut found = if words { all(doc, from..to, &subs) } else { all_but_words(doc, from..to, &subs) };
-    let local = matches!(name, Name::Parameter(p) if is_local(p)) && line.is_some();
-    found.retain(|(n, _, at)| n == name && (!local || scope(&subs, *at, doc.count()) == (from, to)));
+    found.retain(|(n, _, at)| n == name && (!local || line.is_none() || scope(&subs, *at, doc.count()) == (from, to)));
+    if let (true, Name::Line(n)) = (local, name) {
+        found.retain(|(_, o, at)| o.role != Role::Read || !returns(doc, &subs, *at, *n));
+    }
     found.into_iter().map(|(_, o, _)| o).collect()
 }
 
@@ -457,6 +472,16 @@ pub fn objection(doc: Doc<'_>, name: &Name, line: Option<u32>) -> Option<String>
     if label || matches!(name, Name::Line(_)) {
         if let Some(l) = computed_call() {
             return Some(format!("the number computed in line {} may be this one", l.line + 1));
+        }
+    }
+    if let Name::Line(number) = name
+        && doc.dialect.family == gr_spec::Family::Fanuc
+    {
+        let subs = subs(doc);
+        let mut all = all(doc, 0..doc.count(), &subs).into_iter();
+        let back = all.find(|(n, o, at)| n == name && o.role == Role::Read && returns(doc, &subs, *at, *number));
+        if let Some((.., at)) = back {
+            return Some(format!("M99 in line {} may jump to it", at + 1));
         }
     }
     match (name, line) {

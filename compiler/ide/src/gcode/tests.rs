@@ -208,6 +208,34 @@ fn words_that_are_needed_come_first() {
     assert_eq!(jumps("N10 G21\nN20 M3\nN100 M5\nIF [#1 EQ 2] GOTO 1"), ["10", "100"]);
 }
 
+/// Each program of a Fanuc control has block numbers of its own; M99 P goes to those of the program that called.
+#[test]
+fn block_numbers_stay_in_their_program() {
+    let dialect = Dialect::find("fanuc-mill").expect("there");
+    let text = "O1\nN10 #1=1\nGOTO 20\nN20 M98 P2\nN30 M30\nO2\nN10 #1=#1+1\nIF [#1 LT 5] GOTO 10\nGOTO 20\nN20 M99 P30\nO3\nGOTO 10\nM99\n";
+    let chunks = gr_gcode::split_chunks(text, 2);
+    let chunk = |t: &str| Chunk { text: t.into(), scan: Arc::new(gr_gcode::scan(t, dialect)) };
+    let f = File::new("a", chunks.into_iter().map(chunk).collect());
+    let d = Doc { file: &f, dialect };
+    let lines = |spans: Vec<gr_text::Span>| spans.iter().map(|s| d.line_at(s.start).expect("a line").line + 1).collect::<Vec<_>>();
+    let at = |what: &str, nth: usize| text.match_indices(what).nth(nth).expect("there").0 as u32 + what.len() as u32;
+    let asked = |offset: u32| {
+        let (name, _) = name_at(d, offset).expect("a name");
+        let line = d.line_at(offset).map(|l| l.line);
+        let all = lines(occurrences(d, &name, line).iter().map(|o| o.span).collect());
+        (lines(definitions(d, &name, line)), all, super::names::objection(d, &name, line))
+    };
+    assert_eq!(asked(at("N10", 0)), (vec![2], vec![2], None));
+    assert_eq!(asked(at("N10", 1)), (vec![7], vec![7, 8], None));
+    assert_eq!(asked(at("GOTO 10", 0)), (vec![7], vec![7, 8], None));
+    assert_eq!(asked(at("GOTO 20", 0)), (vec![4], vec![3, 4], None));
+    assert_eq!(asked(at("GOTO 20", 1)), (vec![10], vec![9, 10], None));
+    assert_eq!(asked(at("GOTO 10", 1)), (vec![], vec![12], None));
+    let may = Some("M99 in line 10 may jump to it".to_string());
+    assert_eq!(asked(at("N30", 0)), (vec![5], vec![5], may.clone()));
+    assert_eq!(asked(at("P30", 0)), (vec![5], vec![5, 10], may));
+}
+
 proptest! {
     #[test]
     fn nothing_fails_on_any_text(text in "[GMXYoN0-9.#<>\\[\\]a()%; \r\né/]{0,60}", at in 0u32..70) {
