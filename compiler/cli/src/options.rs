@@ -198,7 +198,7 @@ pub struct CheckArgs {
     pub setup: SetupArgs,
     #[command(flatten)]
     pub lints: LintArgs,
-    /// Robots: job file, which gives parts of the program to setups with their own placement of the part
+    /// Job file, which gives parts of the program to setups with their own placement of the part
     #[arg(long, value_name = "FILE")]
     pub job: Option<PathBuf>,
     /// Number of files checked at a time [default: number of processors]

@@ -27,7 +27,7 @@ pub struct RobotOptions {
     /// Robots: write forms whose meaning on the controller is not confirmed, too
     #[arg(long)]
     pub allow_unverified: bool,
-    /// Robots: job file, which gives parts of the program to setups with their own placement of the part
+    /// Job file, which gives parts of the program to setups with their own placement of the part
     #[arg(long, value_name = "FILE")]
     pub job: Option<std::path::PathBuf>,
     /// Correct every point for the deviations in `[as_built]` of the machine file
@@ -266,7 +266,18 @@ pub fn corrected(program: &gr_ir::Program, goal: &Goal<'_>, texts: &dyn Sources)
 /// The machine of a goal, in a reference mode as its publication has it.
 fn machine(goal: &Goal<'_>) -> Result<Machine, String> {
     let machine = goal.machine.ok_or_else(|| format!("the target {} needs --machine; `gcc-robot machine list` shows the ids", goal.target))?;
-    Ok(if goal.options.reference.is_some() { gr_machine::as_published(machine) } else { machine.clone() })
+    let mut machine = if goal.options.reference.is_some() { gr_machine::as_published(machine) } else { machine.clone() };
+    if let Some(most) = goal.options.joint_speed {
+        if !(most > 0.0) {
+            return Err("--joint-speed must be above zero".into());
+        }
+        for joint in &mut machine.joints {
+            let most = if joint.kind == gr_machine::JointKind::Revolute { most.to_radians() } else { most };
+            joint.rapid = Some(joint.top_rapid().min(most));
+            joint.speed = Some(joint.speed.map_or(most, |own| own.min(most)));
+        }
+    }
+    Ok(machine)
 }
 
 fn robot(goal: &Goal<'_>) -> Result<Machine, String> {
@@ -388,7 +399,6 @@ pub fn joint_gcode(motion: &Motion, goal: &Goal<'_>, texts: &dyn Sources, name: 
     let choice = JointOptions {
         tolerance: o.arc_tolerance.unwrap_or(default.tolerance) * rest,
         interval: o.interval,
-        joint_speed: o.joint_speed.map(f64::to_radians),
         ..default
     };
     let path = match joint_path(&planned.program, &choice) {

@@ -224,15 +224,24 @@ fn limits(machine: &gr_machine::Machine, setup: &mut Setup) {
         setup.ini.values.retain(|(section, key), _| !(section.starts_with("axis_") && of_axes(key)));
         return;
     }
+    let elsewhere = gr_robot::opinion::is_elsewhere(machine);
+    if elsewhere {
+        // Its axes are not the coordinates of the program: the plan of its motion knows their limits.
+        setup.ini.values.retain(|(section, key), _| !(section.starts_with("axis_") && ["min_limit", "max_limit"].contains(&key.as_str())));
+    }
     // Limits of an INI file are in the unit that the file states.
     let scale = if setup.ini.machine_units() == Some(Units::Inch) { 25.4 } else { 1.0 };
     let travel = machine.travel().unwrap_or_default().into_iter().zip(machine.speeds().unwrap_or_default());
-    let all = travel.zip(machine.accelerations().unwrap_or_default());
-    for (i, (axis, (((min, max), (_, speed)), acceleration))) in "xyzabcuvw".chars().zip(all).enumerate() {
+    let all: Vec<_> = travel.zip(machine.accelerations().unwrap_or_default()).collect();
+    let along = gr_robot::opinion::axes_along(machine);
+    for (i, axis) in "xyzabcuvw".chars().enumerate() {
+        let own = if i < 3 { along.map(|a| a[i]) } else { Some(i) };
+        let Some(own) = own else { continue };
+        let (((min, max), (_, speed)), acceleration) = all[own];
         let shown = |v: f64| if (3..6).contains(&i) { v.to_degrees() } else { v / scale };
         let rows = [("min_limit", min), ("max_limit", max), ("max_velocity", speed), ("max_acceleration", acceleration)];
         for (key, value) in rows {
-            if let Some(value) = value {
+            if let Some(value) = value.filter(|_| !elsewhere || key.starts_with("max_v") || key.starts_with("max_a")) {
                 let entry = setup.ini.values.entry((format!("axis_{axis}"), key.into())).or_default();
                 if entry.is_empty() {
                     entry.push(shown(value).to_string());
@@ -272,6 +281,13 @@ fn subs(args: &SetupArgs, project: Option<&Project>, setup: &mut Setup) -> Vec<P
 }
 
 impl Station {
+    /// With the setups of a job file, which puts the part where limits of axes alone say nothing: the plan of its motion knows them.
+    pub fn take_job(&mut self, job: Option<&Path>) {
+        self.job = job.map(Path::to_path_buf);
+        if job.is_some() && self.machine.is_some() {
+            self.lints.allow.push(code::TRAVEL_BEYOND_LIMIT);
+        }
+    }
     /// The dialect of a file: option, modeline, project, extension, default. Faults are shown once by the caller.
     pub fn dialect_of(&self, path: &Path, text: &str) -> &'static Dialect {
         self.declared(path, text).unwrap_or_else(Dialect::linuxcnc)

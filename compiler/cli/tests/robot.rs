@@ -181,6 +181,68 @@ fn check_takes_a_job() {
     assert!(alone.0 == Some(2) && alone.1.contains("--job needs --machine"), "{:?}", alone);
 }
 
+/// `check` has the part of a mill where its file or a job puts it, and the axes where rotary words turn the tool.
+#[test]
+fn check_knows_where_a_mill_stands() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_string();
+    let told = |command: &str, base: &str, place: &str, program: &str, more: &[&str]| {
+        std::fs::write(path("m.toml"), format!("format = 1\nid = \"t/m\"\nextends = \"{base}\"\n{place}")).unwrap();
+        std::fs::write(path("a.ngc"), format!("G21 G90 G54\nS1000 M3\n{program}\nM5\nM2\n")).unwrap();
+        let made = run(&[&[command, &path("a.ngc"), "--machine", &path("m.toml"), "--message-format", "short"], more].concat());
+        (made.status.code(), text(&made.stderr) + &text(&made.stdout))
+    };
+    let left = "[frames.table]\nposition = [-300, 0, -100]\n";
+    let good = (Some(0), "no findings in 1 file\n".to_string());
+    let right = "G0 X0 Y0 Z10\nG0 X600\nG1 Y20 F300";
+    assert_eq!(told("check", "generic/mill3", left, right, &[]), good);
+    let built = told("build", "generic/mill3", left, right, &["--target", "joint-gcode", "--strict"]);
+    assert!(built.0 == Some(0) && !built.1.contains("E0285"), "{}", built.1);
+    let (code, found) = told("check", "generic/mill3", left, "G0 X0 Y0 Z10\nG0 X-150\nG1 Y20 F300", &[]);
+    assert!(code == Some(1) && found.contains("a.ngc:4:1: error[E0507]: joint X would have to go to"), "{found}");
+    // Where nobody says where the part is, it is a warning.
+    let (code, found) = told("check", "generic/mill3", "", right, &[]);
+    assert!(code == Some(0) && found.contains("warning[E0285]") && !found.contains("E0507"), "{found}");
+    let (code, found) = told("check", "generic/mill5-ac-table", "", "G0 X0 Y0 Z-200\nG1 A-125 C0 F300", &[]);
+    assert!(code == Some(0) && found.contains("a.ngc:4:1: warning[E0507]: joint A would have to go to"), "{found}");
+    let (code, found) = told("check", "generic/mill5-ac-table", "[frames.table]\nposition = [0, 0, -300]\n", "G0 X0 Y0 Z10\nG0 A-20\nG0 X500", &[]);
+    assert!(code == Some(1) && found.contains("a.ngc:5:1: error[E0507]: joint X would have to go to"), "{found}");
+    // What only other targets can't do is no matter of the mill's own control.
+    assert_eq!(told("check", "generic/mill3", left, "G0 X0 Y0 Z10\nG1 X300 F90000\nG33.1 Z5 K1", &[]).0, Some(0));
+    let job = |place: &str| std::fs::write(path("job.toml"), format!("[[setup]]\nname = \"a\"\nfrom_line = 1\nposition = {place}\n")).unwrap();
+    for (place, code, more) in [("[-300, 0, -100]", 0, "no findings"), ("[-100, 0, -100]", 1, "error[E0507]: joint X would have to go to")] {
+        job(place);
+        let found = told("check", "generic/mill3", "", right, &["--job", &path("job.toml")]);
+        assert!(found.0 == Some(code) && found.1.contains(more) && !found.1.contains("E0285"), "{place}: {}", found.1);
+    }
+    // Predicted times have the axis that really moves.
+    let slow = |place: &str| told("build", "unb/router", &format!("{place}[[joint]]\nname = \"Y\"\nspeed = 2\nrapid = 2\n"), "G0 Z20\nG0 X100\nG0 Z0\nG1 X101 F100", &["--target", "sheet"]).1;
+    let time = |sheet: &str| sheet.lines().find(|l| l.starts_with("Time ")).map(|l| l.split_once("rapids ").unwrap().1[..7].to_string()).unwrap_or_else(|| panic!("{sheet}"));
+    let turned = slow("[frames.table]\nposition = [300, 100, 0]\nrotation = [0, 0, 90]\n");
+    assert!(time(&turned).as_str() > "0:00:50" && time(&slow("")).as_str() < "0:00:40", "{turned} {}", slow(""));
+    let between = slow("[frames.table]\nposition = [300, 100, 0]\nrotation = [0, 0, 40]\n");
+    assert!(between.contains("Times are estimates without acceleration; rapids at 6000 mm/min."), "{between}");
+}
+
+/// No joint of an arm goes faster than `--joint-speed`: a cut that would is an error, a rapid is slower.
+#[test]
+fn joints_no_faster_than_asked() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("a.ngc");
+    let build = |most: &str| run(&["build", PART, "--machine", CELL, "--target", "joint-gcode", "--message-format", "short", "--joint-speed", most, "-o", out.to_str().unwrap()]);
+    let slow = build("1");
+    assert!(!slow.status.success() && text(&slow.stderr).contains("error[E0508]: joint J3 would have to turn at 1.5") && !out.exists(), "{}", text(&slow.stderr));
+    assert_eq!(build("0").status.code(), Some(2));
+    let most = 3.0;
+    let made = build("3");
+    assert!(made.status.success(), "{}", text(&made.stderr));
+    let table = std::fs::read_to_string(folder.path().join("a-joint.csv")).unwrap();
+    let rows: Vec<Vec<f64>> = table.lines().skip(1).map(|l| l.split(',').map(|v| v.parse().unwrap()).collect()).collect();
+    let speeds = rows.windows(2).flat_map(|w| (1..7).map(move |i| (w[1][i] - w[0][i]).abs() / (w[1][0] - w[0][0])));
+    let fastest = speeds.filter(|v| v.is_finite()).fold(0.0, f64::max);
+    assert!(fastest > 0.99 * most && fastest < most * (1.0 + 1e-3), "{fastest}");
+}
+
 const PROBED: &str = "compiler/cli/tests/fixtures/probe.p21";
 
 /// `check` asks the machine about STEP-NC files as well, with the setups of a job.
@@ -699,6 +761,15 @@ fn a_mill_goes_on_from_where_it_stands() {
     // A cycle rises to R and no way aside, and comes back to where the tool was.
     ends(0, "G99 G81 X5 Y6 Z-3 R150 F500", &[[0.0, 0.0, 10.0], [105.0, 56.0, 10.0], [105.0, 56.0, -143.0], [105.0, 56.0, 10.0]]);
     ends(0, "G0 X0 Y0 Z20\nG92 Z-100\nG53 G0 Z0\nG98 G81 X5 Y6 Z-130 R-125 F500", &[[105.0, 56.0, 0.0], [105.0, 56.0, -145.0], [105.0, 56.0, -150.0], [105.0, 56.0, 0.0]]);
+    // As G92 has stored it, offsets come back, however often they were put away.
+    let stored = "G0 X0 Y0 Z20\nG53 G0 X120 Y60\nG92 X0 Y0\n";
+    for back in ["G92.3", "G92.2\nG92.2\nG0 X1 Y1\nG92.3", "G92.2\nG92.3"] {
+        ends(0, &format!("{stored}{back}\nG0 X2 Y2"), &[[122.0, 62.0, -120.0]]);
+    }
+    // The place of a setup holds for every work offset, also for one that isn't in force.
+    std::fs::write(path("at.toml"), "[[setup]]\nname = \"a\"\nfrom_line = 1\nposition = [40, 70, 0]\n").unwrap();
+    let (moves, found) = made(0, "G0 X5 Y6 Z50\nG10 L20 P2 X0 Y0\nG55\nG0 X20 Y30", &["--job", &path("at.toml")]);
+    assert_eq!(moves.last(), Some(&vec![165.0, 156.0, -90.0]), "{moves:?} {found}");
     // In a job too: up, and not down to Z0 of the part.
     std::fs::write(path("job.toml"), "[[setup]]\nname = \"a\"\nfrom_line = 1\n").unwrap();
     let program = "G0 X10 Y20 Z20\nG1 Z0 F500\nG53 G0 Z0\nG0 X0 Y0 Z20\nG91 G28 Z0";

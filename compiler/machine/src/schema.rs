@@ -389,9 +389,11 @@ impl Check {
 
     /// Whether the limits leave no room: that is told here, and nothing else of them.
     fn inverted(&mut self, t: &Node) -> bool {
-        let (Some(min), Some(max)) = (t.value_of("min"), t.get("max")) else { return false };
-        let Some(top) = max.number().filter(|top| min >= *top) else { return false };
-        self.value(&max.span, format!("max {top} is not above min {min}"));
+        let (Some(low), Some(high)) = (t.get("min"), t.get("max")) else { return false };
+        let Some((min, max)) = low.number().zip(high.number()).filter(|(min, max)| min >= max) else { return false };
+        // One that comes from the base of `extends` has its place there, before the tables.
+        let at = if low.span.start > high.span.start { low } else { high };
+        self.value(&at.span, format!("max {max} is not above min {min}"));
         true
     }
 
@@ -902,6 +904,15 @@ mod tests {
             tried += 1;
         }
         assert_eq!(tried, 7);
+    }
+
+    /// A limit that stands on the wrong side of one of the machine that is extended is told where it stands.
+    #[test]
+    fn limits_beside_those_of_another_machine() {
+        let mill = "format = 1\nid = \"shop/mill\"\nextends = \"generic/mill3\"\n[[joint]]\nname = \"X\"\n";
+        for limit in ["min = 500", "max = -500"] {
+            assert_eq!(faults(&format!("{mill}{limit}\n")), [("machine/bad-value", limit.split_once("= ").unwrap().1.to_string())]);
+        }
     }
 
     #[test]

@@ -36,6 +36,11 @@ const SAG: f64 = 1.0;
 /// Closer to a singular position than this is worth a word, rad.
 const CLOSE: f64 = 3.0 * std::f64::consts::PI / 180.0;
 
+/// From this share of its limit on a joint's speed is looked at closer.
+const NEAR_LIMIT: f64 = 0.9;
+/// A feed that fits is told so much lower than what was found: between two looks the joint may be a little faster.
+const FITS: f64 = 0.999;
+
 /// Where the tool is while the program is walked along.
 struct Here {
     at: Frame,
@@ -214,33 +219,22 @@ impl<'a> Emit<'a> {
         let looks = path.looks();
         // An even number of looks has one in the middle.
         let looks = if matches!(m.way, Way::Arc(_)) { looks.next_multiple_of(2) } else { looks };
-        let (mut q, mut branch) = (h.joints, h.branch);
-        let mut middle = (q, branch);
-        let mut all = Branches::NONE;
-        // Change of a joint over its limit, by the share of the way.
-        let mut worst = (0.0f64, 0usize);
+        let begin = (h.joints, h.branch);
+        let ((mut q, mut branch), mut middle) = (begin, begin);
         let follow = Follow { solver: self.solver, limits: self.limits, path: &path, mount: &mount };
-        for k in 1..=looks {
-            let (a, b) = ((k - 1) as f64 / looks as f64, k as f64 / looks as f64);
-            // The chooser has been here: nothing is out of reach.
-            let _ = self.solver.all(&mount.flange(&path.at(b)), &mut all);
-            let next = follow.step(&all, (&q, branch), (a, b)).unwrap_or((q, branch));
-            let rates = follow.rates((&q, branch), (&next.0, next.1), (a, b));
-            for i in 0..self.solver.count {
-                let part = rates[i] / self.speeds[i];
-                if part > worst.0 {
-                    worst = (part, i);
-                }
-            }
-            (q, branch) = next;
+        let mut worst = self.fastest(&follow, looks, begin, false, |emit, k, next| {
+            (q, branch) = *next;
             if 2 * k == looks {
-                middle = next;
+                middle = *next;
             }
-            self.look(&q, m.source);
-        }
+            emit.look(&next.0, m.source);
+        });
         let on_the_spot = || turned_on_the_spot(self.machine, &h.joints, &q) / m.speed;
         let seconds = if path.length > ON_THE_SPOT { path.length / m.speed } else { on_the_spot() };
         if !m.rapid && seconds > 0.0 {
+            if worst.0 > NEAR_LIMIT * seconds {
+                worst = self.fastest(&follow, looks, begin, true, |_, _, _| {});
+            }
             self.fast(m, (worst.0 / seconds, worst.1), findings);
         }
         if m.rapid {
@@ -253,6 +247,36 @@ impl<'a> Emit<'a> {
         ((q, branch), middle)
     }
 
+    /// The joint that is fastest along a way, and its change over its limit by the share of the way. Tells every look.
+    fn fastest(
+        &mut self,
+        follow: &Follow<'_>,
+        looks: usize,
+        begin: (Joints, u8),
+        closer: bool,
+        mut tell: impl FnMut(&mut Self, usize, &(Joints, u8)),
+    ) -> (f64, usize) {
+        let (mut q, mut branch) = begin;
+        let mut all = Branches::NONE;
+        let mut worst = (0.0f64, 0usize);
+        for k in 1..=looks {
+            let (a, b) = ((k - 1) as f64 / looks as f64, k as f64 / looks as f64);
+            // The chooser has been here: nothing is out of reach.
+            let _ = self.solver.all(&follow.mount.flange(&follow.path.at(b)), &mut all);
+            let next = follow.step(&all, (&q, branch), (a, b)).unwrap_or((q, branch));
+            let rates = follow.rates((&q, branch), (&next.0, next.1), (a, b), closer);
+            for i in 0..self.solver.count {
+                let part = rates[i] / self.speeds[i];
+                if part > worst.0 {
+                    worst = (part, i);
+                }
+            }
+            (q, branch) = next;
+            tell(self, k, &next);
+        }
+        worst
+    }
+
     fn fast(&mut self, m: &Move, (part, i): (f64, usize), findings: &mut Findings<'_>) {
         if self.summary.joint_speed.is_none_or(|(p, ..)| part > p) && part > 0.0 {
             self.summary.joint_speed = Some((part, i, m.source));
@@ -260,7 +284,7 @@ impl<'a> Emit<'a> {
         if part > 1.0 + 1e-9 {
             let joint = &self.machine.joints[i];
             let per_second = |v: f64| format!("{}/s", joint.show(v));
-            let fits = libm::floor(m.speed / part * 60.0 * 10.0) / 10.0;
+            let fits = libm::floor(m.speed / part * FITS * 60.0 * 10.0) / 10.0;
             let limit = self.speeds[i];
             findings.say(code::ROBOT_JOINT_SPEED, m.source, &[joint.name.clone(), per_second(limit * part), per_second(limit), format!("{fits} mm/min")]);
         }

@@ -10,6 +10,8 @@ use crate::solver::{Branches, Joints, Limits, Solver};
 
 /// A joint that changes more than this between two looks is looked at closer, rad (mm count a hundredth).
 const SMALL: f64 = 0.12;
+/// The same for speeds that are near a limit: what is found so is less than a thousandth below the peak.
+const FINE: f64 = SMALL / 256.0;
 /// So often a stretch is halved.
 const HALVINGS: u32 = 18;
 /// A wrist goes through its straight position when it comes nearer to it than this, rad.
@@ -114,22 +116,22 @@ impl Follow<'_> {
         self.far(&end, q) < 1e-9 && self.smooth(branch, p, &r, (a, middle), left - 1) && self.smooth(branch, &r, q, (middle, b), left - 1)
     }
 
-    /// How fast each joint goes at most between two looks, per share of the way.
-    pub fn rates(&self, from: (&Joints, u8), to: (&Joints, u8), stretch: (f64, f64)) -> Joints {
+    /// How fast each joint goes at most between two looks, per share of the way; looked at closer where that is asked for.
+    pub fn rates(&self, from: (&Joints, u8), to: (&Joints, u8), stretch: (f64, f64), closer: bool) -> Joints {
         let mut out = [0.0; MAX_JOINTS];
-        self.steepest(from, to, stretch, HALVINGS, &mut out);
+        self.steepest(from, to, stretch, (HALVINGS, if closer { FINE } else { SMALL }), &mut out);
         out
     }
 
-    fn steepest(&self, (p, from): (&Joints, u8), (q, to): (&Joints, u8), (a, b): (f64, f64), left: u32, out: &mut Joints) {
-        if left > 0 && self.far(p, q) > SMALL {
+    fn steepest(&self, (p, from): (&Joints, u8), (q, to): (&Joints, u8), (a, b): (f64, f64), (left, step): (u32, f64), out: &mut Joints) {
+        if left > 0 && self.far(p, q) > step {
             let middle = (a + b) / 2.0;
             let mut guide = *p;
             (0..self.solver.count).for_each(|i| guide[i] = (p[i] + q[i]) / 2.0);
             let near = if from == to { p } else { &guide };
             if let Some((r, branch)) = self.at(middle, [from, to], near) {
-                self.steepest((p, from), (&r, branch), (a, middle), left - 1, out);
-                return self.steepest((&r, branch), (q, to), (middle, b), left - 1, out);
+                self.steepest((p, from), (&r, branch), (a, middle), (left - 1, step), out);
+                return self.steepest((&r, branch), (q, to), (middle, b), (left - 1, step), out);
             }
         }
         for i in 0..self.solver.count {

@@ -22,15 +22,13 @@ pub struct JointOptions {
     pub tolerance: f64,
     /// Greatest time between two positions, s; none = as far as the tolerance allows.
     pub interval: Option<f64>,
-    /// Greatest speed of every joint in rapids, rad/s or mm/s, besides the machine's own.
-    pub joint_speed: Option<f64>,
     /// Positions at most.
     pub most: usize,
 }
 
 impl Default for JointOptions {
     fn default() -> JointOptions {
-        JointOptions { tolerance: 0.01, interval: None, joint_speed: None, most: 4_000_000 }
+        JointOptions { tolerance: 0.01, interval: None, most: 4_000_000 }
     }
 }
 
@@ -99,10 +97,7 @@ struct Run<'a> {
 
 /// Cuts the moves of a program.
 pub fn joint_path(program: &RobotProgram, options: &JointOptions) -> Result<JointPath, TooMany> {
-    let mut rapid = crate::plan::speeds(&program.machine);
-    if let Some(limit) = options.joint_speed {
-        rapid.iter_mut().for_each(|s| *s = s.min(limit));
-    }
+    let rapid = crate::plan::speeds(&program.machine);
     let g = Gathered {
         items: Vec::new(),
         turns: Vec::new(),
@@ -279,8 +274,16 @@ impl Run<'_> {
         let found = cut.merged(self.here.joints, self.options.interval.is_some());
         let mut last = 0.0;
         for (share, joints) in found {
-            let end = share >= 1.0;
-            self.push(joints, seconds * (share - last), rapid, end && zone == Zone::Stop, source)?;
+            let stop = share >= 1.0 && zone == Zone::Stop;
+            let even = seconds * (share - last);
+            // A rapid takes its time where a joint would be too fast.
+            let slower = if rapid { self.joint_time(&self.here.joints, &joints) } else { 0.0 };
+            if slower > even {
+                self.even(&joints, slower, stop, source)?;
+            } else {
+                self.push(joints, even, rapid, stop, source)?;
+            }
+            self.here.joints = joints;
             last = share;
         }
         self.here = to;

@@ -1,12 +1,15 @@
 //! What a machine has to say about a program when nothing is made of it: for `check` and for editors, which so say the
 //! same. A robot is planned; the planar arm, which has a way of its own, is asked point by point; a machine tool has to have
-//! the axes. Limits of a machine tool's axes are the interpreter's matter.
+//! the axes. Limits of a machine tool's axes are the interpreter's matter, as long as its axes are those of the program: where the part
+//! is put somewhere, or the tool is turned, the motion is planned.
 
 use gr_backends::joint;
 use gr_ir::{Program, Source, Sources};
+use gr_machine::math::{Frame, M3};
 use gr_machine::{Chain, Kind, Machine};
-use gr_text::{Diagnostic, Severity, code};
+use gr_text::{Code, Diagnostic, Severity, code};
 
+use crate::words::placed_by;
 use crate::{Options, plan};
 
 const LETTERS: &str = "XYZABCUVW";
@@ -45,13 +48,37 @@ pub fn missing_axes(program: &Program, machine: &Machine, texts: &dyn Sources) -
 
 /// Whether a machine has anything to say about a program beside what its limits say.
 pub fn has_a_say(machine: &Machine) -> bool {
-    machine.kind == Kind::Robot || axes(machine).is_some_and(|has| has.contains(&false))
+    machine.kind == Kind::Robot || is_elsewhere(machine) || axes(machine).is_some_and(|has| has.contains(&false))
+}
+
+/// Whether a mill's file says where the part is.
+fn is_placed(machine: &Machine) -> bool {
+    !machine.cell.frames.is_empty() || machine.cell.part_in_base() != Frame::IDENTITY
+}
+
+/// Whether a mill stands elsewhere than the coordinates of its program: its part is put somewhere, or the tool is turned.
+pub fn is_elsewhere(machine: &Machine) -> bool {
+    machine.kind == Kind::Mill && (is_placed(machine) || matches!(machine.chain, Chain::FiveAxis(_)))
+}
+
+/// Which axis of a mill goes along X, Y and Z of its programs, whose part may be clamped turned. None where several do.
+pub fn axes_along(machine: &Machine) -> Option<[usize; 3]> {
+    let places = (1..=9).map(|work| placed_by(machine, work));
+    let along = |turn: &M3| {
+        let one = |k: usize| (0..3).find(|i| (turn[*i][k].abs() - 1.0).abs() < 1e-9);
+        Some([one(0)?, one(1)?, one(2)?])
+    };
+    let mut all = places.map(|p| along(&p.turn));
+    let first = all.next()??;
+    all.all(|a| a == Some(first)).then_some(first)
 }
 
 /// What any machine has to say about a program.
 pub fn opinion(program: &Program, machine: &Machine, texts: &dyn Sources, options: &Options) -> Vec<Diagnostic> {
     if machine.kind != Kind::Robot {
-        return missing_axes(program, machine, texts);
+        let missing = missing_axes(program, machine, texts);
+        let placed = machine.kind == Kind::Mill && !options.setups.is_empty();
+        return if missing.is_empty() && (placed || is_elsewhere(machine)) { of_mill(program, machine, texts, options) } else { missing };
     }
     if matches!(machine.chain, Chain::Planar3r(_)) {
         return by_point(program, machine, texts);
@@ -60,6 +87,19 @@ pub fn opinion(program: &Program, machine: &Machine, texts: &dyn Sources, option
         Ok(planned) => planned.warnings,
         Err(found) => found,
     }
+}
+
+/// Where a mill can't go. The rest of what a plan says is no matter of its own control, which follows the program itself.
+fn of_mill(program: &Program, machine: &Machine, texts: &dyn Sources, options: &Options) -> Vec<Diagnostic> {
+    const PLACES: [Code; 5] =
+        [code::ROBOT_OUT_OF_REACH, code::ROBOT_JOINT_LIMIT, code::ROBOT_LEAVES_WORKSPACE, code::JOB_BAD_VALUE, code::JOB_BEGINS_IN_WORK];
+    let Err(mut found) = plan(program, machine, texts, &Options { own_words: true, ..options.clone() }) else { return Vec::new() };
+    found.retain(|d| PLACES.contains(&d.code));
+    if !is_placed(machine) && options.setups.is_empty() {
+        // Nobody has said where the part is.
+        found.iter_mut().filter(|d| d.severity == Severity::Error).for_each(|d| d.severity = Severity::Warning);
+    }
+    found
 }
 
 fn by_point(program: &Program, machine: &Machine, texts: &dyn Sources) -> Vec<Diagnostic> {

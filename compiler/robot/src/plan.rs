@@ -289,9 +289,9 @@ impl Planner<'_> {
             }
             Why::Condition(v) => {
                 let limit = amount(&gr_machine::Violation { value: v.limit, ..v.clone() });
-                self.findings.say(code::ROBOT_CONDITION, source, &[v.name.into(), v.what.clone(), amount(v), limit]);
+                self.findings.say(code::ROBOT_CONDITION, source, &[v.name.into(), v.what.clone(), amount(v), limit, at]);
             }
-            Why::Limit { joint, value, limit } => self.limit(chain, fault, source, *joint, *value, *limit, first),
+            Why::Limit { joint, value, limit } => self.limit(chain, fault, source, (*joint, *value, *limit), (first, at)),
             Why::Jump => {
                 let why = format!("at {at} it is singular: the tool can't go on without a jump of joints");
                 if self.stands_at(fault, &m) {
@@ -303,14 +303,18 @@ impl Planner<'_> {
         }
     }
 
-    #[allow(clippy::too_many_arguments)]
-    fn limit(&mut self, chain: Chain, fault: &Fault, source: Option<gr_ir::Source>, joint: usize, value: f64, limit: f64, first: u32) {
+    /// A joint beyond its limit; `first`: the line that the configuration was chosen for.
+    fn limit(&mut self, chain: Chain, fault: &Fault, source: Option<gr_ir::Source>, (joint, value, limit): (usize, f64, f64), (first, at): (u32, String)) {
         let j = &self.machine.joints[joint];
         let (value, bound) = (j.show(value), j.show(limit));
         let Item::Move(m) = &self.g.items[fault.item] else { return };
-        if fault.item > chain.first && self.machine.kind != Kind::Mill && self.stands_at(fault, m) {
-            let why = format!("joint {} would have to go to {value}, its limit is {bound}", j.name);
+        let why = format!("joint {} would have to go to {value}, its limit is {bound}", j.name);
+        let (goes_on, other) = (fault.item > chain.first, self.stands_at(fault, m));
+        if goes_on && self.machine.kind != Kind::Mill && other {
             return self.findings.say(code::ROBOT_CONFIGURATION, source, &[first.to_string(), why]);
+        }
+        if fault.share < 1.0 && m.way != Way::Joint && !other && self.stands(m) {
+            return self.findings.say(code::ROBOT_LEAVES_WORKSPACE, source, &[at, why]);
         }
         self.findings.say(code::ROBOT_JOINT_LIMIT, source, &[j.name.clone(), value, bound]);
     }

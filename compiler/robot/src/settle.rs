@@ -14,7 +14,7 @@ use gr_machine::{Kind, Machine};
 use gr_text::{Diagnostic, Severity, code};
 
 use crate::Setup;
-use crate::words::{placed, tool};
+use crate::words::{placed_by, tool};
 use stands::Stands;
 
 /// What a coordinate is known by.
@@ -293,7 +293,7 @@ pub fn settled(
         any |= coordinates.step(program, &view, sources).contains(&By::Machine);
         let told = match view.op.moves() {
             true => stands.goes(program, &out, &view, sources, &mut coordinates, place),
-            false => stands.shifts(program, &out, &view, sources, place),
+            false => stands.shifts(program, &out, &view, sources, &places),
         };
         let (op, pose) = told.unwrap_or_else(|why| {
             untold.get_or_insert((view.source, why));
@@ -309,11 +309,13 @@ struct Places<'a, 'p> {
     setups: &'a [Setup],
     machine: &'a Machine,
     workingstep: Option<&'p str>,
+    /// That of the setup in force.
+    part: Option<Frame>,
 }
 
 impl<'a, 'p> Places<'a, 'p> {
     fn new(machine: &'a Machine, setups: &'a [Setup]) -> Self {
-        Places { setups, machine, workingstep: None }
+        Places { setups, machine, workingstep: None, part: None }
     }
 
     /// In the base, at an operation.
@@ -321,9 +323,13 @@ impl<'a, 'p> Places<'a, 'p> {
         if let Op::Begin { marker: Marker::Workingstep, text, .. } = view.op {
             self.workingstep = Some(text);
         }
-        setup_at(self.setups, self.workingstep, || main_line(program, view.source))
-            .and_then(|i| self.setups[i].part)
-            .unwrap_or_else(|| placed(self.machine, view.state))
+        self.part = setup_at(self.setups, self.workingstep, || main_line(program, view.source)).and_then(|i| self.setups[i].part);
+        self.of(view.state.work)
+    }
+
+    /// In the base, of a work offset by its number: a setup's place holds for all of them.
+    fn of(&self, work: u8) -> Frame {
+        self.part.unwrap_or_else(|| placed_by(self.machine, work))
     }
 }
 

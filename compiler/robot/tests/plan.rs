@@ -239,6 +239,43 @@ fn a_line_leaves_the_work_space() {
     insta::assert_snapshot!("leaves_the_work_space", told);
 }
 
+/// A joint limit in the middle of a line whose ends are both good: the place is told. So is that of a condition.
+#[test]
+fn a_joint_leaves_its_range_on_the_way() {
+    let legs = builtin("usp/2ups-prp").unwrap();
+    let told = faults("G0 X640 Y-40 Z0\nG1 X708 Y-460 F3000\nM2\n", &legs);
+    assert!(told.starts_with("E0530 line 2: both ends of this move can be reached, but at X 64") && told.contains("joint h2 would have to go to 847.9"), "{told}");
+    // One whose end is beyond is told as such.
+    let told = faults("G0 X640 Y-40 Z0\nG1 X680 Y-290 F3000\nM2\n", &legs);
+    assert!(told.starts_with("E0507 line 2: joint h2 would have to go to"), "{told}");
+    let told = faults("G0 X800 Y0 Z600\nG1 X810 Y50 F3000\nM2\n", &legs);
+    assert!(told.starts_with("E0531 line 2: the point X 805.000 Y 25.000 Z 600.000 breaks the condition `spherical-1`"), "{told}");
+    let mill = builtin("generic/mill3").unwrap();
+    let told = faults("G0 X395 Y-10 Z-50\nG3 Y10 J10 F500\nM2\n", &mill);
+    assert!(told.starts_with("E0530 line 2: ") && told.contains("at X 400.") && told.contains("joint X would have to go to 400."), "{told}");
+}
+
+/// The feed that E0508 tells fits, and hardly more would: joint speeds by positions six thousand times along the line.
+#[test]
+fn the_feed_that_is_told_fits() {
+    use gr_robot::joints::{JointOptions, joint_path};
+    let machine = cell();
+    let program = |f: f64| format!("G21 G90\nT1 M6\nG0 X399.754 Y344.881 Z-287.353\nG1 X601.171 Y251.210 Z-232.390 F{f:.1}\nM2\n");
+    let told = planned(&program(900_000.0), &machine).expect_err("J3 is too fast");
+    let speed = told.iter().find(|d| d.code == gr_text::code::ROBOT_JOINT_SPEED).expect("E0508");
+    let help = speed.help.clone().expect("the feed that fits");
+    let fits: f64 = help.split_whitespace().find_map(|w| w.parse().ok()).unwrap_or_else(|| panic!("{help}"));
+    let fine = planned(&program(fits), &machine).unwrap_or_else(|e| panic!("{}", messages(&e, &program(fits))));
+    let length = (201.417f64.powi(2) + 93.671f64.powi(2) + 54.963f64.powi(2)).sqrt();
+    let path = joint_path(&fine.program, &JointOptions { interval: Some(length / (fits / 60.0) / 6000.0), ..JointOptions::default() }).unwrap();
+    let points: Vec<_> = path.points().collect();
+    let cuts = points.windows(2).filter(|w| !w[1].rapid);
+    let peak = cuts.flat_map(|w| (0..6).map(move |i| (w[1].joints[i] - w[0].joints[i]).abs() / w[1].seconds));
+    let limit = machine.joints[2].speed.unwrap();
+    let peak = peak.fold(0.0, f64::max);
+    assert!(peak <= limit && peak > 0.997 * limit, "{} of {}", peak.to_degrees(), limit.to_degrees());
+}
+
 /// A tool beside the axis of the platform goes round with it: no place of it is worked out.
 #[test]
 fn a_tool_beside_the_platform() {
@@ -337,7 +374,7 @@ fn a_point_breaks_a_condition() {
     let grid = (0..=640).step_by(40).flat_map(|z| (0..1400).step_by(20).flat_map(move |x| (-600..=600).step_by(100).map(move |y| [x, y, z].map(f64::from))));
     let all: Vec<[f64; 3]> = grid.filter(|p| broken(p[0], p[1], p[2])).collect();
     let told: Vec<String> = all.iter().take(20).map(|[x, y, z]| faults(&format!("G0 X{x} Y{y} Z{z}\nG1 X{x} Y{y} Z{} F500\nM30\n", z + 1.0), &machine)).collect();
-    let named = told.iter().find(|t| t.contains("E0531 line 1: this point breaks the condition `"));
+    let named = told.iter().find(|t| t.starts_with("E0531 line 1: the point X ") && t.contains(" breaks the condition `"));
     assert!(named.is_some(), "{} places: {told:?}", all.len());
 }
 

@@ -219,8 +219,8 @@ impl Body for Writer {
                 self.activity("DNBWaitSignalActivity", "WaitSignal", &text);
             }
             Op::Call { name, value } => {
-                if let Some(v) = value {
-                    let _ = write!(self.text, "      <!-- with {} -->\n", num(v, 6));
+                if value.is_some() {
+                    cx.no_number();
                 }
                 let text = format!("        <CallName>{}</CallName>\n", escape(name));
                 self.activity("DNBIgpCallRobotTask", "CallTask", &text);

@@ -82,6 +82,7 @@ impl Writer {
 
 impl Body for Writer {
     fn op(&mut self, cx: &mut Cx, op: Op) {
+        self.out.points(cx, op.points());
         match op {
             Op::Line(number, text) => self.remark(cx, &format!("{number}: {text}")),
             Op::Comment(text) | Op::Message(text) => self.remark(cx, text),
@@ -112,8 +113,8 @@ impl Body for Writer {
             }
             Op::Call { name, value } => {
                 let n = cx.number(name, "routine");
-                if let Some(v) = value {
-                    self.remark(cx, &format!("with {}", num(v, 6)));
+                if value.is_some() {
+                    cx.no_number();
                 }
                 self.out.line(cx, &format!("CALLP[{n}]"));
             }

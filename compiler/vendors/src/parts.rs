@@ -81,6 +81,7 @@ pub(crate) struct Lines {
     /// The text.
     pub text: String,
     count: u64,
+    points: u64,
     indent: &'static str,
     remark: &'static str,
     /// Bytes of marks in `text`.
@@ -90,7 +91,7 @@ pub(crate) struct Lines {
 impl Lines {
     /// With so much in front of each line, and what begins a remark.
     pub(crate) fn new(indent: &'static str, remark: &'static str) -> Lines {
-        Lines { text: String::new(), count: 0, indent, remark, marks: 0 }
+        Lines { text: String::new(), count: 0, points: 0, indent, remark, marks: 0 }
     }
     /// Appends a line, with the number of the source line where one is due.
     pub(crate) fn line(&mut self, cx: &mut crate::walk::Cx, text: &str) {
@@ -103,12 +104,13 @@ impl Lines {
         self.text.push_str("\r\n");
         self.count += 1;
         let limits = &cx.machine.cell.controller;
-        let over = |most: Option<u64>, now: u64| most.is_some_and(|m| now > m);
-        if over(limits.lines, self.count) || over(limits.bytes, self.text.len().saturating_sub(self.marks) as u64) {
-            let most = limits.lines.unwrap_or(0).max(limits.bytes.unwrap_or(0));
-            let args = ["more".to_string(), "lines or bytes".into(), most.to_string(), cx.traits.title.into()];
-            cx.say(gr_text::code::VENDOR_PROGRAM_TOO_LONG, &args);
-        }
+        too_long(cx, self.count, limits.lines, "lines");
+        too_long(cx, self.text.len().saturating_sub(self.marks) as u64, limits.bytes, "bytes");
+    }
+    /// Counts points used.
+    pub(crate) fn points(&mut self, cx: &mut crate::walk::Cx, count: u64) {
+        self.points += count;
+        too_long(cx, self.points, cx.machine.cell.controller.points, "points");
     }
     /// Appends what holds from here on, when it is another than before. A move's remark waits for the move.
     pub(crate) fn setting(&mut self, cx: &mut crate::walk::Cx, before: &mut String, text: String) {
@@ -126,5 +128,11 @@ impl Lines {
             let line = format!("{} {piece}", self.remark);
             self.line(cx, &line);
         }
+    }
+}
+
+fn too_long(cx: &mut crate::walk::Cx, now: u64, most: Option<u64>, what: &str) {
+    if let Some(most) = most.filter(|m| now > *m) {
+        cx.say(gr_text::code::VENDOR_PROGRAM_TOO_LONG, &["more".to_string(), what.into(), most.to_string(), cx.traits.title.into()]);
     }
 }

@@ -51,6 +51,7 @@ pub(crate) trait Plain {
 
 impl<W: Plain> Body for W {
     fn op(&mut self, cx: &mut Cx, op: Op) {
+        self.out().points(cx, op.points());
         match op {
             Op::Line(number, text) => self.out().remark(cx, &format!("{number}: {text}")),
             Op::Comment(text) => self.out().remark(cx, text),

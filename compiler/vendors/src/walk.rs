@@ -49,6 +49,17 @@ pub(crate) enum Op<'p> {
     End,
 }
 
+impl Op<'_> {
+    /// Points of a program that it takes.
+    pub(crate) fn points(&self) -> u64 {
+        match self {
+            Op::Home(_) | Op::Joint { .. } | Op::Linear { .. } | Op::Probe { .. } => 1,
+            Op::Arc { .. } => 2,
+            _ => 0,
+        }
+    }
+}
+
 /// The value of an output.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) enum Value {
@@ -566,6 +577,11 @@ impl<'p> Cx<'p> {
     /// What the language can't say.
     pub fn cannot(&mut self, what: &str) {
         self.say(code::VENDOR_CANNOT, &[what.into(), self.traits.title.into()]);
+    }
+
+    /// A routine is called without the number that it needs.
+    pub fn no_number(&mut self) {
+        self.cannot("a number for a routine");
     }
 
     /// The language has no probe move whose form is sure.

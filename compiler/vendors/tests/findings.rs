@@ -69,6 +69,9 @@ fn every_finding() {
     }
     b.program.machine.cell.controller.lines = Some(100);
     note("E0635 longer than the machine file allows", run("kawasaki-as", &b, true));
+    b.program.machine.cell.controller.lines = None;
+    b.program.machine.cell.controller.bytes = Some(5000);
+    note("E0635 bytes", run("kawasaki-as", &b, true));
     let (id, home, _) = robot_of("rapid");
     let mut b = Builder::new(machine(id), home);
     b.program.name = "module".into();
@@ -94,6 +97,35 @@ fn every_finding() {
     insta::assert_snapshot!(all);
     for code in 620..=637 {
         assert!(all.contains(&format!(" E0{code} at")), "E0{code} is never raised");
+    }
+}
+
+/// Points count where programs aren't split, an arc as two; a number that a routine can't take is told.
+#[test]
+fn points_and_numbers_of_routines() {
+    let codes = |out: &Output| out.findings.iter().filter(|f| f.severity == Severity::Error).map(|f| f.message.clone()).collect::<Vec<_>>();
+    for target in ["kawasaki-as", "denso-pac", "melfa", "pdl2", "spel", "nachi", "vplus"] {
+        let (id, home, _) = robot_of(target);
+        let mut b = Builder::new(machine(id), home);
+        for i in 0..18 {
+            assert!(b.add(&Move::Line { shift: [if i % 2 == 0 { 1.0 } else { -1.0 }, 0.0, 0.0], turn: [0.0; 3], speed: 10.0, zone: None }));
+        }
+        // Home, the lines, and home again.
+        let points = 1 + b.program.targets.len() as u64;
+        b.program.machine.cell.controller.points = Some(points);
+        assert_eq!(codes(&run(target, &b, true)), [] as [String; 0], "{target}");
+        b.program.machine.cell.controller.points = Some(15);
+        let told = codes(&run(target, &b, true));
+        assert!(told.len() == 1 && told[0].starts_with("the program has more points; the controller takes 15"), "{target}: {told:?}");
+    }
+    let routine = |target: &str, value: Option<f64>| {
+        let call = Signal { routine: Some("20".into()), signal: None, ..signal("x") };
+        codes(&one(target, signal_of("S", value, call)))
+    };
+    for target in ["nachi", "delmia-xml"] {
+        assert!(routine(target, None).is_empty(), "{target}");
+        let told = routine(target, Some(3000.0));
+        assert!(told.len() == 1 && told[0].ends_with("a number for a routine"), "{target}: {told:?}");
     }
 }
 

@@ -168,6 +168,8 @@ impl Compare<'_> {
                 }
                 Ok(())
             }
+            // The operator is asked.
+            Action::ChangeTool { by: None, .. } => Ok(()),
             Action::ChangeTool { .. } => match self.next()? {
                 Event::Call(..) | Event::Set(..) => Ok(()),
                 other => Err(format!("{other:?} for a tool change")),

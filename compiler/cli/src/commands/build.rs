@@ -154,6 +154,7 @@ impl<'a> Round<'a> {
             self.fail(self.renderer.failed());
             return self.end(false, None);
         };
+        stations.iter_mut().for_each(|s| s.take_job(self.args.options.robot.job.as_deref()));
         self.files.extend(stations.iter().flat_map(|s| s.files.iter().cloned()));
         match self.jobs(&stations) {
             Ok(jobs) => {

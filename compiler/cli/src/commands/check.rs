@@ -64,9 +64,8 @@ pub fn run(global: &Global, args: &CheckArgs) -> Exit {
             return Exit::Usage;
         }
     };
-    let no_robot = |s: &Station| s.machine.as_ref().is_none_or(|m| m.kind != gr_machine::Kind::Robot);
-    if args.job.is_some() && stations.iter().any(no_robot) {
-        eprintln!("--job needs --machine with a robot: it places parts for one");
+    if args.job.is_some() && stations.iter().any(|s| s.machine.is_none()) {
+        eprintln!("--job needs --machine: it places parts on one");
         return Exit::Usage;
     }
     renderer.tally.files = files.len();
@@ -138,7 +137,7 @@ fn programs(args: &CheckArgs, sources: &mut Sources, renderer: &mut Renderer) ->
         }
     }
     let Some(mut stations) = Stations::of(&args.setup, &args.lints, &files, sources, renderer) else { return Named::Faulty };
-    stations.iter_mut().for_each(|s| s.job.clone_from(&args.job));
+    stations.iter_mut().for_each(|s| s.take_job(args.job.as_deref()));
     empty.into_iter().for_each(|path| nothing(path.display().to_string(), sources, renderer));
     Named::Programs(files, stations, exit)
 }
@@ -154,7 +153,7 @@ fn sources_of_project(args: &CheckArgs, sources: &mut Sources, renderer: &mut Re
     } else if files.is_empty() {
         nothing(project.path.display().to_string(), sources, renderer);
     }
-    station.job.clone_from(&args.job);
+    station.take_job(args.job.as_deref());
     let stations = Stations::one(station, files.len());
     Named::Programs(files, stations, exit)
 }
@@ -256,7 +255,7 @@ pub fn unreadable(name: &str, code: Code, args: &[String]) -> Checked {
 }
 
 fn checked(name: &str, path: &Path, text: &Text, station: &Station) -> Checked {
-    let machine = station.machine.as_ref().filter(|m| gr_robot::opinion::has_a_say(m));
+    let machine = station.machine.as_ref().filter(|m| station.job.is_some() || gr_robot::opinion::has_a_say(m));
     if exchange::is_exchange(path, text) {
         return match machine {
             Some(machine) => exchange::check_on(machine, name, text, path, station),

@@ -6,9 +6,9 @@ use gr_ir::{Arc, ArcPlane, Axes, Builder, Marker, Op, Pose, Program, Source, Sou
 use gr_machine::math::{Frame, V3, add, dot, product, rot_z, solve, sub};
 use gr_machine::{Chain, Kind, Kinematics, Machine};
 
-use super::{By, Coordinates, Goal, ROUNDING, Untold};
+use super::{By, Coordinates, Goal, Places, ROUNDING, Untold};
 use crate::gather::same_turn;
-use crate::words::{Asked, Slides, Words, as_far_as_known, placed, placed_by, started, work_shift};
+use crate::words::{Asked, Slides, Words, as_far_as_known, placed, started, work_shift};
 
 /// Follows a machine through its program.
 pub(super) struct Stands<'a> {
@@ -45,7 +45,7 @@ enum Last {
 #[derive(Default)]
 struct Shifted {
     local: Axes,
-    /// Put away by G92.2.
+    /// As G92 has stored it, in force or not.
     kept: Axes,
     /// Of each work offset, and what of it is in force.
     work: [Axes; 10],
@@ -309,7 +309,7 @@ impl<'a> Stands<'a> {
     }
 
     /// What moves nothing. Offsets that are set from where the machine stands are others than in the program's run.
-    pub fn shifts<'p>(&mut self, program: &Program, out: &Builder, view: &View<'_, 'p>, sources: &dyn Sources, place: Frame) -> Told<'p> {
+    pub fn shifts<'p>(&mut self, program: &Program, out: &Builder, view: &View<'_, 'p>, sources: &dyn Sources, places: &Places<'_, '_>) -> Told<'p> {
         let op = match view.op {
             Op::Begin { marker: Marker::Cycle, .. } => {
                 // Up to R it goes before; of several passes each begins where the one before has ended.
@@ -329,11 +329,11 @@ impl<'a> Stands<'a> {
                 Op::LocalOffset(plus(&offset, &self.shifted.local))
             }
             Op::StoredOffset { number, offset, rotation } if self.sets_from_here() => {
-                self.work(number, out, view, sources, place)?;
+                self.work(number, out, view, sources, places)?;
                 Op::StoredOffset { number, offset: plus(&offset, &self.shifted.work[slot(number)]), rotation }
             }
             Op::WorkOffset(number, offset) if self.sets_from_here() => {
-                self.work(number, out, view, sources, place)?;
+                self.work(number, out, view, sources, places)?;
                 self.shifted.current = self.shifted.work[slot(number)];
                 Op::WorkOffset(number, plus(&offset, &self.shifted.current))
             }
@@ -354,19 +354,21 @@ impl<'a> Stands<'a> {
         if letters.g(920) {
             let lag = lag(out, view);
             named(letters).for_each(|i| local[i] += lag[i]);
+            *kept = *local;
         } else if letters.g(921) {
             (*local, *kept) = ([0.0; 9], [0.0; 9]);
         } else if letters.g(922) {
-            *kept = std::mem::take(local);
+            *local = [0.0; 9];
         } else if letters.g(923) {
             *local = *kept;
         } else if letters.g(520) {
             named(letters).for_each(|i| local[i] = 0.0);
+            *kept = *local;
         }
     }
 
     /// G10.
-    fn work(&mut self, number: u8, out: &Builder, view: &View<'_, '_>, sources: &dyn Sources, place: Frame) -> Result<(), Untold> {
+    fn work(&mut self, number: u8, out: &Builder, view: &View<'_, '_>, sources: &dyn Sources, places: &Places<'_, '_>) -> Result<(), Untold> {
         let Some(letters) = Letters::at(sources, view.source.file, view.source.line).filter(|l| l.g(100)) else { return Ok(()) };
         if !sets_here(sources, view.source) {
             if number_of(sources, 'l', view.source) == Some(2) {
@@ -377,10 +379,9 @@ impl<'a> Stands<'a> {
         let state = out.state();
         let mut lag = lag(out, view);
         if number != state.work {
-            // Seen from where the machine file puts the other one.
-            let there = placed_by(self.machine, number);
+            // Seen from where the other one is put.
             let here = work_shift(state).apply(out.pose().xyz());
-            let seen = there.inverse().then(&place).apply(here);
+            let seen = places.of(number).inverse().then(&places.of(state.work)).apply(here);
             (0..3).for_each(|i| lag[i] += seen[i] - here[i]);
         }
         if state.rotation != 0.0 && (lag[0].abs() > ROUNDING || lag[1].abs() > ROUNDING) {

@@ -352,8 +352,13 @@ pub fn sample(target: &str) -> RobotProgram {
         if NO_ANALOG.contains(&target) && matches!(&step.action, Action::Signal { word, .. } if word.code == "S") {
             step.action = Action::Comment("S12000".into());
         }
-        if target == "nachi" && let Action::ChangeTool { by: Some(by), .. } = &mut step.action {
-            *by = Signal { routine: Some("9".into()), ..Signal::default() };
+        // Their routines take no number.
+        if let Action::ChangeTool { by, .. } = &mut step.action {
+            match target {
+                "nachi" => *by = None,
+                "delmia-xml" => *by = Some(signal("GO[1]")),
+                _ => {}
+            }
         }
     }
     program
