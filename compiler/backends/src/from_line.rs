@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 
 use crate::sources::{SYSTEMS, Words, is_hidden, sets_here};
 use gr_ir::Sources;
-use gr_ir::{Axes, Builder, FrameId, Marker, Note, Op, Override, PathMode, Pose, Program, Source, State, Turn, Units};
+use gr_ir::{Axes, Builder, FrameId, Marker, Note, Op, Override, Pose, Program, Source, State, Turn, Units};
 use gr_text::{Diagnostic, FileId, Span, code};
 
 /// Line number of operations that no source line asked for.
@@ -26,6 +26,19 @@ pub struct Options {
     /// Axes whose numbers rest on what no file names. The tool is brought there only where the program cuts before it
     /// names them.
     pub unsure: [bool; 9],
+    /// How high and how far out the approach goes, where that has been found before; goes before `safe_z`.
+    pub room: Option<Room>,
+}
+
+/// How high and how far out an approach goes, in the work frame in force, mm.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Room {
+    /// Above the part, spindle and all.
+    pub safe: f64,
+    /// As low as the program's own rapids go sideways, if any do.
+    pub lowest: Option<f64>,
+    /// Outside of the part on a lathe: the greatest X.
+    pub out: f64,
 }
 
 /// A program that begins later, and what there is to say about it.
@@ -39,6 +52,12 @@ pub struct Restart {
     pub goal: [Option<f64>; 9],
     /// Where the program itself first sends each axis in the work frame; none: nowhere by a word of its own.
     pub named: [Option<f64>; 9],
+    /// By how much G92 has shifted the axes it named, mm and rad: numbers that come from where the tool stood.
+    pub shifted: [Option<f64>; 9],
+    /// By how much G10 L20 has changed the axes it named of work offsets, by their number: the same.
+    pub kept: BTreeMap<u8, [Option<f64>; 9]>,
+    /// How high and how far out it is brought there.
+    pub room: Room,
 }
 
 /// Lets a program begin at `line` (from 1) of `file`.
@@ -76,10 +95,11 @@ pub fn from_line(
     }
     let (state, pose) = (*cursor.state(), *cursor.pose());
     let length = length_to_come(program, found.index, &state);
-    let safe = match options.safe_z {
+    let safe = match (options.room, options.safe_z) {
+        (Some(room), _) => room.safe,
         // What is asked for is the height of the tool; where its length is not in force yet, the spindle goes higher.
-        Some(z) => z + length.unwrap_or(0.0),
-        None => {
+        (None, Some(z)) => z + length.unwrap_or(0.0),
+        (None, None) => {
             let top = top(program, &state);
             notes.push(no_height(place, top));
             top
@@ -91,12 +111,15 @@ pub fn from_line(
     if length == Some(0.0) {
         notes.push(Diagnostic::new(code::FROM_LINE_BARE_SPINDLE, place.0, place.1, &[state.tool.to_string()]));
     }
-    if let Some(lowest) = approach::lowest_crossing(program, &state).filter(|lowest| safe.max(pose.axes[2]) < lowest - SAME_HEIGHT) {
-        let heights = [safe.max(pose.axes[2]), lowest].map(|z| format!("{z:.3}"));
+    let found_room = || Room { safe: safe.max(pose.axes[2]), lowest: approach::lowest_crossing(program, &state), out: approach::outmost(program, &state) };
+    let room = options.room.unwrap_or_else(found_room);
+    if let Some(lowest) = room.lowest.filter(|lowest| room.safe < lowest - SAME_HEIGHT) {
+        let heights = [room.safe, lowest].map(|z| format!("{z:.3}"));
         notes.push(Diagnostic::new(code::FROM_LINE_LOW_HEIGHT, place.0, place.1, &heights));
     }
-    if let Some((_, source)) = kept_here(program, found.index, sources).into_values().next() {
-        let (file, span) = sources.place(source);
+    let kept = kept_here(program, found.index, sources);
+    if let Some((_, source)) = kept.values().next() {
+        let (file, span) = sources.place(*source);
         notes.push(Diagnostic::new(code::FROM_LINE_OFFSET_KEPT, file, span, &[]));
     }
     let lathe = approach::is_lathe(program);
@@ -118,9 +141,48 @@ pub fn from_line(
     // On a lathe no height is safe, and a cut has none that nobody named: the program begins as it begins itself.
     let wait = !known[2] && !lathe && !needed[2] && used[2];
     let from = From { index: found.index, line, known, wait, lathe };
-    let restart = build(program, &from, &state, &pose, safe.max(pose.axes[2]), sources);
+    let restart = build(program, &from, &state, &pose, &room, sources);
     let goal = std::array::from_fn(|i| known[i].then_some(pose.axes[i]));
-    Ok(Restart { program: restart, notes, goal, named })
+    let (shifted, kept) = (shifted(program, found.index, sources), set_from_here(program, found.index, sources));
+    Ok(Restart { program: restart, notes, goal, named, shifted, kept, room })
+}
+
+/// By how much G10 L20 has changed the axes it named of work offsets.
+fn set_from_here(program: &Program, index: usize, sources: &dyn Sources) -> BTreeMap<u8, [Option<f64>; 9]> {
+    let mut out: BTreeMap<u8, [Option<f64>; 9]> = BTreeMap::new();
+    for step in own(program, index).filter(|s| sets_here(sources, s.source)) {
+        let state = *program.cursor_at(step.index).state();
+        let (number, by) = match step.op {
+            Op::WorkOffset(n, offset) if n == state.work => (n, std::array::from_fn(|i| offset[i] - state.work_offset[i])),
+            Op::WorkOffset(number, offset) | Op::StoredOffset { number, offset, .. } => (number, offset),
+            _ => continue,
+        };
+        let Some(words) = Words::at(sources, step.source.file, step.source.line) else { continue };
+        let sum = out.entry(number).or_default();
+        (0..9).filter(|i| words.has(AXIS_LETTERS[*i])).for_each(|i| sum[i] = Some(sum[i].unwrap_or(0.0) + by[i]));
+    }
+    out
+}
+
+/// By how much G92 has shifted the axes it named, as far as that is still in force.
+fn shifted(program: &Program, index: usize, sources: &dyn Sources) -> [Option<f64>; 9] {
+    let mut out = [None; 9];
+    for step in own(program, index) {
+        let Op::LocalOffset(offset) = step.op else { continue };
+        let Some(words) = Words::at(sources, step.source.file, step.source.line) else { continue };
+        if [921, 922].into_iter().any(|g| words.g(g)) {
+            out = [None; 9];
+        }
+        for i in (0..9).filter(|i| words.has(AXIS_LETTERS[*i])) {
+            out[i] = words.g(920).then_some(offset[i]);
+        }
+    }
+    out
+}
+
+/// What the program itself does before an operation.
+fn own(program: &Program, index: usize) -> impl Iterator<Item = gr_ir::Step<'_>> {
+    program.steps().take(index).skip(crate::begins(program))
 }
 
 fn no_height(place: (FileId, Span), top: f64) -> Diagnostic {
@@ -372,7 +434,8 @@ fn says(axis: usize, start: &Pose, end: &Pose, source: Source, sources: &dyn Sou
     start.axes[axis] != end.axes[axis] || words().is_some_and(|w| w.has(AXIS_LETTERS[axis]) || home(&w))
 }
 
-fn build(program: &Program, from: &From, state: &State, pose: &Pose, safe: f64, sources: &dyn Sources) -> Program {
+fn build(program: &Program, from: &From, state: &State, pose: &Pose, room: &Room, sources: &dyn Sources) -> Program {
+    let safe = room.safe;
     let index = from.index;
     // A place that no program names, so that every axis of the approach moves and has its word.
     let used = axes_used(program);
@@ -393,12 +456,12 @@ fn build(program: &Program, from: &From, state: &State, pose: &Pose, safe: f64, 
     out.names_of(program);
     let source = Source { line: INSERTED, ..Source::default() };
     // The line that asked for the offset knows more than the offset: of a tool that was never measured it is 0.
-    let own = program.steps().take(index).skip(crate::begins(program));
-    let offset = own.filter(|s| matches!(s.op, Op::ToolOffset(_))).last().map(|s| s.source);
+    let offset = own(program, index).filter(|s| matches!(s.op, Op::ToolOffset(_))).last().map(|s| s.source);
     let mut restore = Restore { out, source };
     restore.push(Op::Note(Note::Comment, &format!("restart at line {}", from.line)));
     restore.stored(program, index, sources);
-    restore.frame(state, named);
+    let shifts = own(program, index).any(|s| matches!(s.op, Op::LocalOffset(_)));
+    restore.frame(state, named, shifts);
     restore.tool(state, offset);
     if units_under_offset(program, index) {
         // The same change again, which shows in no motion: G28 depends on it.
@@ -406,7 +469,7 @@ fn build(program: &Program, from: &From, state: &State, pose: &Pose, safe: f64, 
         restore.push(Op::Units(other));
         restore.push(Op::Units(state.units));
     }
-    restore.modes(state);
+    restore.modes(state, says_path(program, index, from.line, sources));
     restore.outputs(program, index);
     let mut waiting = from.wait;
     let mut goal = *pose;
@@ -419,7 +482,7 @@ fn build(program: &Program, from: &From, state: &State, pose: &Pose, safe: f64, 
     if from.lathe && !from.known[2] {
         start(&mut restore);
     } else {
-        approach::Approach { program, index, state, goal, approached, safe }.make(&mut restore, start);
+        approach::Approach { program, index, state, goal, approached, room }.make(&mut restore, start);
     }
     let mut out = restore.out;
     let mut rest = program.cursor_at(index);
@@ -452,6 +515,19 @@ fn kept_here(program: &Program, index: usize, sources: &dyn Sources) -> BTreeMap
     kept
 }
 
+/// What a step of G10 L2 stores: of the work offset in force too, which it sets by operations of its own.
+fn set_by(program: &Program, step: &gr_ir::Step<'_>, sources: &dyn Sources) -> Option<Op<'static>> {
+    match step.op {
+        Op::StoredOffset { number, offset, rotation } => Some(Op::StoredOffset { number, offset, rotation }),
+        Op::WorkOffset(..) | Op::Rotation(_) if Words::at(sources, step.source.file, step.source.line)?.g(100) && !sets_here(sources, step.source) => {
+            let cursor = program.cursor_at(step.index + 1);
+            let s = cursor.state();
+            Some(Op::StoredOffset { number: s.work, offset: s.work_offset, rotation: s.rotation })
+        }
+        _ => None,
+    }
+}
+
 /// Whether the program says before a line which work offset is in force: by an operation, or by a line that selects what
 /// was in force already.
 fn names_system(program: &Program, index: usize, line: u32, sources: &dyn Sources) -> bool {
@@ -459,6 +535,15 @@ fn names_system(program: &Program, index: usize, line: u32, sources: &dyn Source
     let selected = |s: &gr_ir::Step<'_>| s.index >= begun && matches!(s.op, Op::WorkOffset(..));
     program.steps().take(index).any(|s| selected(&s))
         || (0..line).map_while(|l| Words::at(sources, FileId(0), l)).any(|w| SYSTEMS[1..].iter().any(|g| w.g(*g)))
+}
+
+/// Whether the program says before a line how the path is followed (G61, G61.1, G64): by an operation, or by a line that asks for what
+/// was in force already.
+fn says_path(program: &Program, index: usize, line: u32, sources: &dyn Sources) -> bool {
+    let says = |w: Words| [610, 611, 640].iter().any(|g| w.g(*g));
+    let ops = own(program, index).filter(|s| matches!(s.op, Op::PathMode(_)));
+    ops.filter_map(|s| Words::at(sources, s.source.file, s.source.line)).any(says)
+        || (0..line.saturating_sub(1)).map_while(|l| Words::at(sources, FileId(0), l)).any(says)
 }
 
 /// Whether a shift by G92 is put away by G92.2 where the program begins, and comes back by G92.3.
@@ -494,15 +579,16 @@ impl Restore {
         self.out.push(op, self.source);
     }
 
-    /// `named`: the program says which work offset is in force. What it leaves to the machine stays with the machine.
-    fn frame(&mut self, s: &State, named: bool) {
+    /// `named`: the program says which work offset is in force. `shifts`: it says how the frame is shifted, if by nothing (G92.1, G52
+    /// X0). What it leaves to the machine stays with the machine.
+    fn frame(&mut self, s: &State, named: bool, shifts: bool) {
         self.push(Op::Units(s.units));
         self.push(Op::Plane(s.plane));
         if named {
             self.push(Op::WorkOffset(s.work, s.work_offset));
             self.push(Op::Rotation(s.rotation));
         }
-        if s.local_offset != [0.0; 9] {
+        if shifts || s.local_offset != [0.0; 9] {
             self.push(Op::LocalOffset(s.local_offset));
         }
     }
@@ -511,14 +597,13 @@ impl Restore {
     /// stays with the machine.
     fn stored(&mut self, program: &Program, index: usize, sources: &dyn Sources) {
         let kept = kept_here(program, index, sources);
-        let stored = program.steps().take(index).filter(|s| matches!(s.op, Op::StoredOffset { .. }));
         // Of a line in a loop the last pass counts.
-        let last: BTreeMap<_, _> = stored.map(|s| ((s.source.file, s.source.line), s)).collect();
+        let last: BTreeMap<_, _> = own(program, index).filter_map(|s| Some(((s.source.file, s.source.line), (s, set_by(program, &s, sources)?)))).collect();
         let mut last: Vec<_> = last.into_values().collect();
-        last.sort_by_key(|s| s.index);
-        for step in last {
-            if !matches!(step.op, Op::StoredOffset { number, .. } if kept.contains_key(&number)) {
-                self.out.push(step.op, step.source);
+        last.sort_by_key(|(s, _)| s.index);
+        for (step, op) in last {
+            if !matches!(op, Op::StoredOffset { number, .. } if kept.contains_key(&number)) {
+                self.out.push(op, step.source);
             }
         }
         for op in kept.into_values().map(|(op, _)| op) {
@@ -540,8 +625,10 @@ impl Restore {
         }
     }
 
-    fn modes(&mut self, s: &State) {
-        if s.path != PathMode::default() || s.merge_tolerance != 0.0 {
+    /// `paths`: the program says how the path is followed.
+    fn modes(&mut self, s: &State, paths: bool) {
+        // A mode that a canned cycle has left behind it is none that the program asked for.
+        if paths || s.merge_tolerance != 0.0 {
             self.push(Op::PathMode(s.path));
             self.push(Op::MergeTolerance(s.merge_tolerance));
         }

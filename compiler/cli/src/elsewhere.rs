@@ -4,21 +4,22 @@
 //! such a machine, and must go the same way. It is a look from outside: it shares nothing with the writer but the interpreter.
 
 use gr_backends::Sources;
-use gr_backends::from_line::Restart;
+use gr_backends::from_line::{self, Restart};
 use gr_backends::sources::Words;
 use gr_interp::{ASSUMED, Setup};
 use gr_ir::diff::{Aspect, Diff, Difference, Tolerance, diff};
-use gr_ir::{Marker, Op, Program, Source, plane_axes};
+use gr_ir::{Builder, FileId, Marker, Op, Program, Source, plane_axes};
 use gr_machine::math::Frame;
 use gr_machine::{Kind, Machine};
 use gr_robot::Coordinates;
 use gr_spec::{Dialect, Family};
 use gr_text::{Diagnostic, code};
 
-use crate::pipeline::{Motion, Unit, motion_of, motion_with};
+use crate::pipeline::{Begun, Motion, Unit, motion_of, motion_with};
 
-/// Where the translation goes another way: read back as it is, or on such a machine.
-pub fn differs(unit: &Unit, source: &Motion, written: &str, to: &'static Dialect, length: f64) -> Option<Diagnostic> {
+/// Where the translation goes another way: read back as it is, or on such a machine. `begins`: from which of its lines on, from 0, it
+/// is that of the source.
+pub fn differs(unit: &Unit, source: &Motion, (written, begins): (&str, Option<u32>), to: &'static Dialect, length: f64) -> Option<Diagnostic> {
     // Times follow from the ways; the numbers of tools are told elsewhere.
     let tolerance = Tolerance { rate: 1e-3, limit: 50, ..Tolerance::within(length) };
     let mut there = Setup { dialect: to, ..unit.setup.clone() };
@@ -32,6 +33,20 @@ pub fn differs(unit: &Unit, source: &Motion, written: &str, to: &'static Dialect
         Some(Diagnostic::new(code, file, span, args))
     };
     let again = |setup: &Setup| motion_of("<translation>", written.to_string(), setup).program;
+    let differs_elsewhere = || {
+        // Of a program that begins later, the way to its first block is its own.
+        let aspects: &[Aspect] = if source.begun.is_some() { &[Aspect::Path] } else { &[Aspect::Path, Aspect::Feed, Aspect::Event] };
+        let other = |change: Change<'_>| {
+            let program = again(&change(&there));
+            let begins = begins.and_then(|line| program.steps().find(|s| s.source.line >= line).map(|s| s.index));
+            begins.map(|i| from(&program, i)).unwrap_or(program)
+        };
+        let (first, why) = first(unit, source, &tolerance, aspects, other)?;
+        told(&first, code::EMIT_ELSEWHERE, &[why.machine().into(), why.remedy().into()])
+    };
+    if source.begun.is_some() {
+        return differs_elsewhere();
+    }
     let read = again(&there);
     let mut same = diff(&source.program, &read, &tolerance).differences;
     if same.iter().any(|d| d.aspect == Aspect::Feed) {
@@ -53,8 +68,7 @@ pub fn differs(unit: &Unit, source: &Motion, written: &str, to: &'static Dialect
     if let Some(difference) = worst {
         return told(difference, code::EMIT_NOT_EQUAL, std::slice::from_ref(&difference.message));
     }
-    let (first, why) = first(unit, source, &tolerance, &[Aspect::Path, Aspect::Feed, Aspect::Event], |change| again(&change(&there)))?;
-    told(&first, code::EMIT_ELSEWHERE, &[why.machine().into(), why.remedy().into()])
+    differs_elsewhere()
 }
 
 /// Two programs that go the same way in the simulation, compared on such a machine.
@@ -75,6 +89,37 @@ fn lowered(unit: &Unit, setup: &Setup) -> Program {
     motion_with(unit, setup).program
 }
 
+/// The same of a program that begins later; none where it doesn't get there on such a machine.
+fn begun(unit: &Unit, setup: &Setup, begun: Option<Begun>) -> Option<Program> {
+    let motion = motion_with(unit, setup);
+    let Some(Begun { line, unsure, room }) = begun else { return Some(motion.program) };
+    let options = from_line::Options { unsure, room: Some(room), ..from_line::Options::default() };
+    let restart = from_line::from_line(&motion.program, FileId(0), line, &options, &crate::emit::texts(&motion)).ok()?.program;
+    let way = restart.steps().filter(|s| s.source.line == from_line::INSERTED).last()?.index;
+    Some(from(&restart, way + 1))
+}
+
+/// A program from one of its operations on.
+fn from(program: &Program, index: usize) -> Program {
+    let mut rest = program.cursor_at(index);
+    let mut out = Builder::from_state(*rest.pose(), *rest.state());
+    out.names_of(program);
+    while let Some(view) = rest.next() {
+        out.push_to(view.op, view.end, view.source);
+    }
+    out.finish()
+}
+
+/// Where the machine stands before a program, as a setup has it.
+fn start_of(program: &Program, setup: &Setup) -> [f64; 9] {
+    let length = if setup.machine_units == gr_canon::Units::Inch { 25.4 } else { 1.0 };
+    let mut at = program.start_state().machine(&program.start().axes);
+    for (i, v) in at.iter_mut().enumerate() {
+        *v = if (3..6).contains(&i) { v.to_degrees() } else { *v / length };
+    }
+    at
+}
+
 /// Axes whose place a restart knows only because the simulation takes something for given that no file says.
 pub struct Doubt {
     /// These.
@@ -93,23 +138,32 @@ impl Doubt {
 }
 
 /// Runs a program that begins later on such machines too: `here`, and how `restart` begins it there.
-pub fn doubt(unit: &Unit, motion: &Motion, here: &Restart, restart: impl Fn(&Motion) -> Option<Restart>) -> Option<Doubt> {
+/// `placed`: the part is where a machine file says, whatever is in store.
+pub fn doubt(unit: &Unit, motion: &Motion, here: &Restart, placed: bool, restart: impl Fn(&Motion) -> Option<Restart>) -> Option<Doubt> {
     if motion.plan.is_some() || unit.setup.dialect.family == Family::Ufmg2008 {
         return None;
     }
     let mut doubt: Option<Doubt> = None;
-    for machine in machines(motion) {
+    for machine in &machines(motion) {
         // Both returns of a cycle are clear of the part.
-        for unknown in Unknown::ALL.into_iter().filter(|u| *u != Unknown::Return && u.is(&unit.setup, motion)) {
+        let counts = |u: &Unknown| *u != Unknown::Return && (u.is(&unit.setup, motion) || placed && *u == Unknown::Stored);
+        for unknown in Unknown::ALL.into_iter().filter(counts) {
             let mut setup = unit.setup.clone();
             unknown.change(&mut setup, machine);
             // A program that ends before on such a machine is not for it.
             let Some(there) = restart(&motion_with(unit, &setup)) else { continue };
             let other = |a: f64, b: f64| (a - b).abs() > NEAR_ENOUGH;
-            let away = |i: usize| match here.goal[i] {
-                Some(goal) => there.goal[i].is_none_or(|t| other(t, goal)),
-                // It stays where it is, and a step (G91) from there is one from another place.
-                None => here.named[i].zip(there.named[i]).is_some_and(|(h, t)| other(h, t)),
+            let apart = |a: Option<f64>, b: Option<f64>| a.zip(b).is_some_and(|(a, b)| other(a, b));
+            // Where G92 is in force already, it counts from there: that is told of what is written.
+            let fresh = machine.local == 0.0;
+            let kept = |i: usize| here.kept.iter().any(|(n, h)| there.kept.get(n).is_some_and(|t| apart(h[i], t[i])));
+            let away = |i: usize| {
+                let elsewhere = match here.goal[i] {
+                    Some(goal) => there.goal[i].is_none_or(|t| other(t, goal)),
+                    // It stays where it is, and a step (G91) from there is one from another place.
+                    None => apart(here.named[i], there.named[i]),
+                };
+                elsewhere || fresh && (apart(here.shifted[i], there.shifted[i]) || placed && kept(i))
             };
             if (0..9).any(away) {
                 let first = Doubt { axes: [false; 9], machine: unknown.machine(), remedy: unknown.remedy() };
@@ -201,12 +255,19 @@ fn first(
             which.iter().for_each(|u| u.change(&mut setup, machine));
             setup
         };
-        let found = diff(&lowered(unit, &change(&unit.setup)), &other(&change), tolerance).differences;
+        let a = begun(unit, &change(&unit.setup), motion.begun)?;
+        let from = motion.begun.map(|_| start_of(&a, &unit.setup));
+        let change = |setup: &Setup| {
+            let mut setup = change(setup);
+            setup.start = from.unwrap_or(setup.start);
+            setup
+        };
+        let found = diff(&a, &other(&change), tolerance).differences;
         aspects.iter().find_map(|a| found.iter().find(|d| d.aspect == *a).cloned())
     };
-    for machine in machines(motion) {
+    for machine in &machines(motion) {
         // What differs on every machine is told elsewhere.
-        let new = |d: &Difference| d.aspect == Aspect::Path || look(&[], machine).is_none();
+        let new = |d: &Difference| d.aspect == Aspect::Path && motion.begun.is_none() || look(&[], machine).is_none();
         let Some(all) = look(&unknown, machine).filter(new) else { continue };
         let alone = unknown.iter().find_map(|u| look(&[*u], machine).map(|d| (d, *u)));
         return Some(alone.unwrap_or((all, unknown[0])));
@@ -278,7 +339,10 @@ impl Unknown {
                 for system in 0..9u32 {
                     setup.params.insert(5230 + 20 * system, n.rotation * f64::from(1 + system));
                 }
-                setup.params.insert(5210, 1.0);
+                setup.params.insert(5210, n.local);
+                // Numbers of the user's own, which a parameter file may keep.
+                let own = if setup.dialect.family == Family::Fanuc { 500..1000 } else { 31..5001 };
+                setup.params.extend(own.filter(|_| n.own != 0.0).map(|k| (k, n.own)));
             }
             Unknown::Tools => {
                 for tool in setup.tools.rows.iter_mut().skip(1).filter(|t| &*t.comment == ASSUMED) {
@@ -303,18 +367,27 @@ struct Numbers {
     step: f64,
     /// By what work offsets are turned, degrees, each by as much again.
     rotation: f64,
+    /// Whether G92 is in force.
+    local: f64,
+    /// Of a user's own number; 0 where the program reads none.
+    own: f64,
     length: f64,
     start: f64,
 }
 
-const NEAR: Numbers = Numbers { system: 2.0, origin: 1.5, step: 2.25, rotation: 0.0, length: 3.5, start: 0.625 };
-const BELOW: Numbers = Numbers { system: 1.0, origin: -411.5, step: 12.25, rotation: 7.5, length: 93.5, start: -41.375 };
-const ABOVE: Numbers = Numbers { system: 9.0, origin: 211.5, step: 31.25, rotation: 0.0, length: 193.5, start: 141.375 };
+const NEAR: Numbers = Numbers { system: 2.0, origin: 1.5, step: 2.25, rotation: 0.0, local: 0.0, own: 0.5, length: 3.5, start: 0.625 };
+const BELOW: Numbers = Numbers { system: 1.0, origin: -411.5, step: 12.25, rotation: 7.5, local: 1.0, own: 3.0, length: 93.5, start: -41.375 };
+const ABOVE: Numbers = Numbers { system: 9.0, origin: 211.5, step: 31.25, rotation: 0.0, local: 1.0, own: -2.25, length: 193.5, start: 141.375 };
 
 /// Origins above and below the machine's zero tell whether heights depend on them; where the program asks what its values
 /// are, it may take another branch on others.
-fn machines(motion: &Motion) -> &'static [Numbers] {
-    let asks = |text: &str| text.lines().any(|l| l.contains('#') && l.contains(['5', '<']));
-    let branches = motion.sources.iter().any(|(_, f)| asks(&f.text));
-    if branches { &[NEAR, BELOW, ABOVE] } else { &[NEAR, BELOW] }
+fn machines(motion: &Motion) -> Vec<Numbers> {
+    let any = |asks: fn(&str) -> bool| motion.sources.iter().any(|(_, f)| f.text.lines().any(asks));
+    if any(|l| l.contains('#') && l.contains(['5', '<'])) {
+        vec![NEAR, BELOW, ABOVE]
+    } else if any(|l| l.contains('#')) {
+        vec![NEAR, BELOW]
+    } else {
+        [NEAR, BELOW].map(|n| Numbers { own: 0.0, ..n }).into()
+    }
 }

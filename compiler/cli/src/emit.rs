@@ -18,7 +18,7 @@ use crate::options::UnitArg;
 use crate::commands::check::Checked;
 use crate::elsewhere;
 use crate::output::Pending;
-use crate::pipeline::{Motion, Unit, motion, run};
+use crate::pipeline::{Begun, Motion, Unit, motion, run};
 use crate::sources::Sources;
 
 /// Options of targets; `gcc-robot target show` says which target heeds which.
@@ -365,8 +365,8 @@ fn calls(unit: &Unit, program: String, tools: Option<gr_interp::ToolTable>) -> V
 
 fn of_motion(mut motion: Motion, unit: &Unit, goal: &Goal<'_>) -> Result<Built, String> {
     let rests = goal.machine.filter(|_| crate::robot::is_for_machine(goal)).and_then(|m| elsewhere::rests(unit, &motion, m));
-    if let Some((line, safe_z)) = goal.from_line {
-        restart(&mut motion, unit, line, safe_z);
+    if let Some(from) = goal.from_line {
+        restart(&mut motion, unit, from, goal.machine.is_some() && crate::robot::is_for_machine(goal));
     }
     if motion.found.iter().any(|d| d.severity == gr_text::Severity::Error) {
         return Ok(built(motion, Vec::new(), Vec::new()));
@@ -447,18 +447,19 @@ fn built(motion: Motion, artifacts: Vec<Artifact>, more: Vec<Diagnostic>) -> Bui
     Built { artifacts, written: None, found, sources: motion.sources, subs: motion.subs, tools, table, summary: None }
 }
 
-/// Lets the program begin later.
-fn restart(motion: &mut Motion, unit: &Unit, line: u32, safe_z: Option<f64>) {
+/// Lets the program begin later. `placed`: a machine file says where the part is.
+fn restart(motion: &mut Motion, unit: &Unit, (line, safe_z): (u32, Option<f64>), placed: bool) {
     let begin = |motion: &Motion, unsure| {
-        let options = gr_backends::from_line::Options { safe_z, unsure };
+        let options = gr_backends::from_line::Options { safe_z, unsure, room: None };
         gr_backends::from_line::from_line(&motion.program, FileId(0), line, &options, &texts(motion))
     };
-    let sure = [false; 9];
-    let doubt = |made: &Result<Restart, _>| elsewhere::doubt(unit, motion, made.as_ref().ok()?, |there| begin(there, sure).ok());
-    let mut made = begin(motion, sure);
+    let mut unsure = [false; 9];
+    let doubt = |made: &Result<Restart, _>| elsewhere::doubt(unit, motion, made.as_ref().ok()?, placed, |there| begin(there, [false; 9]).ok());
+    let mut made = begin(motion, unsure);
     let mut doubted = doubt(&made);
     if let Some(first) = doubted {
-        made = begin(motion, first.axes);
+        unsure = first.axes;
+        made = begin(motion, unsure);
         doubted = doubt(&made);
     }
     if let Some(doubt) = doubted {
@@ -468,6 +469,7 @@ fn restart(motion: &mut Motion, unit: &Unit, line: u32, safe_z: Option<f64>) {
     }
     match made {
         Ok(restart) => {
+            motion.begun = Some(Begun { line, unsure, room: restart.room });
             motion.program = restart.program;
             motion.found.extend(restart.notes);
         }
@@ -641,7 +643,7 @@ fn normalised(motion: &Motion, unit: &Unit, options: &TargetOptions, name: &str)
     }
     let texts = texts(motion);
     Ok(rs274ngc::emit(&motion.program, &o, &texts).and_then(|mut e| {
-        e.notes.extend(state_told(motion, unit, options, &o, &e.text));
+        e.notes.extend(state_told(motion, unit, options, &o, &e));
         if e.notes.iter().any(|d| d.severity == gr_text::Severity::Error) {
             return Err(e.notes);
         }
@@ -655,21 +657,24 @@ fn normalised(motion: &Motion, unit: &Unit, options: &TargetOptions, name: &str)
 const FINEST: usize = 9;
 
 /// What is to be said of a translation that depends on values nobody has named.
-fn state_told(motion: &Motion, unit: &Unit, options: &TargetOptions, o: &rs274ngc::Options, text: &str) -> Option<Diagnostic> {
-    let begins_later = motion.program.steps().any(|s| s.source.line == gr_backends::from_line::INSERTED);
-    if motion.plan.is_some() || begins_later || options.robot.compensate || options.tool_change_at.is_some() {
+fn state_told(motion: &Motion, unit: &Unit, options: &TargetOptions, o: &rs274ngc::Options, written: &rs274ngc::Emitted) -> Option<Diagnostic> {
+    if motion.plan.is_some() || options.robot.compensate || options.tool_change_at.is_some() {
         return None;
     }
     let to = gr_spec::Dialect::find(options.to.as_deref().unwrap_or("linuxcnc"))?;
-    let differs = |text: &str| elsewhere::differs(unit, motion, text, to, allowed(options).max(1e-3) + 4.0 * o.arc_tolerance);
-    let found = differs(text)?;
+    let begins = |e: &rs274ngc::Emitted| {
+        let first = motion.begun?.line - 1;
+        e.lines.iter().position(|l| *l >= first && *l != u32::MAX).map(|k| k as u32)
+    };
+    let differs = |e: &rs274ngc::Emitted| elsewhere::differs(unit, motion, (&e.text, begins(e)), to, allowed(options).max(1e-3) + 4.0 * o.arc_tolerance);
+    let found = differs(written)?;
     if found.code != code::EMIT_NOT_EQUAL || o.decimals >= Some(FINEST) {
         return Some(found);
     }
     // Where points are closer than a decimal, roundings meet; what is the same with all decimals is the same.
     let finest = rs274ngc::Options { decimals: Some(FINEST), ..o.clone() };
     match rs274ngc::emit(&motion.program, &finest, &texts(motion)) {
-        Ok(finest) => differs(&finest.text),
+        Ok(finest) => differs(&finest),
         Err(_) => Some(found),
     }
 }

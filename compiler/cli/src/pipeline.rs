@@ -135,6 +135,19 @@ pub struct Motion {
     pub increments: bool,
     /// There is no tool table.
     pub no_tool_table: bool,
+    /// Where it begins instead of at its beginning.
+    pub begun: Option<Begun>,
+}
+
+/// How a program was made to begin later.
+#[derive(Clone, Copy)]
+pub struct Begun {
+    /// Line, from 1.
+    pub line: u32,
+    /// As in [`gr_backends::from_line::Options`].
+    pub unsure: [bool; 9],
+    /// How high and how far out the approach goes.
+    pub room: gr_backends::from_line::Room,
 }
 
 /// Runs, lowers and checks a program.
@@ -171,7 +184,7 @@ fn plain(motion: gr_driver::Motion) -> Motion {
     for (name, text) in motion.texts {
         sources.add(name, text);
     }
-    Motion { program: motion.program, sources, subs: motion.subs, found: Vec::new(), plan: None, setups: Vec::new(), increments: false, no_tool_table: false }
+    Motion { program: motion.program, sources, subs: motion.subs, found: Vec::new(), plan: None, setups: Vec::new(), increments: false, no_tool_table: false, begun: None }
 }
 
 /// Motion of a program for a machine, in whatever language it is.
@@ -192,5 +205,5 @@ fn ufmg(name: &str, text: &str, dialect: &'static gr_spec::Dialect, machine: Opt
     found.extend(more);
     let mut sources = Sources::default();
     sources.add(name, text);
-    Motion { program, sources, subs: Vec::new(), found, plan: None, setups: Vec::new(), increments: false, no_tool_table: false }
+    Motion { program, sources, subs: Vec::new(), found, plan: None, setups: Vec::new(), increments: false, no_tool_table: false, begun: None }
 }

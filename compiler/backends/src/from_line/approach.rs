@@ -3,7 +3,7 @@
 
 use gr_ir::{FeedMode, Op, Plane, Pose, Program, State, Turn};
 
-use super::{Restore, axes_used};
+use super::{Restore, Room, axes_used};
 
 /// How far before the place rapid ends and feed begins, mm.
 const CLEARANCE: f64 = 2.0;
@@ -18,8 +18,8 @@ pub(super) struct Approach<'a> {
     pub goal: Pose,
     /// Axes that go there; of the others nobody knows where they are.
     pub approached: [bool; 9],
-    /// Safe height in the work frame, mm.
-    pub safe: f64,
+    /// How high and how far out.
+    pub room: &'a Room,
 }
 
 /// Places of an approach, one after the other.
@@ -65,11 +65,11 @@ impl Approach<'_> {
     }
 
     fn from_above(&self, ways: &mut Ways) {
-        let (height, safe) = (self.goal.axes[2], self.safe);
+        let (height, safe) = (self.goal.axes[2], self.room.safe);
         ways.go([2], |_| safe);
         ways.go((0..9).filter(|i| *i != 2), |i| self.goal.axes[i]);
         ways.start = ways.places.len();
-        let rapids = lowest_crossing(self.program, self.state).unwrap_or(safe);
+        let rapids = self.room.lowest.unwrap_or(safe);
         ways.go([2], |_| if height < safe { (height + CLEARANCE).max(rapids).min(safe) } else { safe });
     }
 
@@ -80,7 +80,7 @@ impl Approach<'_> {
         let beside = (1..9).filter(|i| *i != 2);
         if is_bore(self.program, self.index) {
             // From the front, at the radius where the program goes by rapid.
-            ways.go([2], |_| self.safe);
+            ways.go([2], |_| self.room.safe);
             ways.go([0], |_| radius.min(goal(0) - CLEARANCE));
             ways.go(beside, goal);
             ways.start = ways.places.len();
@@ -88,7 +88,7 @@ impl Approach<'_> {
             return;
         }
         // From outside: along Z where no stock is, then in as the program came.
-        let out = outmost(self.program, self.state).max(radius);
+        let out = self.room.out.max(radius);
         let there = rapid.is_some_and(|p| p.axes == self.goal.axes);
         ways.go([0], |_| out);
         ways.go(beside, goal);
@@ -165,7 +165,7 @@ fn last_rapid(program: &Program, index: usize) -> Option<Pose> {
 }
 
 /// The greatest X of the whole program, in the work frame of a state.
-fn outmost(program: &Program, state: &State) -> f64 {
+pub(super) fn outmost(program: &Program, state: &State) -> f64 {
     let zero = state.machine(&[0.0; 9])[0];
     let mut most = f64::NEG_INFINITY;
     let mut cursor = program.cursor();

@@ -9,6 +9,8 @@ use gr_text::code;
 
 pub(super) const OFFSETS: [&str; 10] = ["", "G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3"];
 
+/// Places that are nearer to each other are one, mm.
+const SAME_PLACE: f64 = 1e-3;
 /// Height above the place of tool changes in G55, mm.
 const ABOVE_CHANGE: f64 = 5.0;
 
@@ -170,7 +172,7 @@ impl Emitter<'_> {
             }
         }
         let mut words = self.changed_or_named(offset, &old, set);
-        if turned || set.is_some_and(|w| w.has(b'r')) {
+        if turned || self.linuxcnc() && set.is_some_and(|w| w.has(b'r')) {
             if !self.linuxcnc() {
                 return self.cannot("a rotated work offset", view.source);
             }
@@ -219,13 +221,19 @@ impl Emitter<'_> {
     /// What a block (G92, G10 L20) calls the place where an axis stands: where it was written to, which rounding has moved, or
     /// where only the machine knows, the number of the source. None: that is no plain number.
     fn named_here(&self, axis: usize, known: bool, view: &View<'_, '_>) -> Option<f64> {
+        let scale = if axis >= 3 && axis < 6 { 1f64.to_radians() } else if view.state.units == gr_ir::Units::Inch { 25.4 } else { 1.0 };
         if self.loose[axis] {
-            let scale = if axis >= 3 && axis < 6 { 1f64.to_radians() } else if view.state.units == gr_ir::Units::Inch { 25.4 } else { 1.0 };
             return Some(self.literal(AXES[axis], view.source)? * scale);
         }
         // Behind another work offset the place is not known any more; what rounding has moved it by still is.
-        let rounded = (self.at[axis] - view.end.axes[axis]).abs() <= self.w.unit * 10f64.powi(-(self.w.places as i32));
-        Some(if known || rounded { self.at[axis] } else { view.end.axes[axis] })
+        let unit = self.w.unit * 10f64.powi(-(self.w.places as i32));
+        let rounded = (self.at[axis] - view.end.axes[axis]).abs() <= unit;
+        let at = if known || rounded { self.at[axis] } else { view.end.axes[axis] };
+        // LinuxCNC takes another place for the present one where the frame was turned under a shift: what it is called is
+        // what the source says. A lathe's may be a diameter.
+        let near = |v: f64| (v - at).abs() <= 2.0 * unit + SAME_PLACE;
+        let literal = self.literal(AXES[axis], view.source).map(|v| v * scale).filter(|v| !near(*v) && !near(v / 2.0));
+        Some(literal.filter(|_| view.state.local_offset != [0.0; 9]).unwrap_or(at))
     }
 
     /// The plain number behind a letter of a source line.
@@ -261,15 +269,15 @@ impl Emitter<'_> {
         // Where the source says so it is said again: the control may know more than the simulation.
         let asked = [920, 921, 922, 923, 520].into_iter();
         let asked = self.words(view.source).is_some_and(|w| asked.clone().any(|g| w.g(g)));
-        if *offset == old && !asked {
+        let inserted = view.source.line == crate::from_line::INSERTED;
+        if *offset == old && !asked && !inserted {
             return;
         }
-        let inserted = view.source.line == crate::from_line::INSERTED;
         let shift = match self.options.language {
             Language::FanucMill => true,
             // G92 refers to where the machine is, which nobody knows before the first move.
             Language::Linuxcnc => inserted || self.words(view.source).is_some_and(|w| w.g(520)),
-            Language::Grbl if inserted => {
+            Language::Grbl if inserted && *offset != old => {
                 return self.cannot("a shifted work frame (G92) at the start", view.source);
             }
             Language::Grbl => false,
@@ -284,7 +292,8 @@ impl Emitter<'_> {
         // G92 with words names the place where the tool stands; where that is only the machine may know.
         let named = text.filter(|w| w.g(920) && w.names_axes());
         let shift = shift && named.is_none();
-        if offset.iter().all(|v| *v == 0.0) && !shift && named.is_none() {
+        let fanuc = self.options.language == Language::FanucMill;
+        if offset.iter().all(|v| *v == 0.0) && (!shift || inserted && !fanuc) && named.is_none() {
             self.w.block("G92.1");
             return self.motion_unsure();
         }
