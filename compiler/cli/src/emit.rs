@@ -187,6 +187,8 @@ pub struct Built {
     pub sources: Sources,
     /// Subroutine files used.
     pub subs: Vec<PathBuf>,
+    /// Subroutine files that were looked for and are not there.
+    pub missing: Vec<PathBuf>,
     /// Tools of a STEP-NC file, and the tool table that its program needs, if that is its own (mm).
     pub tools: Vec<Tool>,
     /// See `tools`.
@@ -349,7 +351,7 @@ fn of_converted(unit: &Unit, converted: crate::exchange::Converted, goal: &Goal<
     setup.tools = tools;
     let motion = crate::pipeline::motion_of(&format!("{} as G-code", unit.name()), program, &setup);
     let made = of_motion(motion, unit, goal)?;
-    Ok(Built { table: base.table, subs: base.subs, ..made })
+    Ok(Built { table: base.table, subs: base.subs, missing: base.missing, ..made })
 }
 
 /// Canonical calls of a program of our own making.
@@ -444,7 +446,7 @@ fn built(motion: Motion, artifacts: Vec<Artifact>, more: Vec<Diagnostic>) -> Bui
     found.extend(more);
     let table = motion.plan.as_ref().filter(|p| p.own_table).map(|p| gr_planner::tool_table(&p.tools));
     let tools = motion.plan.map(|p| p.tools).unwrap_or_default();
-    Built { artifacts, written: None, found, sources: motion.sources, subs: motion.subs, tools, table, summary: None }
+    Built { artifacts, written: None, found, sources: motion.sources, subs: motion.subs, missing: motion.missing, tools, table, summary: None }
 }
 
 /// Lets the program begin later. `placed`: a machine file says where the part is.
@@ -591,6 +593,7 @@ fn canon(unit: &Unit, file: Option<&Path>) -> Result<Result<(Built, Checked), St
         written,
         found: Vec::new(),
         subs: files.subs().cloned().collect(),
+        missing: files.missing().cloned().collect(),
         ..Built::default()
     };
     // Beside the goal while it is being made; in memory when that can't be, which then says why when it is written.

@@ -113,7 +113,8 @@ pub fn load(path: &Path, station: &Station) -> Result<Unit, Checked> {
 pub fn run<S: Sink>(unit: &Unit, sink: S) -> Result<(S, Loaded, Checked), Checked> {
     let setup = Setup { startup_code: false, ..unit.setup.clone() };
     let streamed = gr_driver::stream(&unit.name(), unit.text.clone(), &setup, Some(&unit.rules()), sink);
-    let checked = if streamed.clean { unit.told(Checked::nothing()) } else { unit.check()? };
+    let sought = || streamed.files.subs().chain(streamed.files.missing()).cloned().collect();
+    let checked = if streamed.clean { unit.told(Checked::nothing()) } else { unit.check().map_err(|c| Checked { sought: sought(), ..c })? };
     Ok((streamed.sink, streamed.files, checked))
 }
 
@@ -125,6 +126,8 @@ pub struct Motion {
     pub sources: Sources,
     /// Files pulled in.
     pub subs: Vec<PathBuf>,
+    /// Files that were looked for and are not there.
+    pub missing: Vec<PathBuf>,
     /// What else was found.
     pub found: Vec<Diagnostic>,
     /// The process plan that it comes from; none for G-code.
@@ -160,7 +163,8 @@ pub fn motion(unit: &Unit, machine: Option<&gr_machine::Machine>) -> Result<(Mot
         return Ok((ufmg(&unit.name(), &unit.text, unit.setup.dialect, machine), checked));
     }
     let motion = gr_driver::lower(&unit.name(), unit.text.clone(), &unit.setup, Some(&unit.rules()));
-    let checked = if motion.clean { unit.told(Checked::nothing()) } else { unit.check()? };
+    let sought = || motion.subs.iter().chain(&motion.missing).cloned().collect();
+    let checked = if motion.clean { unit.told(Checked::nothing()) } else { unit.check().map_err(|c| Checked { sought: sought(), ..c })? };
     Ok((Motion { increments: increments(&unit.setup), no_tool_table: gr_interp::assumed(&unit.setup.tools), ..plain(motion) }, checked))
 }
 
@@ -184,7 +188,7 @@ fn plain(motion: gr_driver::Motion) -> Motion {
     for (name, text) in motion.texts {
         sources.add(name, text);
     }
-    Motion { program: motion.program, sources, subs: motion.subs, found: Vec::new(), plan: None, setups: Vec::new(), increments: false, no_tool_table: false, begun: None }
+    Motion { program: motion.program, sources, subs: motion.subs, missing: motion.missing, found: Vec::new(), plan: None, setups: Vec::new(), increments: false, no_tool_table: false, begun: None }
 }
 
 /// Motion of a program for a machine, in whatever language it is.
@@ -205,5 +209,5 @@ fn ufmg(name: &str, text: &str, dialect: &'static gr_spec::Dialect, machine: Opt
     found.extend(more);
     let mut sources = Sources::default();
     sources.add(name, text);
-    Motion { program, sources, subs: Vec::new(), found, plan: None, setups: Vec::new(), increments: false, no_tool_table: false, begun: None }
+    Motion { program, sources, subs: Vec::new(), missing: Vec::new(), found, plan: None, setups: Vec::new(), increments: false, no_tool_table: false, begun: None }
 }

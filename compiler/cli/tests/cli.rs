@@ -387,6 +387,39 @@ fn watching() {
     assert!(running && seen == [true, true, true], "{running} {seen:?}");
 }
 
+/// A subroutine file that is missing, goes or comes back makes another build.
+#[test]
+fn watching_a_subroutine() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let sub = |x: &str| std::fs::write(at.join("lib").join("ss.ngc"), format!("o<ss> sub\nG0 X{x}\no<ss> endsub\n")).unwrap();
+    std::fs::create_dir(at.join("lib")).unwrap();
+    std::fs::write(at.join("a.ngc"), "G21 G90\no<ss> call\nM2\n").unwrap();
+    let log = std::fs::File::create(at.join("log")).unwrap();
+    let mut child = command(&["build", "a.ngc", "--target", "canon", "-o", "a.canon", "--subs", "lib", "--watch"]).current_dir(at).stderr(log).spawn().unwrap();
+    let wait_for = |file: &str, what: &str, times: usize| {
+        let until = std::time::Instant::now() + std::time::Duration::from_secs(120);
+        let there = || std::fs::read_to_string(at.join(file)).is_ok_and(|t| t.matches(what).count() >= times);
+        while !there() && std::time::Instant::now() < until {
+            std::thread::sleep(std::time::Duration::from_millis(50));
+        }
+        there()
+    };
+    let mut seen = vec![wait_for("log", "E0250", 1)];
+    sub("1");
+    seen.push(wait_for("a.canon", "STRAIGHT_TRAVERSE(1.0000", 1));
+    std::fs::remove_file(at.join("lib").join("ss.ngc")).unwrap();
+    seen.push(wait_for("log", "E0250", 2));
+    sub("2");
+    seen.push(wait_for("a.canon", "STRAIGHT_TRAVERSE(2.0000", 1));
+    // One that is found sooner.
+    std::fs::write(at.join("ss.ngc"), "o<ss> sub\nG0 X3\no<ss> endsub\n").unwrap();
+    seen.push(wait_for("a.canon", "STRAIGHT_TRAVERSE(3.0000", 1));
+    child.kill().unwrap();
+    child.wait().unwrap();
+    assert_eq!(seen, [true; 5]);
+}
+
 #[test]
 fn a_folder_of_subroutines_that_is_not_there_is_told() {
     let folder = tempfile::tempdir().unwrap();

@@ -5,7 +5,7 @@
 //! *clean*, and need not be checked again. Otherwise [`crate::check_once`] says what there is to say: there is
 //! one wording of findings, and it is there.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
 use gr_canon::{At, Call, CallFrame, FileId, FrameId, Mark, Sink};
@@ -25,6 +25,7 @@ pub struct Loaded {
     main: Lazy,
     subs: Vec<File>,
     known: BTreeMap<PathBuf, FileId>,
+    sought: BTreeSet<PathBuf>,
     setup: Setup,
     overlay: Overlay,
 }
@@ -39,7 +40,7 @@ impl Loaded {
     }
     /// The same with texts that go before those on disk.
     pub fn over(path: &str, text: Text, setup: &Setup, overlay: Overlay) -> Loaded {
-        Loaded { main: Lazy::new(path, text, setup.dialect), subs: Vec::new(), known: BTreeMap::new(), setup: setup.clone(), overlay }
+        Loaded { main: Lazy::new(path, text, setup.dialect), subs: Vec::new(), known: BTreeMap::new(), sought: BTreeSet::new(), setup: setup.clone(), overlay }
     }
     fn read(&self, path: &std::path::Path) -> Option<String> {
         if !self.overlay.is_empty()
@@ -55,6 +56,10 @@ impl Loaded {
     /// Subroutine files that were pulled in, in the order of their names.
     pub fn subs(&self) -> impl Iterator<Item = &PathBuf> {
         self.known.keys()
+    }
+    /// Subroutine files that were looked for and are not there: should one come, the program may be another.
+    pub fn missing(&self) -> impl Iterator<Item = &PathBuf> {
+        self.sought.iter()
     }
     /// Names and texts of all files, under the numbers that the stream uses.
     pub fn texts(&self) -> Vec<(Box<str>, Text)> {
@@ -76,7 +81,10 @@ impl Files for Loaded {
             if let Some(id) = self.known.get(&path) {
                 return Some(*id);
             }
-            let Some(text) = self.read(&path).map(Text::from) else { continue };
+            let Some(text) = self.read(&path).map(Text::from) else {
+                self.sought.insert(path);
+                continue;
+            };
             self.subs.push(crate::disk::file_of(&path.to_string_lossy(), &text, crate::disk::CHUNK, self.setup.dialect));
             let id = FileId(self.subs.len() as u32);
             self.known.insert(path, id);
@@ -216,6 +224,8 @@ pub struct Motion {
     pub texts: Vec<(Box<str>, Text)>,
     /// Subroutine files that were pulled in.
     pub subs: Vec<PathBuf>,
+    /// Subroutine files that were looked for and are not there.
+    pub missing: Vec<PathBuf>,
     /// Lints were asked for, and a check of this program would say nothing at all.
     pub clean: bool,
 }
@@ -229,7 +239,7 @@ pub fn lower(path: &str, text: Text, setup: &Setup, rules: Option<&Rules>) -> Mo
     for (i, (name, _)) in texts.iter().enumerate() {
         lowering.builder_mut().file(FileId(i as u32), name);
     }
-    Motion { program: lowering.finish(), texts, subs: files.subs().cloned().collect(), clean }
+    Motion { program: lowering.finish(), texts, subs: files.subs().cloned().collect(), missing: files.missing().cloned().collect(), clean }
 }
 
 /// Drops texts for standard output.

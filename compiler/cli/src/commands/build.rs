@@ -36,12 +36,12 @@ pub fn run(global: &Global, args: &BuildArgs) -> Exit {
             let count = round.files.len();
             eprintln!("watching {count} file{}; Ctrl-C ends", if count == 1 { "" } else { "s" });
         }
-        let seen = stamps(&round.files);
+        let seen = stamps(&round);
         // What changed during the round may have been read before that.
         let late = begun..=SystemTime::now();
         if !seen.values().flatten().any(|t| late.contains(t)) {
             let mut looks = 0_u32;
-            while stamps(&round.files) == seen {
+            while stamps(&round) == seen {
                 std::thread::sleep(POLL);
                 looks += 1;
                 // Patterns of a project are looked up less often: they walk through folders.
@@ -67,8 +67,8 @@ fn rows<'p>(project: &'p Project, args: &'p BuildArgs) -> impl Iterator<Item = (
 }
 
 /// When files were changed last; a file that is not there has no time.
-fn stamps(files: &[PathBuf]) -> BTreeMap<&PathBuf, Option<SystemTime>> {
-    files.iter().map(|f| (f, std::fs::metadata(f).and_then(|m| m.modified()).ok())).collect()
+fn stamps(round: &Ended) -> BTreeMap<&PathBuf, Option<SystemTime>> {
+    round.files.iter().chain(&round.sought).map(|f| (f, std::fs::metadata(f).and_then(|m| m.modified()).ok())).collect()
 }
 
 /// One thing to make.
@@ -88,6 +88,8 @@ struct Job<'s> {
 struct Ended {
     exit: Exit,
     files: Vec<PathBuf>,
+    /// Files of subroutines that may be there or not: the result is another when one comes or goes.
+    sought: Vec<PathBuf>,
     /// The project that was built as a whole, and the sources that its patterns named.
     project: Option<Project>,
     listed: BTreeSet<PathBuf>,
@@ -101,6 +103,7 @@ struct Round<'a> {
     sources: Sources,
     exit: Exit,
     files: Vec<PathBuf>,
+    sought: Vec<PathBuf>,
     listed: BTreeSet<PathBuf>,
     results: Vec<(PathBuf, Vec<u8>)>,
     /// Findings that were shown: several targets of one program find the same.
@@ -122,6 +125,7 @@ impl<'a> Round<'a> {
             sources: Sources::default(),
             exit: Exit::Ok,
             files: args.files.clone(),
+            sought: Vec::new(),
             listed: BTreeSet::new(),
             results: Vec::new(),
             told: Vec::new(),
@@ -180,7 +184,7 @@ impl<'a> Round<'a> {
         crate::output::drop_all(std::mem::take(&mut self.written));
         let something = self.renderer.tally.errors + self.renderer.tally.warnings > 0;
         self.renderer.finish(ran && something && !self.global.quiet);
-        Ended { exit: self.exit, files: self.files, project, listed: self.listed }
+        Ended { exit: self.exit, files: self.files, sought: self.sought, project, listed: self.listed }
     }
 
     fn fail(&mut self, exit: Exit) {
@@ -313,6 +317,7 @@ impl<'a> Round<'a> {
             }
             Ok(Err(text)) => self.refused(job, text),
             Err(checked) => {
+                self.sought.extend(checked.sought.iter().cloned());
                 self.fail(if checked.unreadable { Exit::Io } else { Exit::Findings });
                 self.show_new(job, checked);
             }
@@ -340,6 +345,7 @@ impl<'a> Round<'a> {
             eprint!("{summary}");
         }
         self.files.extend(built.subs.iter().cloned());
+        self.sought.extend(built.missing);
         let Some(goal) = &job.goal else {
             let others: Vec<String> = built.artifacts.iter().skip(1).map(|a| a.name.clone().unwrap_or_else(|| format!("*{}", a.suffix))).collect();
             if !others.is_empty() && !self.global.quiet {

@@ -26,19 +26,21 @@ pub struct Checked {
     pub more: Tally,
     /// It could not be read at all.
     pub unreadable: bool,
+    /// Where there are errors: files of subroutines that belong to the program, and those that it looked for.
+    pub sought: Vec<PathBuf>,
 }
 
 impl Checked {
     /// Nothing was found.
     pub fn nothing() -> Checked {
-        Checked { sources: Sources::default(), found: Vec::new(), more: Tally::default(), unreadable: false }
+        Checked { sources: Sources::default(), found: Vec::new(), more: Tally::default(), unreadable: false, sought: Vec::new() }
     }
     /// What is to be said about a G-code program.
     pub fn of(name: &str, text: &Text, options: Options, lints: &Levels) -> Checked {
         let once = gr_driver::check_once(name, text, options);
         let mut found = once.check.diagnostics.clone();
         found.iter_mut().for_each(|d| lints.harden(d));
-        Checked { sources: used(&once, &found), found, more: lints.tally(&once.check.unlisted), unreadable: false }
+        Checked { sources: used(&once, &found), found, more: lints.tally(&once.check.unlisted), ..Checked::nothing() }
     }
     /// The same behind a finding about the start of the file.
     pub fn headed_by(mut self, first: Diagnostic, name: &str, text: &Text) -> Checked {
@@ -243,7 +245,7 @@ fn syntax_only(name: &str, text: &Text, station: &Station) -> Checked {
     let more = Tally { hints: found.len().saturating_sub(gr_driver::MOST_OF_A_KIND), ..Tally::default() };
     found.truncate(gr_driver::MOST_OF_A_KIND);
     found.iter_mut().for_each(|d| station.lints.harden(d));
-    Checked { sources, found, more, unreadable: false }
+    Checked { sources, found, more, ..Checked::nothing() }
 }
 
 /// A file that could not be read.
@@ -251,7 +253,7 @@ pub fn unreadable(name: &str, code: Code, args: &[String]) -> Checked {
     let mut sources = Sources::default();
     let file = sources.add(name, "");
     let found = vec![crate::sources::about_file(code, file, args)];
-    Checked { sources, found, more: Tally::default(), unreadable: true }
+    Checked { sources, found, unreadable: true, ..Checked::nothing() }
 }
 
 fn checked(name: &str, path: &Path, text: &Text, station: &Station) -> Checked {

@@ -214,11 +214,14 @@ impl Drawing {
             Ok((motion, checked)) => {
                 let trace = crate::emit::traced(&motion, &unit, self.station.machine.as_ref());
                 self.path = Some(trace.json(&self.shared.title, &trace.key(), false).to_string());
-                self.files = std::iter::once(self.file.clone()).chain(motion.subs).collect();
+                self.files = std::iter::once(self.file.clone()).chain(motion.subs).chain(motion.missing).collect();
                 let bad = motion.found.iter().any(|d| d.severity == Severity::Error);
                 problem(&if bad { Checked { sources: motion.sources, found: motion.found, ..Checked::nothing() } } else { checked })
             }
-            Err(checked) => problem(&checked),
+            Err(checked) => {
+                self.files.extend(checked.sought.iter().filter(|f| !self.files.contains(f)).cloned().collect::<Vec<_>>());
+                problem(&checked)
+            }
         };
         self.publish(&text, &said);
     }
