@@ -439,7 +439,8 @@ fn build(program: &Program, from: &From, state: &State, pose: &Pose, room: &Room
     let index = from.index;
     // A place that no program names, so that every axis of the approach moves and has its word.
     let used = axes_used(program);
-    let approached: [bool; 9] = std::array::from_fn(|i| i == 2 && from.wait || from.known[i] && (i < 3 || used[i]));
+    // A rotary axis that the program has named but never moves may stand elsewhere too.
+    let approached: [bool; 9] = std::array::from_fn(|i| i == 2 && from.wait || from.known[i] && (i < 6 || used[i]));
     let far: Axes = std::array::from_fn(|i| if approached[i] { pose.axes[i] + 777.25 } else { pose.axes[i] });
     let named = names_system(program, index, from.line, sources);
     let mut begins = State::default();

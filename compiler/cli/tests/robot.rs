@@ -617,7 +617,16 @@ fn a_five_axis_mill_restarts() {
                 assert!(part[begins..].iter().any(|l| *l == cuts(&whole)[1]), "{base}: {part:?}");
             }
         }
+        // Named and never moved, the rotary axes go where the words say; not named they stay.
+        for words in [format!(" {tilt}0 {turn}0"), String::new()] {
+            std::fs::write(path("a.ngc"), format!("G21 G90 G17 G54\nG0 X0 Y0 Z-30{words}\nG1 Z-60 F300\nG1 X10\nG1 Y10\nG0 Z-30\nM2\n")).unwrap();
+            let (whole, part) = (made(&[]), made(&["--from-line", "4", "--safe-z", "-10"]));
+            assert_eq!(part[part.len() - 3..], whole[whole.len() - 3..], "{base} {words}");
+        }
     }
+    std::fs::write(path("a.ngc"), "G21 G90 G17 G54\nG0 X0 Y0 Z50 A0\nG1 Z-60 F300\nG1 X10\nG0 Z50\nM2\n").unwrap();
+    let o = run(&["build", &path("a.ngc"), "--machine", "generic/mill3", "--target", "joint-gcode", "--from-line", "4", "--safe-z", "60", "-q"]);
+    assert!(o.status.success(), "{}", text(&o.stderr));
 }
 
 /// Part 1 of UFSC 2016 on the IRB 140, from the command line as the page says: the rows of table 5.3, and the printed points.

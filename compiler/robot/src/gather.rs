@@ -650,7 +650,9 @@ impl<'a> Gather<'a> {
             self.cannot("a move of U, V or W");
         }
         if self.control == Control::Position {
-            let turned = (3..6).any(|i| view.start.axes[i] != view.end.axes[i]) || view.end.spin.is_some();
+            // The way to a restart begins anywhere.
+            let words = |i: usize| view.start.axes[i] != view.end.axes[i] || self.restarted && view.end.axes[i] != 0.0;
+            let turned = !self.inserted && (3..6).any(words) || view.end.spin.is_some();
             let leaned = view.end.tool_axis.is_some_and(|a| a[2] < 1.0 - 1e-9);
             if turned || leaned {
                 self.yaws(view);

@@ -3,6 +3,7 @@
 //! the axes. Limits of a machine tool's axes are the interpreter's matter, as long as its axes are those of the program: where the part
 //! is put somewhere, or the tool is turned, the motion is planned.
 
+use gr_backends::from_line::INSERTED;
 use gr_backends::joint;
 use gr_ir::{Program, Source, Sources};
 use gr_machine::math::{Frame, M3};
@@ -37,7 +38,9 @@ pub fn missing_axes(program: &Program, machine: &Machine, texts: &dyn Sources) -
             continue;
         }
         for (i, letter) in LETTERS.chars().enumerate() {
-            if view.start.axes[i] != view.end.axes[i] && !std::mem::replace(&mut has[i], true) {
+            // The way to a restart begins anywhere: what it brings to 0 may have been there.
+            let stays = view.start.axes[i] == view.end.axes[i] || view.source.line == INSERTED && view.end.axes[i] == 0.0;
+            if !stays && !std::mem::replace(&mut has[i], true) {
                 let (file, span) = texts.place(view.source);
                 found.push(Diagnostic::new(code::MACHINE_NO_AXIS, file, span, &[letter.to_string(), machine.id.clone()]));
             }

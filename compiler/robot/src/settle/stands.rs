@@ -99,8 +99,8 @@ impl<'a> Stands<'a> {
     /// The rotary words of a machine that stands at home.
     fn turn_home(&self, turning: &[(usize, usize)], axes: &mut Axes, state: &State) {
         let Some(home) = crate::plan::home_joints(self.machine) else { return };
+        axes[3..6].fill(0.0);
         let words = || turning.iter().filter(|(_, word)| (3..6).contains(word));
-        words().for_each(|(_, word)| axes[*word] = 0.0);
         let zero = self.rotary(axes, state, &self.place).unwrap_or_default();
         words().for_each(|(joint, word)| axes[*word] = home[*joint] - zero[*word - 3]);
     }
