@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 
 use crate::sources::{SYSTEMS, Words, is_hidden, sets_here};
 use gr_ir::Sources;
-use gr_ir::{Axes, Builder, FrameId, Marker, Note, Op, Override, Pose, Program, Source, State, Turn, Units};
+use gr_ir::{Axes, Builder, FrameId, Marker, Note, Op, Override, PathMode, Pose, Program, Source, State, Turn, Units};
 use gr_text::{Diagnostic, FileId, Span, code};
 
 /// Line number of operations that no source line asked for.
@@ -461,7 +461,8 @@ fn build(program: &Program, from: &From, state: &State, pose: &Pose, room: &Room
     let mut restore = Restore { out, source };
     restore.push(Op::Note(Note::Comment, &format!("restart at line {}", from.line)));
     restore.stored(program, index, sources);
-    let shifts = own(program, index).any(|s| matches!(s.op, Op::LocalOffset(_)));
+    let asks = |s: &gr_ir::Step<'_>| Words::at(sources, s.source.file, s.source.line).is_some_and(|w| [920, 921, 922, 923, 520].iter().any(|g| w.g(*g)));
+    let shifts = own(program, index).any(|s| matches!(s.op, Op::LocalOffset(_)) && asks(&s));
     restore.frame(state, named, shifts);
     restore.tool(state, offset);
     if units_under_offset(program, index) {
@@ -470,7 +471,10 @@ fn build(program: &Program, from: &From, state: &State, pose: &Pose, room: &Room
         restore.push(Op::Units(other));
         restore.push(Op::Units(state.units));
     }
-    restore.modes(state, says_path(program, index, from.line, sources));
+    // A mode that a canned cycle has left behind it is none that the program asked for: its line says so.
+    let path = own(program, index).filter(|s| matches!(s.op, Op::PathMode(_))).last().map_or(source, |s| s.source);
+    let path = if says_path(program, index, from.line, sources) { Some(source) } else { Some(path).filter(|_| state.path != PathMode::default()) };
+    restore.modes(state, path);
     restore.outputs(program, index);
     let mut waiting = from.wait;
     let mut goal = *pose;
@@ -626,12 +630,11 @@ impl Restore {
         }
     }
 
-    /// `paths`: the program says how the path is followed.
-    fn modes(&mut self, s: &State, paths: bool) {
-        // A mode that a canned cycle has left behind it is none that the program asked for.
-        if paths || s.merge_tolerance != 0.0 {
-            self.push(Op::PathMode(s.path));
-            self.push(Op::MergeTolerance(s.merge_tolerance));
+    /// `path`: what asks for the way the path is followed, if it is to be said.
+    fn modes(&mut self, s: &State, path: Option<Source>) {
+        if let Some(line) = path {
+            self.out.push(Op::PathMode(s.path), line);
+            self.out.push(Op::MergeTolerance(s.merge_tolerance), line);
         }
         for (which, on, usual) in [
             (Override::Feed, s.feed_override, true),

@@ -359,3 +359,46 @@ fn where_a_machine_stands_no_file_says() {
         assert_eq!(told("G21 G90 G17 F100\nG0 X1 Y1 Z5\nG81 Z-1 R2\nX4\nG80\nM2\n", startup), none, "{startup}");
     }
 }
+
+/// What a control may have in store is said again, or told: zeros, shifts put away, numbers of the user's own.
+#[test]
+fn what_a_control_has_in_store() {
+    let part = |before: &str| file("a.ngc", &format!("G21 G90 G17 G54 F100\n{before}\nS1000 M3\nG0 X10 Y0 Z50\nG1 X20 Z-1\nX30\nG0 Z50\nM5\nM2\n"));
+    let restart = "build a.ngc --target rs274ngc --from-line 5 --safe-z 60";
+    for (before, written) in [
+        ("G92.1", "G92.1\n"),
+        ("G92.2", "G92.1\n"),
+        ("G52 X0 Y0 Z0", "G92.1\n"),
+        ("G10 L2 P1 R0", "G10 L2 P1 R0\n"),
+        ("G10 L2 P1 X0 Y0 Z0", "G10 L2 P1 X0 Y0 Z0\n"),
+        ("G10 L2 P0 X0 R0", "G10 L2 P1 X0 R0\n"),
+    ] {
+        let (text, status) = output(&[part(before)], restart);
+        assert!(text.contains(written) && status == Some(0), "{before}: {text}");
+    }
+    // Where G92 counts from, nobody knows.
+    told("E0652", &[part("G92 X1 Y2 Z3")], restart);
+    // The way the path is followed: what the program asks for, and nothing that a cycle left behind it.
+    let path = "G21 G90 G17 G54 F100\nS1000 M3\nG0 X0 Y0 Z5\nG61\nG1 Z-1\nX10\nG0 Z5\nM5\nM2\n";
+    assert!(output(&[file("a.ngc", path)], "build a.ngc --target rs274ngc --from-line 6 --safe-z 60").0.contains("\nG61\n"));
+    let cycle = "G21 G90 G17 G54 F100\nS1000 M3\nG0 X0 Y0 Z5\nG99 G81 X2 Y2 Z-1 R2\nG80\nG0 X3\nG1 Z1\nX5\nM2\n";
+    let (text, _) = output(&[file("a.ngc", cycle)], "build a.ngc --target rs274ngc --from-line 7 --safe-z 60");
+    assert!(text.contains("restart at line 7") && !text.contains("G64"), "{text}");
+    // Another work offset in the middle of increments: a restart as much as the whole.
+    let steps = "G21 G90 G17 G54 F100\nS1000 M3\nG0 X0 Y0 Z5\nX1\nG55\nG91 G1 X5 Y1\nG90 G0 Z5\nM5\nM2\n";
+    let own = "G21 G90 G17 G54 F100\nS500 M3\nG0 X0 Y0 Z5\nG1 Z-#500\nG0 Z5\nM5\nM2\n";
+    let put_away = "G21 G90 G17 G54 F100\nS1000 M3\nG0 X0 Y0 Z5\nG92.3\nG91 G1 X5\nG90 G0 Z5\nM5\nM2\n";
+    for (text, option) in [(steps, ""), (steps, " --from-line 4 --safe-z 60"), (own, ""), (put_away, "")] {
+        told("E0607", &[file("a.ngc", text)], &format!("build a.ngc --target rs274ngc -o a.nc{option}"));
+    }
+    assert!(codes(&[file("a.ngc", &own.replace("G0 X0 Y0", "#500=2\nG0 X0 Y0"))], "build a.ngc --target rs274ngc -o a.nc").0.is_empty());
+    for line in [5, 6] {
+        let plain = file("a.ngc", path);
+        assert!(codes(&[plain], &format!("build a.ngc --target rs274ngc --from-line {line} --safe-z 60 -o a.nc")).0.is_empty());
+    }
+    // LinuxCNC takes another place for the present one where the frame is turned under a shift: the number is the source's.
+    let turned = file("a.ngc", "G21 G90 G17 G54 F100\nG0 X0 Y0 Z5\nG10 L2 P1 R0\nG10 L20 P1 X24\nG0 X1 Y2 Z30\nM2\n");
+    let stored = file("a.var", "5210 1\n5211 7\n5212 1\n5213 2\n5220 1\n5221 10\n5222 3\n5230 30\n");
+    let (text, status) = output(&[turned, stored], "build a.ngc --target rs274ngc --vars a.var --machine-units inch");
+    assert!(text.contains("G10 L20 P1 X24\n") && status == Some(0), "{text}");
+}

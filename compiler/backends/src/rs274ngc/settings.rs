@@ -232,8 +232,9 @@ impl Emitter<'_> {
         // LinuxCNC takes another place for the present one where the frame was turned under a shift: what it is called is
         // what the source says. A lathe's may be a diameter.
         let near = |v: f64| (v - at).abs() <= 2.0 * unit + SAME_PLACE;
+        let calls = sets_here(self.sources, view.source) || Words::at(self.sources, view.source.file, view.source.line).is_some_and(|w| w.g(920));
         let literal = self.literal(AXES[axis], view.source).map(|v| v * scale).filter(|v| !near(*v) && !near(v / 2.0));
-        Some(literal.filter(|_| view.state.local_offset != [0.0; 9]).unwrap_or(at))
+        Some(literal.filter(|_| calls && view.state.local_offset != [0.0; 9]).unwrap_or(at))
     }
 
     /// The plain number behind a letter of a source line.
