@@ -35,7 +35,7 @@ pub fn differs(unit: &Unit, source: &Motion, (written, begins): (&str, Option<u3
     let again = |setup: &Setup| motion_of("<translation>", written.to_string(), setup).program;
     let differs_elsewhere = || {
         // Of a program that begins later, the way to its first block is its own.
-        let aspects: &[Aspect] = if source.begun.is_some() { &[Aspect::Path] } else { &[Aspect::Path, Aspect::Feed, Aspect::Event] };
+        let aspects: &[Aspect] = if source.begun.is_some() { &[Aspect::Path, Aspect::Feed] } else { &[Aspect::Path, Aspect::Feed, Aspect::Event, Aspect::Control] };
         let other = |change: Change<'_>| {
             let program = again(&change(&there));
             let begins = begins.and_then(|line| program.steps().find(|s| s.source.line >= line).map(|s| s.index));

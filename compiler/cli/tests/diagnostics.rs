@@ -388,7 +388,11 @@ fn what_a_control_has_in_store() {
     let steps = "G21 G90 G17 G54 F100\nS1000 M3\nG0 X0 Y0 Z5\nX1\nG55\nG91 G1 X5 Y1\nG90 G0 Z5\nM5\nM2\n";
     let own = "G21 G90 G17 G54 F100\nS500 M3\nG0 X0 Y0 Z5\nG1 Z-#500\nG0 Z5\nM5\nM2\n";
     let put_away = "G21 G90 G17 G54 F100\nS1000 M3\nG0 X0 Y0 Z5\nG92.3\nG91 G1 X5\nG90 G0 Z5\nM5\nM2\n";
-    for (text, option) in [(steps, ""), (steps, " --from-line 4 --safe-z 60"), (own, ""), (put_away, "")] {
+    // Half a minute a move is another feed where the move is another one.
+    let inverse = "G21 G90 G17 G54 F100\nS1000 M3\nG0 X0 Y0 Z5\nX1\nG55\nG93 G1 X7 Y0 Z5 F3\nG94 G0 Z9\nM5\nM2\n";
+    let blend = "G21 G90 G17 G54 F100\nS1000 M3\nG0 X0 Y0 Z5\nG64 P[#500/100]\nG1 X4\nM5\nM2\n";
+    let later = " --from-line 4 --safe-z 60";
+    for (text, option) in [(steps, ""), (steps, later), (own, ""), (put_away, ""), (inverse, later), (blend, "")] {
         told("E0607", &[file("a.ngc", text)], &format!("build a.ngc --target rs274ngc -o a.nc{option}"));
     }
     assert!(codes(&[file("a.ngc", &own.replace("G0 X0 Y0", "#500=2\nG0 X0 Y0"))], "build a.ngc --target rs274ngc -o a.nc").0.is_empty());
