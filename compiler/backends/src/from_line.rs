@@ -150,13 +150,15 @@ pub fn from_line(
 /// By how much G10 L20 has changed the axes it named of work offsets.
 fn set_from_here(program: &Program, index: usize, sources: &dyn Sources) -> BTreeMap<u8, [Option<f64>; 9]> {
     let mut out: BTreeMap<u8, [Option<f64>; 9]> = BTreeMap::new();
-    for step in own(program, index).filter(|s| sets_here(sources, s.source)) {
-        let state = *program.cursor_at(step.index).state();
-        let (number, by) = match step.op {
-            Op::WorkOffset(n, offset) if n == state.work => (n, std::array::from_fn(|i| offset[i] - state.work_offset[i])),
-            Op::WorkOffset(number, offset) | Op::StoredOffset { number, offset, .. } => (number, offset),
+    for step in own(program, index) {
+        let (number, offset) = match step.op {
+            Op::WorkOffset(number, offset) | Op::StoredOffset { number, offset, .. } if sets_here(sources, step.source) => (number, offset),
             _ => continue,
         };
+        let cursor = program.cursor_at(step.index);
+        // Of one that is not in force the whole counts: nobody knows what it was.
+        let before = if number == cursor.state().work { cursor.state().work_offset } else { [0.0; 9] };
+        let by: Axes = std::array::from_fn(|i| offset[i] - before[i]);
         let Some(words) = Words::at(sources, step.source.file, step.source.line) else { continue };
         let sum = out.entry(number).or_default();
         (0..9).filter(|i| words.has(AXIS_LETTERS[*i])).for_each(|i| sum[i] = Some(sum[i].unwrap_or(0.0) + by[i]));
@@ -461,8 +463,7 @@ fn build(program: &Program, from: &From, state: &State, pose: &Pose, room: &Room
     let mut restore = Restore { out, source };
     restore.push(Op::Note(Note::Comment, &format!("restart at line {}", from.line)));
     restore.stored(program, index, sources);
-    let asks = |s: &gr_ir::Step<'_>| Words::at(sources, s.source.file, s.source.line).is_some_and(|w| [920, 921, 922, 923, 520].iter().any(|g| w.g(*g)));
-    let shifts = own(program, index).any(|s| matches!(s.op, Op::LocalOffset(_)) && asks(&s));
+    let shifts = own(program, index).any(|s| matches!(s.op, Op::LocalOffset(_)) && asks(&s, &[920, 921, 922, 923, 520], sources));
     restore.frame(state, named, shifts);
     restore.tool(state, offset);
     if units_under_offset(program, index) {
@@ -545,18 +546,21 @@ fn names_system(program: &Program, index: usize, line: u32, sources: &dyn Source
 /// Whether the program says before a line how the path is followed (G61, G61.1, G64): by an operation, or by a line that asks for what
 /// was in force already.
 fn says_path(program: &Program, index: usize, line: u32, sources: &dyn Sources) -> bool {
-    let says = |w: Words| [610, 611, 640].iter().any(|g| w.g(*g));
-    let ops = own(program, index).filter(|s| matches!(s.op, Op::PathMode(_)));
-    ops.filter_map(|s| Words::at(sources, s.source.file, s.source.line)).any(says)
-        || (0..line.saturating_sub(1)).map_while(|l| Words::at(sources, FileId(0), l)).any(says)
+    const CODES: [u32; 3] = [610, 611, 640];
+    own(program, index).any(|s| matches!(s.op, Op::PathMode(_)) && asks(&s, &CODES, sources))
+        || (0..line.saturating_sub(1)).map_while(|l| Words::at(sources, FileId(0), l)).any(|w| CODES.iter().any(|g| w.g(*g)))
+}
+
+/// Whether the line of a step asks for one of these codes, in tenths.
+fn asks(step: &gr_ir::Step<'_>, codes: &[u32], sources: &dyn Sources) -> bool {
+    Words::at(sources, step.source.file, step.source.line).is_some_and(|w| codes.iter().any(|g| w.g(*g)))
 }
 
 /// Whether a shift by G92 is put away by G92.2 where the program begins, and comes back by G92.3.
 fn put_away(program: &Program, index: usize, sources: &dyn Sources) -> bool {
-    let asked = |s: &gr_ir::Step<'_>, codes: &[u32]| Words::at(sources, s.source.file, s.source.line).is_some_and(|w| codes.iter().any(|g| w.g(*g)));
     let shift = |s: &gr_ir::Step<'_>| matches!(s.op, Op::LocalOffset(_));
     let last = program.steps().take(index).filter(shift).last();
-    last.is_some_and(|s| asked(&s, &[922])) && program.steps().skip(index).filter(shift).any(|s| asked(&s, &[923]))
+    last.is_some_and(|s| asks(&s, &[922], sources)) && program.steps().skip(index).filter(shift).any(|s| asks(&s, &[923], sources))
 }
 
 /// Whether the length unit changed while a tool offset was active.
