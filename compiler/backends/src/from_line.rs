@@ -26,6 +26,8 @@ pub struct Options {
     /// Axes whose numbers rest on what no file names. The tool is brought there only where the program cuts before it
     /// names them.
     pub unsure: [bool; 9],
+    /// A file names the work offsets and reference points of the machine: where G28, G30 and G53 go is known.
+    pub stored: bool,
     /// How high and how far out the approach goes, where that has been found before; goes before `safe_z`.
     pub room: Option<Room>,
 }
@@ -56,6 +58,8 @@ pub struct Restart {
     pub shifted: [Option<f64>; 9],
     /// By how much G10 L20 has changed the axes it named of work offsets, by their number: the same.
     pub kept: BTreeMap<u8, [Option<f64>; 9]>,
+    /// Offsets that it sets before it begins, axis by axis, mm and rad: G92 (0) and work offsets, by their number.
+    pub offsets: BTreeMap<u8, Axes>,
     /// How high and how far out it is brought there.
     pub room: Room,
 }
@@ -123,10 +127,10 @@ pub fn from_line(
         notes.push(Diagnostic::new(code::FROM_LINE_OFFSET_KEPT, file, span, &[]));
     }
     let lathe = approach::is_lathe(program);
-    let places = places(program, found.index, lathe, sources);
-    let Ahead { needed, named } = ahead(program, found.index, sources);
+    let places = places(program, found.index, lathe, options.stored, sources);
+    let Ahead { needed, named } = ahead(program, found.index, &places, sources);
     let used = axes_used(program);
-    let lost = |i: &usize| places[*i] == Place::Machine && needed[*i] && used[*i];
+    let lost = |i: &usize| matches!(places[*i], Place::Machine | Place::Probed) && needed[*i] && used[*i];
     let lost: Vec<String> = (0..9).filter(lost).map(|i| char::from(AXIS_LETTERS[i].to_ascii_uppercase()).to_string()).collect();
     if !lost.is_empty() {
         return Err(vec![Diagnostic::new(code::FROM_LINE_PLACE_OF_MACHINE, place.0, place.1, &[lost.join(" ")])]);
@@ -144,7 +148,20 @@ pub fn from_line(
     let restart = build(program, &from, &state, &pose, &room, sources);
     let goal = std::array::from_fn(|i| known[i].then_some(pose.axes[i]));
     let (shifted, kept) = (shifted(program, found.index, sources), set_from_here(program, found.index, sources));
-    Ok(Restart { program: restart, notes, goal, named, shifted, kept, room })
+    let offsets = offsets(&restart);
+    Ok(Restart { program: restart, notes, goal, named, shifted, kept, offsets, room })
+}
+
+/// Offsets that a restart sets before its first source line; work offsets that the machine has kept are not among them.
+fn offsets(restart: &Program) -> BTreeMap<u8, Axes> {
+    let Some(last) = restart.steps().filter(|s| s.source.line == INSERTED).last() else { return BTreeMap::new() };
+    let said = restart.steps().take(last.index).filter(|s| s.source.line != INSERTED);
+    let stored = said.filter_map(|s| match s.op {
+        Op::StoredOffset { number, offset, .. } => Some((number, offset)),
+        _ => None,
+    });
+    let local = restart.cursor_at(last.index).state().local_offset;
+    stored.chain([(0, local)]).collect()
 }
 
 /// By how much G10 L20 has changed the axes it named of work offsets.
@@ -371,13 +388,16 @@ enum Place {
     Named,
     /// The machine went to a place of its own.
     Machine,
+    /// A probe stopped there.
+    Probed,
 }
 
 /// What a program has said about the places of its axes before an operation. Of axes that it never named, and of those
-/// that G28, G30 and G53 brought to a place of the machine, the numbers are only what a simulation takes them for; and
-/// how high the tool is after a tool change, only the machine knows.
-fn places(program: &Program, index: usize, lathe: bool, sources: &dyn Sources) -> [Place; 9] {
+/// that G28, G30 and G53 brought to a place of the machine, the numbers are only what a simulation takes them for, but where
+/// such places are `stored` in a file; where a probe stopped and how high the tool is after a tool change, only the machine knows.
+fn places(program: &Program, index: usize, lathe: bool, stored: bool, sources: &dyn Sources) -> [Place; 9] {
     let mut places = [Place::Never; 9];
+    let used = axes_used(program);
     for s in program.steps().take(index) {
         if !s.op.moves() {
             if matches!(s.op, Op::ToolChange(_)) && !lathe && places[2] != Place::Never {
@@ -390,8 +410,14 @@ fn places(program: &Program, index: usize, lathe: bool, sources: &dyn Sources) -
         let fixed = hidden || words.is_some_and(|w| [280, 300, 530].into_iter().any(|g| w.g(g)));
         let home = fixed && !hidden && words.is_some_and(|w| !w.g(530) && !w.names_axes());
         for (i, letter) in AXIS_LETTERS.iter().enumerate() {
-            if home || s.start.axes[i] != s.end.axes[i] || words.is_some_and(|w| w.has(*letter)) {
-                places[i] = if fixed { Place::Machine } else { Place::Named };
+            // The simulation goes on from where it takes a probe to stop.
+            let moves = s.start.axes[i] != s.end.axes[i] && places[i] != Place::Probed;
+            if home && (used[i] || !stored) || moves || words.is_some_and(|w| w.has(*letter)) {
+                places[i] = match s.op {
+                    Op::Probe(_) => Place::Probed,
+                    _ if hidden || fixed && !stored => Place::Machine,
+                    _ => Place::Named,
+                };
             }
         }
     }
@@ -406,13 +432,14 @@ struct Ahead {
     named: [Option<f64>; 9],
 }
 
-fn ahead(program: &Program, index: usize, sources: &dyn Sources) -> Ahead {
+fn ahead(program: &Program, index: usize, places: &[Place; 9], sources: &dyn Sources) -> Ahead {
     let mut ahead = Ahead { needed: [false; 9], named: [None; 9] };
     let mut said = [false; 9];
     for s in program.steps().skip(index).filter(|s| s.op.moves()) {
         let words = Words::at(sources, s.source.file, s.source.line);
         for i in 0..9 {
-            if said[i] || !says(i, &s.start, &s.end, s.source, sources) {
+            let drifts = places[i] == Place::Probed && !words.is_some_and(|w| w.has(AXIS_LETTERS[i]));
+            if said[i] || drifts || !says(i, &s.start, &s.end, s.source, sources) {
                 continue;
             }
             said[i] = true;

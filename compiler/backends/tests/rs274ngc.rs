@@ -653,6 +653,46 @@ fn after_a_probe_only_named_axes_are_written() {
     assert!(written.contains("G38.2 Z-10 F100\nG0 X5\nZ20\n"), "{written}");
 }
 
+/// On a Fanuc control G43 and G49 without a Z move the axis by the length, and G52 and G92 are two shifts that add up.
+#[test]
+fn lengths_and_shifts_of_a_fanuc_control() {
+    let text = "G21 G90\nT1 M6\nG49\nG0 X1 Y1\nG43 H1\nX2\nZ50\nG1 Z1 F100\nG0 Z40\nG49\nG91 G28 Z0\nG90\nT2 M6\nG43 H2 Z50\nG92 X7\nG1 Z2\nG92.1\nG0 Z50\nX3\nG49\nG53 G0 Z0\nM30\n";
+    let written = write(text, &options(Language::FanucMill));
+    for part in ["G49\nG0 X1. Y1.\nG0 X2.\nG43 Z50. H1\nG1 Z1. F100.", "G0 Z40.\nG91 G28 Z0.\nG90\n", "M6\nG43 G0 Z50. H2\nG92 X7.\nG1 Z2.\nG92 X2.\nG0 Z50.\nX3.\nG49 G53 G0 Z0.\nM30"] {
+        assert!(written.contains(part), "{part}\n---\n{written}");
+    }
+    same(text, &options(Language::FanucMill), 1e-3);
+    let text = "G21 G90 F100\nT1 M6\nG43 H1 G0 Z50\nG1 Z1\nG0 Z40\nG49\nM30\n";
+    let notes = emit(&run(text), &options(Language::FanucMill), &Texts::new([(FileId(0), text)])).expect("written").notes;
+    assert_eq!(notes.iter().map(|d| d.code.def().slug).collect::<Vec<_>>(), ["emit/dropped-note"]);
+    assert_eq!(errors("G21 G90 F100\nT1 M6\nG43 H1\nG2 X2 I1 Z-1\nM30\n", Language::FanucMill)[0].0, "emit/not-expressible");
+}
+
+/// G96 wants its S in its block, whatever feed stands there.
+#[test]
+fn surface_speed_and_feed_in_one_block() {
+    for feed in ["G95 F.2", "G94 F100", "F100", "G93 F2"] {
+        let text = format!("G21 G18 G90 F50\nG0 X50 Z2\nG96 D2500 S180 M3 {feed}\nG1 Z-5 F3\nG94 G97 S500 F90\nG1 Z-7\nM5\nM30\n");
+        same(&text, &options(Language::Linuxcnc), 1e-3);
+        assert!(write(&text, &options(Language::Linuxcnc)).contains("G96 D2500 S180\n"));
+    }
+}
+
+/// Steps from where a probe stopped are steps, and what the place is called is what the source says, whatever the simulation
+/// takes it for: the probe touches twice, and the height counts from a variable thickness, here and in another work offset.
+#[test]
+fn a_probe_stops_where_the_machine_knows() {
+    let text = "G21 G90 F100\n#<t>=1.5\nG0 X0 Y0 Z10\nG38.2 Z-10\nG91 G0 Z1\nG38.2 Z-2 F10\nG90\nG10 L20 P1 Z[#<t>+1]\nG10 L20 P2 Z#<t>\n\
+                G0 Z5\nG38.2 X20\nG38.3 Y9\nG92 X[-#<t>] Y0\nG91 G1 X2 Z-1\nG38.3 Z-4\nG90 G1 X3 Z2 F100\nM2\n";
+    let written = write(text, &options(Language::Linuxcnc));
+    let expected = "G38.2 Z-10 F100\nG91 G0 Z1\nG90\nG91 G38.2 Z-2 F10\nG90\nG10 L20 P1 Z2.5\nG10 L20 P2 Z1.5\nG0 Z5\nG38.2 X20\nG38.3 Y9\n\
+                    G92 X-1.5 Y0\nG1 X0.5 Z4\nG38.3 Z0\nG1 X3 Z2 F100\nM2\n";
+    assert!(written.ends_with(expected), "{written}");
+    for language in [Language::Linuxcnc, Language::Grbl] {
+        same(&text.replace("#<t>=1.5\n", "").replace("[#<t>+1]", "2.5").replace("[-#<t>]", "-1.5").replace("#<t>", "1.5"), &options(language), 1e-3);
+    }
+}
+
 #[test]
 fn home_after_a_change_of_units_under_a_tool_offset() {
     let text = "G21\nG43.1 Z12\nG0 Z100\nG20\nG0 X1\nG28\nM2\n";

@@ -69,6 +69,9 @@ pub enum PathMode {
     Continuous(f64),
 }
 
+/// By how much the probe of the stand-alone `rs274` stops before its target, mm.
+pub const PROBE_STOPS_SHORT: f64 = 0.254;
+
 /// One canonical call. Positions are in the active work frame and program units; rotary axes in degrees;
 /// feeds in units per minute (or per revolution, or 1/min, as the feed mode says).
 #[derive(Clone, PartialEq, Debug)]

@@ -93,7 +93,7 @@ fn lowered(unit: &Unit, setup: &Setup) -> Program {
 fn begun(unit: &Unit, setup: &Setup, begun: Option<Begun>) -> Option<Program> {
     let motion = motion_with(unit, setup);
     let Some(Begun { line, unsure, room }) = begun else { return Some(motion.program) };
-    let options = from_line::Options { unsure, room: Some(room), ..from_line::Options::default() };
+    let options = from_line::Options { unsure, stored: !unit.setup.params.is_empty(), room: Some(room), ..from_line::Options::default() };
     let restart = from_line::from_line(&motion.program, FileId(0), line, &options, &crate::emit::texts(&motion)).ok()?.program;
     let way = restart.steps().filter(|s| s.source.line == from_line::INSERTED).last()?.index;
     Some(from(&restart, way + 1))
@@ -163,10 +163,13 @@ pub fn doubt(unit: &Unit, motion: &Motion, here: &Restart, placed: bool, restart
                     // It stays where it is, and a step (G91) from there is one from another place.
                     None => apart(here.named[i], there.named[i]),
                 };
-                elsewhere || fresh && (apart(here.shifted[i], there.shifted[i]) || placed && kept(i))
+                let set = || here.offsets.iter().any(|(n, h)| there.offsets.get(n).is_none_or(|t| other(h[i], t[i])));
+                let probed = unknown == Unknown::Probe && set();
+                elsewhere || probed || fresh && (apart(here.shifted[i], there.shifted[i]) || placed && kept(i))
             };
             if (0..9).any(away) {
-                let first = Doubt { axes: [false; 9], machine: unknown.machine(), remedy: unknown.remedy() };
+                let remedy = if unknown == Unknown::Probe { "start at the line of the probe, or before it" } else { unknown.remedy() };
+                let first = Doubt { axes: [false; 9], machine: unknown.machine(), remedy };
                 let doubt = doubt.get_or_insert(first);
                 (0..9).for_each(|i| doubt.axes[i] |= away(i));
             }
@@ -248,7 +251,9 @@ fn first(
     aspects: &[Aspect],
     other: impl Fn(Change<'_>) -> Program,
 ) -> Option<(Difference, Unknown)> {
-    let unknown: Vec<Unknown> = Unknown::ALL.into_iter().filter(|u| u.is(&unit.setup, motion)).collect();
+    let told = motion.found.iter().any(|d| d.code == code::RUN_VALUE_UNKNOWN);
+    let counts = |u: &Unknown| (*u != Unknown::Probe || !told) && u.is(&unit.setup, motion);
+    let unknown: Vec<Unknown> = Unknown::ALL.into_iter().filter(counts).collect();
     let look = |which: &[Unknown], machine: &Numbers| {
         let change = |setup: &Setup| {
             let mut setup = setup.clone();
@@ -286,10 +291,12 @@ enum Unknown {
     Start,
     /// G98 or G99.
     Return,
+    /// Where a probe stops. What a program reads of it is told where it stands.
+    Probe,
 }
 
 impl Unknown {
-    const ALL: [Unknown; 4] = [Unknown::Stored, Unknown::Tools, Unknown::Start, Unknown::Return];
+    const ALL: [Unknown; 5] = [Unknown::Stored, Unknown::Tools, Unknown::Start, Unknown::Return, Unknown::Probe];
 
     fn is(self, setup: &Setup, motion: &Motion) -> bool {
         match self {
@@ -302,6 +309,7 @@ impl Unknown {
                     && setup.dialect.family == Family::Linuxcnc
                     && motion.program.steps().any(|s| cycle(s.op))
             }
+            Unknown::Probe => motion.program.steps().any(|s| matches!(s.op, Op::Probe(_))),
         }
     }
 
@@ -311,6 +319,7 @@ impl Unknown {
             Unknown::Stored => "with other values in store",
             Unknown::Tools => "with tools of other lengths and diameters",
             Unknown::Start => "that stands elsewhere when the program begins",
+            Unknown::Probe => "whose probe stops elsewhere",
             Unknown::Return => "whose startup code selects the other return of canned cycles",
         }
     }
@@ -321,6 +330,7 @@ impl Unknown {
             Unknown::Stored => "name its parameter file with `--vars`, or its INI file with `--ini`",
             Unknown::Tools => "name its tool table with `--tools`, or its INI file with `--ini`",
             Unknown::Start => "name the axes by G90 coordinates before anything depends on where they stand",
+            Unknown::Probe => "name the axis behind the probe, by a G90 coordinate, G92 or G10 L20",
             Unknown::Return => "write G98 or G99 before the cycle, or name the INI file of the machine with `--ini`",
         }
     }
@@ -351,6 +361,7 @@ impl Unknown {
                     tool.diameter = unit * (0.02 + 0.001 * number);
                 }
             }
+            Unknown::Probe => setup.probe_short = 1.625,
             Unknown::Start => setup.start = std::array::from_fn(|i| unit * n.start * (1.0 + 0.125 * i as f64)),
             Unknown::Return => {
                 setup.ini.values.insert(("rs274ngc".into(), "rs274ngc_startup_code".into()), vec!["G98".into()]);

@@ -452,7 +452,7 @@ fn built(motion: Motion, artifacts: Vec<Artifact>, more: Vec<Diagnostic>) -> Bui
 /// Lets the program begin later. `placed`: a machine file says where the part is.
 fn restart(motion: &mut Motion, unit: &Unit, (line, safe_z): (u32, Option<f64>), placed: bool) {
     let begin = |motion: &Motion, unsure| {
-        let options = gr_backends::from_line::Options { safe_z, unsure, room: None };
+        let options = gr_backends::from_line::Options { safe_z, unsure, stored: !unit.setup.params.is_empty(), room: None };
         gr_backends::from_line::from_line(&motion.program, FileId(0), line, &options, &texts(motion))
     };
     let mut unsure = [false; 9];

@@ -223,6 +223,20 @@ fn what_a_written_program_cannot_carry() {
     // Steps from where nobody knows, though every axis is named before it cuts.
     let steps = "G21 G91 F100\nG0 X5 Y5 Z5\nG1 X5 Y5 Z-2\nG0 Z9\nM2\n";
     told("E0652", &[file("a.ngc", steps)], &restart.replace('6', "3"));
+    // A height that the probe has found, and a shift by it; steps from there.
+    for (found, code) in [("G92 Z0", "E0619"), ("G92 Z0\nG0 Z5", "E0652"), ("G10 L2 P1 Z[#5063-1]\nG0 Z5", "E0652"), ("G91 G0 Z1\nG90", "E0652")] {
+        let probed = format!("G21 G90 G94 G54 F50\nG0 X0 Y0 Z10\nG38.2 Z-10\n{found}\nS1000 M3\nG1 X10\nM5\nM2\n");
+        let line = if found.contains('\n') { "7" } else { "6" };
+        told(code, &[file("a.ngc", &probed)], &restart.replace("line 6", &format!("line {line}")));
+    }
+    let stopped = "G21 G90 G94 G54 F50\nG0 X0 Y0 Z10\nG38.2 Z-10\nS1000 M3\nG1 X10\nM2\n";
+    told("E0619", &[file("a.ngc", stopped)], &restart.replace("line 6", "line 5"));
+    // Where G28 goes is known where its place is stored in a file.
+    let home = "G21 G90 G17 G54 F100\nG0 X1 Y2 Z5\nG28\nG1 X23\nX30\nM2\n";
+    told("E0619", &[file("a.ngc", home)], &restart.replace("line 6", "line 5"));
+    let stored = file("a.var", "5161 1\n5162 2\n5163 30\n5220 1\n5221 3\n5222 4\n5223 5\n");
+    let (text, status) = output(&[file("a.ngc", home), stored], "build a.ngc --target rs274ngc --from-line 5 --safe-z 60 --vars a.var");
+    assert_eq!((text.contains("Z60\nX23 Y-2\n"), text.contains("Z25"), text.contains('A'), status), (true, true, false, Some(0)), "{text}");
     // Nothing cuts before the height is said again.
     let clear = fixture.replace("G1 X5", "G0 X5 Y6 Z30").replace("G1 X10", "G1 Z1");
     assert!(codes(&[file("a.ngc", &clear)], &restart.replace('6', "5")).0.is_empty());
@@ -282,6 +296,8 @@ fn a_translation_holds_on_every_machine_or_says_so() {
         // The feed of the first way depends on its length, the wait on what is in store.
         "G21 G90 G93\nG1 X10 Y0 Z0 F2\nX20 F2\nM2\n",
         "G21 G90\nG0 X1\nG4 P[ABS[#5221]]\nG0 X2\nM2\n",
+        // A step from where a probe stopped that nobody can tell from a coordinate.
+        "G21 G54 F100\no1 sub\nG0 Z[0.5+0.5]\no1 endsub\nG90 G0 X0 Y0 Z10\nG38.2 Z-10\nG91\no1 call\nG90 G0 X9\nG0 Z5\nM2\n",
     ] {
         for command in ["build a.ngc -o o.ngc", "verify a.ngc"] {
             let (found, status) = codes(&program(text), command);
@@ -295,6 +311,9 @@ fn a_translation_holds_on_every_machine_or_says_so() {
         "G21 G90\nG0 X1 Y1 Z1\nG38.2 Z-5 F10\nG92 Z0\nG0 Z5\nM2\n",
         "G21 G90\nG0 X1 Y1 Z1\nG38.2 Z-5 F10\nG10 L20 P1 Z2.5\nG0 Z5\nM2\n",
         "G21 G90\nG0 X10\nG10 L20 P1 X0\nG0 X5\nM2\n",
+        "G21 G54 F100\no1 sub\nG0 Z1\no1 endsub\nG90 G0 X0 Y0 Z10\nG38.2 Z-10\nG91\no1 call\nG90 G0 X9\nG0 Z5\nM2\n",
+        // A probe that touches twice.
+        "G21 G90 G54 F100\nG0 X0 Y0 Z10\nG38.2 Z-10\nG91 G0 Z1\nG38.2 Z-2 F10\nG90 G10 L20 P1 Z0\nG0 Z5\nM2\n",
         "G21 G90 G54\nG0 X1 Y2 Z3\nG10 L20 P2 X50 Z[2+3]\nG10 L2 P3 X0 Y[1+1] R20\nG10 L2 P1 X0\nG55 G0 X3 Y4 Z5\nG92 X9\nG10 L20 P3 X1 Y1\nG56 G0 X1 Y1\nG10 L2 P6 Z0\nM2\n",
         "G21 G90 G17 G40 G49 G54\nG0 X1 Y1 Z1\nM2\n",
         // What the control may have in store is said again: a rotation of 0 too.

@@ -395,6 +395,8 @@ struct Fold {
     spoken: usize,
     late: Late,
     end: Option<End>,
+    /// There were too many mistakes to go on.
+    gave_up: bool,
     /// Unclosed statements of the other files that were opened.
     others: Vec<(FileId, Vec<Found>)>,
     /// What is kept of the findings; none = all.
@@ -406,6 +408,8 @@ struct Fold {
 struct Listed {
     seen: BTreeMap<Code, BTreeSet<Key>>,
     unlisted: Unlisted,
+    /// Of lints.
+    lints: Unlisted,
 }
 
 /// Findings of these kinds may be taken back later, when others are known.
@@ -425,7 +429,8 @@ impl Listed {
         }
         let again = seen.contains(&key);
         if !again {
-            *self.unlisted.entry((found.code, found.severity)).or_default() += 1;
+            let unlisted = if found.from == From::Lint { &mut self.lints } else { &mut self.unlisted };
+            *unlisted.entry((found.code, found.severity)).or_default() += 1;
         }
         again
     }
@@ -469,12 +474,10 @@ impl Fold {
         }
         let mut group = Group { first_line, found: found.clone(), frames };
         if let Some(at) = gives_up(found, self.spoken) {
-            let last = &found[at];
-            // Lints of a stretch with control flow come behind its findings.
-            let keep = |(i, f): &(usize, &Found)| *i <= at || (f.from == From::Lint && f.place.line <= last.place.line);
-            group.found = found.iter().enumerate().filter(keep).map(|(_, f)| f.clone()).collect();
-            let line = last.place.line.wrapping_add(first_line);
+            group.found = found[..=at].into();
+            let line = found[at].place.line.wrapping_add(first_line);
             self.end = Some(End { line, stopped: true, program: false });
+            self.gave_up = true;
         }
         self.spoken += found.iter().filter(|f| f.from != From::Lint).count();
         if let Some(listed) = &mut self.listed {
@@ -504,7 +507,8 @@ fn told(run: &mut impl Run, file: Whole<'_>, mut fold: Fold, last_line: u32) -> 
             at += 1;
         }
     }
-    let Fold { mut groups, mut late, mut end, others, listed, .. } = fold;
+    let Fold { mut groups, mut late, mut end, others, listed, gave_up, .. } = fold;
+    let Listed { mut unlisted, lints, .. } = listed.unwrap_or_default();
     let complete = at >= parts.len() || end.is_some();
     let after_error = drop_consequences(&mut groups, main, layout.first_control.unwrap_or(0));
     if complete {
@@ -535,10 +539,20 @@ fn told(run: &mut impl Run, file: Whole<'_>, mut fold: Fold, last_line: u32) -> 
             }
         }
     }
+    if gave_up {
+        // Which lints came before the last mistake, a stretch that jumps back doesn't know; among so many nobody misses them.
+        late.found.retain(|f| f.from != From::Lint);
+        for group in &mut groups {
+            group.found = group.found.iter().filter(|f| f.from != From::Lint).cloned().collect();
+        }
+        groups.retain(|g| !g.found.is_empty());
+    } else {
+        unlisted.extend(lints);
+    }
     if !late.found.is_empty() {
         groups.push(Group { first_line: 0, found: late.found.into(), frames: Some(Arc::default()) });
     }
-    Story { groups, end, complete, unlisted: listed.unwrap_or_default().unlisted }
+    Story { groups, end, complete, unlisted }
 }
 
 /// A run of which each part is remembered by what it depends on.

@@ -209,6 +209,63 @@ fn edits_leave_no_trace(text: String, edits: &[Edit], chunk: usize) {
     }
 }
 
+/// A file of Fanuc programs that jump, loop and call each other, each with block numbers of its own.
+fn fanuc() -> impl Strategy<Value = String> {
+    let line = || {
+        prop_oneof![
+            3 => line().prop_map(|l| if l.contains(['o', '%']) { "G0 X1.".to_string() } else { l }),
+            3 => (1u32..6, line()).prop_map(|(n, l)| if l.contains(['o', '%', 'N']) { format!("N{n}0") } else { format!("N{n}0 {l}") }),
+            2 => (1u32..6).prop_map(|n| format!("GOTO {n}0")),
+            2 => (1u32..6, 1u32..5).prop_map(|(n, k)| format!("IF [#1 LT {k}] GOTO {n}0")),
+            1 => Just("#1=#1+1".to_string()),
+            1 => (0u32..4).prop_map(|k| format!("IF [#1 EQ {k}] THEN #2=#1")),
+            1 => (1u32..4, 1u32..3).prop_map(|(k, n)| format!("WHILE [#1 LT {k}] DO {n}\n#1=#1+1\nEND {n}")),
+            1 => prop_oneof![Just("WHILE [#1 LT 2] DO 1"), Just("END 1"), Just("DO 2"), Just("END 2")].prop_map(str::to_string),
+            2 => (1u32..5, 1u32..4).prop_map(|(n, l)| format!("M98 P{n} L{l}")),
+            1 => (1u32..5, 1u32..4).prop_map(|(n, a)| format!("G65 P{n} A{a}.")),
+            1 => (0u32..6).prop_map(|n| if n == 0 { "M99".to_string() } else { format!("M99 P{n}0") }),
+        ]
+    };
+    let body = proptest::collection::vec(line(), 0..12);
+    let end = prop_oneof![3 => Just("M30"), 3 => Just("M99"), 1 => Just("")];
+    let program = (1u32..5, body, end).prop_map(|(n, body, end)| format!("O{n}\n{}\n{end}\n", body.join("\n")));
+    (any::<bool>(), proptest::collection::vec(program, 1..4)).prop_map(|(percent, all)| if percent { format!("%\n{}%\n", all.concat()) } else { all.concat() })
+}
+
+fn fanuc_edit() -> impl Strategy<Value = Edit> {
+    let jump = prop_oneof![Just("GOTO 10\n"), Just("N20 "), Just("O3\n"), Just("O"), Just("0"), Just("M99\n"), Just("END 1\n"), Just("IF [#1 LT 2] GOTO 30\n")];
+    (edit(), proptest::option::of(jump)).prop_map(|(e, jump)| Edit { new: jump.map_or(e.new, str::to_string), ..e })
+}
+
+fn fanuc_options(chunk: usize) -> Options {
+    let mut options = options(chunk);
+    options.setup.dialect = gr_spec::Dialect::find("fanuc-mill").expect("a dialect");
+    options
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: cases(), ..ProptestConfig::default() })]
+
+    #[test]
+    fn fanuc_programs_leave_no_trace_either(text in fanuc(), edits in proptest::collection::vec(fanuc_edit(), 0..4), chunk in 1usize..9) {
+        let fresh = |text: &str, chunk: usize| {
+            let mut session = Session::new();
+            let file = session.open("part.nc", text, fanuc_options(chunk));
+            session.check(file)
+        };
+        let mut session = Session::new();
+        let file = session.open("part.nc", &text, fanuc_options(chunk));
+        let mut now = text;
+        assert_same(&now, &session.check(file), &fresh(&now, 256), "chunks");
+        for edit in &edits {
+            let range = apply(&mut now, edit);
+            session.edit(file, range, &edit.new);
+                assert_same(&now, &session.check(file), &fresh(&now, 256), "edits");
+        }
+        assert_same(&now, &gr_driver::check_once("part.nc", now.as_str(), fanuc_options(chunk)).check, &fresh(&now, 256), "once");
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: cases(), ..ProptestConfig::default() })]
 

@@ -316,12 +316,17 @@ fn name<'t>() -> impl Parser<'t, Tokens<'t>, usize, Extra> + Clone {
     })
 }
 
-/// `value op value …` without brackets.
+/// `value op value …` without brackets. Behind an operator a value has to come: its fault is the one to tell.
 fn chain<'t>(value: Boxed<'t, Expr>, ctx: Ctx<'t>) -> impl Parser<'t, Tokens<'t>, Expr, Extra> + Clone {
-    value
-        .clone()
-        .then(operator(ctx).then(value).repeated().collect::<Vec<_>>())
-        .map(move |(first, rest)| climb(first, rest, ctx.family))
+    custom(move |inp: &mut Ref<'t, '_>| {
+        let first = inp.parse(&value)?;
+        let mut rest = Vec::new();
+        while let Ok((operator, length)) = find_operator(inp, ctx) {
+            skip(inp, length);
+            rest.push((operator, inp.parse(&value)?));
+        }
+        Ok(climb(first, rest, ctx.family))
+    })
 }
 
 /// `[ value op value … ]`
@@ -365,16 +370,6 @@ fn find_operator<'t>(inp: &mut Ref<'t, '_>, ctx: Ctx<'t>) -> Result<(Binary, usi
             fail(inp, length, Problem::UnknownOperationName(first))
         }
         _ => fail(inp, length, Problem::UnknownOperation),
-    })
-}
-
-fn operator<'t>(ctx: Ctx<'t>) -> impl Parser<'t, Tokens<'t>, Binary, Extra> + Clone {
-    custom(move |inp: &mut Ref<'t, '_>| match find_operator(inp, ctx) {
-        Ok((operator, length)) => {
-            skip(inp, length);
-            Ok(operator)
-        }
-        Err(_) => Err(unexpected(inp)),
     })
 }
 

@@ -124,6 +124,12 @@ fn plain_dialects() {
 /// A Fanuc control has none of LinuxCNC's own statements, names and functions.
 #[test]
 fn fanuc_is_a_closed_language() {
+    // Behind an operator the value is what is wrong, without brackets too.
+    for (line, fault) in [("#1=1+BIN[#100]", ("E0216", "BIN")), ("#1=[1+BIN[#100]]", ("E0216", "BIN")), ("#1=1+", ("E0211", ""))] {
+        let scan = scan(line, dialect("fanuc-mill"));
+        let found: Vec<_> = scan.faults.iter().map(|f| (f.code, &line[f.span.range()])).collect();
+        assert_eq!(found, [(gr_spec::Code::find(fault.0).expect("a code"), fault.1)], "{line}");
+    }
     let text = "O100 sub\nO100 endsub\nO100 call [1]\nO1 while [#1 LT 3]\nO1 repeat [3]\nO1 if [#1]\nO1 while\nO1 break\nO<x>\n\
         O1 nothing\nG0 X#<x>\n#<x>=1\n#1=EXISTS[#2]\nG0 X[2+3**2]\n#1=#<_x>*2\nWHILE[#<x> LT 1]DO1\nO1000 (title)\n";
     insta::assert_snapshot!(dump(text, "fanuc-mill"));

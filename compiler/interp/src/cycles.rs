@@ -353,9 +353,12 @@ impl<S: Sink> Interp<'_, S> {
         if radius != 0.0 || angle != 0.0 {
             hole.at = polar_increment(hole.at, radius, angle)?;
         }
-        if first && hole.level > hole.retract {
+        // A Fanuc control goes to the hole at the level where it stands, whatever level it goes back to.
+        if first && (hole.level > hole.retract || self.is_fanuc()) {
             self.cycle_rapid(hole, hole.at, hole.level);
-            self.cycle_rapid(hole, hole.at, hole.retract);
+            if hole.level != hole.retract {
+                self.cycle_rapid(hole, hole.at, hole.retract);
+            }
         } else {
             self.cycle_rapid(hole, hole.at, hole.clear);
             if hole.clear > hole.retract {

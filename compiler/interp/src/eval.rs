@@ -6,7 +6,7 @@ use gr_gcode::{Binary, ExprId, Node, Scan, Unary};
 use gr_spec::{Rs274, code, rs274};
 
 use crate::angle::sin_cos2;
-use crate::{Fault, Interp, Res, vacant};
+use crate::{Fault, Interp, Res, fanuc, vacant};
 
 /// Deeper nesting than any line of a controller allows; keeps the stack small on hostile input.
 const MAX_DEPTH: u32 = 600;
@@ -280,7 +280,10 @@ impl<S: Sink> Interp<'_, S> {
                 }
                 let (a, b) = (vacant::number(a), vacant::number(b));
                 let tolerance = if self.setup.version == Version::V2_9 { 1e-4 } else { 1e-6 };
-                let value = binary(op, a, b, tolerance).map_err(|f| blame(f, scan, id))?;
+                let value = match fanuc::bitwise(op, a, b).filter(|_| self.is_fanuc()) {
+                    Some(value) => value,
+                    None => binary(op, a, b, tolerance).map_err(|f| blame(f, scan, id))?,
+                };
                 // The controller looks at the value of a bracket, not at what is worked out inside.
                 if !value.is_finite() && self.is_bracketed(scan, id) {
                     return finite(value).map_err(|f| blame(f, scan, id));

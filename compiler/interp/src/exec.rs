@@ -247,6 +247,7 @@ impl<S: Sink> Interp<'_, S> {
         };
         lengths(&mut m.current);
         lengths(&mut m.g92);
+        lengths(&mut m.g52);
         lengths(&mut m.origin);
         m.program.iter_mut().for_each(|v| *v *= factor);
         m.comp_radius *= factor;

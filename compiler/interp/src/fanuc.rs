@@ -3,6 +3,7 @@
 //! dialects.
 
 use gr_canon::{Axes, Call, Plane, Sink};
+use gr_gcode::Binary;
 use gr_spec::{Dialect, Family, code, rs274};
 
 use crate::block::{Group, letters};
@@ -24,17 +25,32 @@ pub(crate) fn is_lathe(dialect: &Dialect) -> bool {
     dialect.id == TURN
 }
 
+/// What AND, OR, XOR and MOD make of two numbers: bits of whole numbers, and a rest with the sign of the first one. None: another operation.
+pub(crate) fn bitwise(op: Binary, a: f64, b: f64) -> Option<f64> {
+    let bits = |v: f64| libm::round(v) as i64;
+    Some(match op {
+        Binary::And => (bits(a) & bits(b)) as f64,
+        Binary::Or => (bits(a) | bits(b)) as f64,
+        Binary::Xor => (bits(a) ^ bits(b)) as f64,
+        Binary::Modulo => libm::fmod(a, b),
+        _ => return None,
+    })
+}
+
 impl<S: Sink> Interp<'_, S> {
     #[inline]
     pub(crate) fn is_fanuc(&self) -> bool {
         self.setup.dialect.family == Family::Fanuc
     }
 
-    /// What the control says of itself when it is switched on.
-    pub(crate) fn fanuc_power_up(&mut self) {
+    /// What the control says of itself when it is switched on, where that is not as with LinuxCNC.
+    pub(crate) fn power_up(&mut self) {
         if is_lathe(self.setup.dialect) {
             self.emit(Call::SelectPlane(Plane::Xz));
             self.emit(Call::SetFeedMode(0, 1));
+        }
+        if self.setup.dialect.family == Family::Grbl {
+            self.m.motion = 0;
         }
     }
 

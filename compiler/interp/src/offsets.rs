@@ -106,6 +106,7 @@ impl<S: Sink> Interp<'_, S> {
             self.m.current[i] -= self.m.g92[i];
         }
         self.world.position.copy_from_slice(&self.m.current[..6]);
+        self.world.short = self.setup.probe_short;
     }
 
     /// From the active frame to machine coordinates without tool offset: origin added.
@@ -225,6 +226,7 @@ impl<S: Sink> Interp<'_, S> {
         if g == 920 {
             self.rests_on_probed();
         }
+        let fanuc = self.is_fanuc();
         match g {
             520 | 920 => {
                 self.write_param(5210, 1.0);
@@ -232,11 +234,14 @@ impl<S: Sink> Interp<'_, S> {
                     let Some(v) = self.block.get(*letter) else { continue };
                     let m = &mut self.m;
                     if g == 520 {
-                        m.current[i] += m.g92[i] - v;
-                        m.g92[i] = v;
+                        // LinuxCNC has one shift for both; a Fanuc control adds the two.
+                        let shift = if fanuc { m.g92[i] - m.g52[i] + v } else { v };
+                        m.current[i] += m.g92[i] - shift;
+                        (m.g92[i], m.g52[i]) = (shift, v);
                     } else {
                         m.g92[i] = m.current[i] + m.g92[i] - v;
                         m.current[i] = v;
+                        m.g52[i] = 0.0;
                     }
                 }
                 self.emit(Call::SetG92Offset(self.m.g92));

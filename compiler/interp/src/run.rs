@@ -355,7 +355,7 @@ impl<'a, S: Sink> Interp<'a, S> {
         self.emit(Call::SetXyRotation(self.m.rotation));
         self.emit(Call::SetFeedReferenceXyz);
         self.start_where_it_stands();
-        self.fanuc_power_up();
+        self.power_up();
         self.run_startup();
     }
 

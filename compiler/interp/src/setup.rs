@@ -19,6 +19,9 @@ pub struct Setup {
     pub params: BTreeMap<u32, f64>,
     /// Where the machine stands when a run begins, in its own coordinates and units. The real `rs274` stands at its zero.
     pub start: Axes,
+    /// By how much a probe stops before its target, mm. 0: as the stand-in of the real `rs274` has it, which stops a little before but
+    /// reports the target.
+    pub probe_short: f64,
     /// INI file.
     pub ini: Ini,
     /// Folder in which files of subroutines are looked for first; none = the folder the command runs in.
@@ -54,6 +57,7 @@ impl Default for Setup {
             tools: ToolTable::default(),
             params: BTreeMap::new(),
             start: [0.0; 9],
+            probe_short: 0.0,
             ini: Ini::default(),
             base: None,
             confined: None,

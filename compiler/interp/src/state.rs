@@ -34,6 +34,8 @@ pub struct Modal {
     pub origin: Axes,
     /// Active G92 offset.
     pub g92: Axes,
+    /// The part of it that a Fanuc control counts as G52.
+    pub g52: Axes,
     /// Active tool length offset.
     pub tool_offset: Axes,
     /// Rotation of the work frame, degrees.

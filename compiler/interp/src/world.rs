@@ -1,7 +1,7 @@
 //! What the outside world answers. The controller asks it for positions after a probe or a tool change, and for
 //! feeds and offsets after a change of units; the stand-in answers as the real `rs274` does without a machine.
 
-use gr_canon::{Axes, Call, PathMode, Plane, Units};
+use gr_canon::{Axes, Call, PROBE_STOPS_SHORT, PathMode, Plane, Units};
 use bytemuck::{Pod, Zeroable};
 
 /// The stand-in for the machine.
@@ -16,6 +16,9 @@ pub struct World {
     g92: [f64; 6],
     /// Tool length offset as it was given out.
     pub tool_offset: Axes,
+    /// By how much a probe stops before its target, mm. 0: as `rs274`'s stand-in has it, which stops a little before but
+    /// reports the target.
+    pub short: f64,
     /// Feed as it was given out.
     pub feed: f64,
     /// G64 P as it was given out.
@@ -103,9 +106,13 @@ impl World {
         let distance = libm::sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
         self.probed.copy_from_slice(&to[..6]);
         if distance != 0.0 {
-            let back = if self.units == Units::Mm as u8 { 0.254 } else { 0.01 };
+            let unit = if self.units == Units::Mm as u8 { 1.0 } else { 25.4 };
+            let back = if self.short > 0.0 { self.short / unit } else { PROBE_STOPS_SHORT / unit };
             for i in 0..3 {
                 self.position[i] = to[i] + back * (d[i] / distance);
+            }
+            if self.short > 0.0 {
+                self.probed[..3].copy_from_slice(&self.position[..3]);
             }
         }
         self.position[3..].copy_from_slice(&to[3..6]);

@@ -75,6 +75,27 @@ fn a_fanuc_mill_wakes_up_in_g0_and_repeats_with_k() {
     assert_eq!(outcome.findings[0].fault.args[1..], ["fanuc-mill", "write K"]);
 }
 
+/// AND, OR and XOR work on bits and MOD keeps the sign of the dividend; G52 and G92 add up; behind a hole in G99 the next one is gone to at
+/// R, also in G98 (B-63944: operation commands, local coordinate system, canned cycles).
+#[test]
+fn a_fanuc_mill_reckons_and_shifts() {
+    let text = "G21 G90 G0 X[6AND3] Y[5XOR3] Z9.\nX[4OR1] Y[-7MOD3]\nIF[[1EQ1]AND[2EQ2]] GOTO 5\nX99.\nN5 M30\n";
+    assert_eq!(moves_of(&run_in("fanuc-mill", text).0), ["rapid 2 6 9", "rapid 5 -1 9"]);
+    let text = "G21 G90 G0 X10. Y10. Z5.\nG92 X0. Y0.\nG52 X5. Y0.\nX1. Y1.\nG52 X0. Y0.\nX1. Y1.\nM30\n";
+    let (calls, _) = run_in("fanuc-mill", text);
+    let shifts: Vec<&String> = calls.iter().filter(|c| c.starts_with("SET_G92")).collect();
+    assert!(shifts.iter().zip(["10.0000, 10.0000", "15.0000, 10.0000", "10.0000, 10.0000"]).all(|(c, s)| c.contains(s)), "{shifts:?}");
+    let text = "G21 G90 G0 X0 Y0 Z50.\nG99 G81 X10. Z-5. R2. F100.\nG98 X20.\nG80\nM30\n";
+    let expected = ["rapid 0 0 50", "rapid 10 0 50", "rapid 10 0 2", "feed 10 0 -5", "rapid 10 0 2", "rapid 20 0 2", "feed 20 0 -5", "rapid 20 0 50"];
+    assert_eq!(moves_of(&run_in("fanuc-mill", text).0), expected);
+}
+
+/// grbl starts in G0.
+#[test]
+fn grbl_wakes_up_in_g0() {
+    assert_eq!(moves_of(&run_in("grbl", "G21 G90\nX10 Y10\nG1 X5 F100\n").0), ["rapid 10 10 0", "feed 5 10 0"]);
+}
+
 fn moves_of(calls: &[String]) -> Vec<String> {
     let kinds = [("STRAIGHT_TRAVERSE(", "rapid "), ("STRAIGHT_FEED(", "feed "), ("ARC_FEED(", "arc ")];
     let numbers = |rest: &str, n: usize| {

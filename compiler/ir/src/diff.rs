@@ -469,8 +469,8 @@ struct Told {
 }
 
 impl Told {
-    /// Notes differences in what holds during a move. A spindle may be switched before or behind a rapid: what counts is
-    /// what it does in cuts.
+    /// Notes differences in what holds during a move. A spindle may be switched before or behind a rapid, and a work offset selected:
+    /// what counts is what they do in cuts.
     fn compare(&mut self, out: &mut Diff, (c, d): (&Conditions, &Conditions), at: (Spot, Spot), tolerance: &Tolerance) {
         let cuts = c.class != Class::Rapid;
         self.cut |= cuts;
@@ -482,9 +482,6 @@ impl Told {
         if changed(&mut self.tools, (c.tool, d.tool), c.tool != d.tool) {
             note(Aspect::Tool, format!("works with tool {}, the other with tool {}", c.tool, d.tool));
         }
-        if changed(&mut self.works, (c.work, d.work), c.work != d.work) {
-            note(Aspect::Event, format!("works in {}, the other in {}", system(c.work), system(d.work)));
-        }
         if cuts && c.class != Class::Tap && (c.class != Class::Sync && (c.mode != d.mode || c.angular != d.angular) || !close(c.feed, d.feed, tolerance.rate)) {
             note(Aspect::Feed, format!("feeds {}, the other {}", feed_text(c), feed_text(d)));
         }
@@ -492,14 +489,17 @@ impl Told {
             note(Aspect::Control, format!("feeds {}, the other {}", c.control.text(), d.control.text()));
         }
         if cuts {
-            self.compare_drive(out, (c, d), at, tolerance);
+            self.compare_rest(out, (c, d), at, tolerance);
         } else if self.rapid.is_none() {
             self.rapid = Some((*c, *d, at.0, at.1));
         }
     }
 
-    fn compare_drive(&mut self, out: &mut Diff, (c, d): (&Conditions, &Conditions), at: (Spot, Spot), tolerance: &Tolerance) {
+    fn compare_rest(&mut self, out: &mut Diff, (c, d): (&Conditions, &Conditions), at: (Spot, Spot), tolerance: &Tolerance) {
         let mut note = |aspect, message| out.note(tolerance.limit, aspect, at.0, at.1, message);
+        if changed(&mut self.works, (c.work, d.work), c.work != d.work) {
+            note(Aspect::Event, format!("works in {}, the other in {}", system(c.work), system(d.work)));
+        }
         if changed(&mut self.spindles, (c.spindles, d.spindles), !same_spindles(c, d, tolerance.rate)) {
             note(Aspect::Spindle, format!("spindle {}, the other {}", spindle_text(c), spindle_text(d)));
         }
@@ -511,7 +511,7 @@ impl Told {
     /// Behind the last move: programs of rapids alone are compared as they are.
     fn end(&mut self, out: &mut Diff, tolerance: &Tolerance) {
         if let Some((c, d, a, b)) = self.rapid.take().filter(|_| !self.cut) {
-            self.compare_drive(out, (&c, &d), (a, b), tolerance);
+            self.compare_rest(out, (&c, &d), (a, b), tolerance);
         }
     }
 }

@@ -14,7 +14,8 @@ fn whole(text: &str, setup: &Setup) -> Option<Vec<u8>> {
     let outcome = Interp::new(&mut files, setup, &mut printer).run(FileId(0));
     printer.flush();
     drop(printer);
-    let limited = outcome.findings.iter().any(|f| f.fault.rs.is_none() && f.fault.code.def().severity == gr_spec::Severity::Error);
+    // So many mistakes end a run, too.
+    let limited = outcome.findings.len() > 90 || outcome.findings.iter().any(|f| f.fault.rs.is_none() && f.fault.code.def().severity == gr_spec::Severity::Error);
     (!limited).then_some(printed)
 }
 

@@ -46,8 +46,13 @@ pub(super) struct Emitter<'a> {
     pub at: Axes,
     /// The axis was given by a word since the frame moved.
     pub anchored: [bool; 9],
-    /// The axis stands where a probe stopped, which only the machine knows.
-    pub loose: [bool; 9],
+    /// The axis stands where a probe stopped, which only the machine knows. By how much the simulation has it there from where the IR
+    /// has it: the target.
+    pub loose: [Option<f64>; 9],
+    /// The shift in force comes from G92, not from G52.
+    pub shifted_by_place: bool,
+    /// The operation whose S is written with G96 or G97 already.
+    pub speed_said: Option<usize>,
     /// The machine went to change the tool at a place of its own: the next move names all its axes.
     pub displaced: bool,
     /// Words of the canned cycle in force, while `motion` says that there is one.
@@ -101,7 +106,9 @@ impl<'a> Emitter<'a> {
             found: Findings::new(MOST_FAULTS),
             at: program.start().axes,
             anchored: [false; 9],
-            loose: [false; 9],
+            loose: [None; 9],
+            speed_said: None,
+            shifted_by_place: false,
             displaced: false,
             cycle: None,
             frame: state,
@@ -235,7 +242,15 @@ impl<'a> Emitter<'a> {
         }
     }
 
+    /// Leaves out a tool length that no move of Z carries.
+    fn drop_length(&mut self) {
+        if let Some((held, source)) = self.w.release() {
+            self.as_comment(&format!("{held} without a move of Z"), source);
+        }
+    }
+
     fn end(&mut self, index: usize) {
+        self.drop_length();
         let before = index.checked_sub(1).and_then(|i| self.program.get(i)).map(|s| s.op);
         let pallet = matches!(before, Some(Op::Stop(Stop::Pallet)));
         self.w.block(if pallet { "M30" } else { "M2" });
@@ -305,6 +320,7 @@ impl<'a> Emitter<'a> {
     }
 
     fn footer(&mut self, ends: bool) {
+        self.drop_length();
         match self.options.language {
             Language::Linuxcnc if !ends => self.w.bare("%"),
             Language::FanucMill => {
@@ -318,6 +334,10 @@ impl<'a> Emitter<'a> {
     }
 
     fn op(&mut self, view: &View<'_, '_>) {
+        let straight = matches!(view.op, Op::Rapid | Op::Linear) && view.state.sync.is_none_or(|s| s.velocity);
+        if view.op.moves() && !straight && view.start.axes[2] != view.end.axes[2] && self.w.release().is_some() {
+            self.cannot("a tool length (G43) that only begins in an arc or a thread along Z", view.source);
+        }
         match view.op {
             Op::Rapid if self.cycle_there(view) => {}
             Op::Rapid => self.rapid(view),
@@ -328,6 +348,8 @@ impl<'a> Emitter<'a> {
             Op::Probe(kind) => self.probe(view, kind),
             Op::RigidTap { bottom, scale } => self.rigid_tap(view, bottom, scale),
             Op::Dwell(seconds) => self.dwell(seconds),
+            // What is read of a probe is told where it is read, and steps from where it stopped are written as steps.
+            Op::RunTime("probe" | "where the probe stopped") => {}
             Op::RunTime(what) => self.say(code::EMIT_RUNTIME_VALUE, view.source, &[what.into()]),
             Op::Note(note, text) => self.note(note, text, view.source),
             Op::Override(Override::Feed, false) if self.tap_here(view) => {}

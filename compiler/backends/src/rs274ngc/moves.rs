@@ -33,8 +33,8 @@ impl Emitter<'_> {
             _ if source.line == crate::from_line::INSERTED => false,
             Some(words) => {
                 let letter = AXES[axis].to_ascii_lowercase() as u8;
-                // R of a drilling cycle; that of an arc, of a thread or of roughing is no place.
-                let roughing = || [700, 710, 711, 712, 720, 721, 722, 760].into_iter().any(|g| words.g(g));
+                // R of a drilling cycle; that of an arc, of a thread, of roughing or of a taper (Fanuc lathes) is no place.
+                let roughing = || self.sources.increments() && !self.cycling || [700, 710, 711, 712, 720, 721, 722, 760].into_iter().any(|g| words.g(g));
                 words.has(letter) || (axis == self.across && words.has(b'r') && !self.rounding && !roughing())
             }
             None => axis < 3,
@@ -66,8 +66,10 @@ impl Emitter<'_> {
             let moves = from.to_bits() != to.to_bits() && from != to;
             // A height that no block has named since the frame moved is the machine's, whatever a simulation takes it for.
             let nameless = !self.anchored[i] && i == self.across && !self.cycling && self.has_text(source);
-            if (self.loose[i] || nameless) && !force && !self.given(i, source) {
+            if (self.loose[i].is_some() || nameless) && !force && !self.given(i, source) {
                 self.at[i] = to;
+                // The simulation goes on from where it has the probe.
+                self.loose[i] = self.loose[i].map(|back| if moves { 0.0 } else { back });
                 continue;
             }
             let named = !self.anchored[i] && self.has_axis(i) && self.given(i, source);
@@ -101,7 +103,7 @@ impl Emitter<'_> {
     fn set(&mut self, axis: usize, said: f64) {
         self.at[axis] = said;
         self.anchored[axis] = true;
-        self.loose[axis] = false;
+        self.loose[axis] = None;
     }
 
     /// A block of motion; nothing when there are no words.
@@ -145,9 +147,56 @@ impl Emitter<'_> {
             let begins = |s: gr_ir::Step<'_>| s.source == view.source && matches!(s.op, Op::Begin { marker: Marker::Cycle, .. });
             self.cycling = (1..=3).any(|n| self.program.get(view.index + n).is_some_and(begins));
         }
-        let words = self.axis_words(view.start, view.end, view.source, &[]);
+        match self.step_from_probe(view) {
+            Some(words) => self.incremental("G0", &words, &[]),
+            None => {
+                let words = self.axis_words(view.start, view.end, view.source, &[]);
+                self.motion_block(0, &words, &[]);
+            }
+        }
         self.cycling = cycling;
-        self.motion_block(0, &words, &[]);
+    }
+
+    /// The words of a step (G91) from where a probe stopped: there only the step is known. None: it is none.
+    fn step_from_probe(&mut self, view: &View<'_, '_>) -> Option<Vec<String>> {
+        if self.loose.iter().all(Option::is_none) {
+            return None;
+        }
+        let from: Axes = std::array::from_fn(|i| self.loose[i].map_or(self.at[i], |back| view.start.axes[i] + back));
+        let by: Axes = std::array::from_fn(|i| view.end.axes[i] - from[i]);
+        let given: Vec<usize> = (0..9).filter(|i| self.given(*i, view.source)).collect();
+        // Who has named the place since knows the coordinate.
+        let unknown = |i: &usize| self.loose[*i].is_some() && !self.anchored[*i];
+        // G91 may stand in another file, or where a jump comes from: a plain number tells whether it is a step.
+        let steps = Words::goes_by_increments(self.sources, view.source.file, view.source.line);
+        let near = |v: f64, to: f64| [v, v / 2.0].iter().any(|v| (v - to).abs() < 1e-6);
+        let says = |i: usize| self.literal(AXES[i], view).map_or(steps, |v| near(v, by[i]) && (steps || !near(v, view.end.axes[i])));
+        if !given.iter().any(unknown) || !given.iter().copied().filter(unknown).all(says) {
+            return None;
+        }
+        let mut words = Vec::new();
+        for i in 0..9 {
+            if self.loose[i].is_some() {
+                self.loose[i] = Some(0.0);
+            }
+            if !given.contains(&i) {
+                self.at[i] = if self.loose[i].is_some() { view.end.axes[i] } else { self.at[i] };
+                continue;
+            }
+            let (text, said) = self.w.axis(i, by[i]);
+            self.at[i] = from[i] + said;
+            words.push(format!("{}{text}", AXES[i]));
+        }
+        Some(words)
+    }
+
+    /// A block in increments.
+    fn incremental(&mut self, code: &str, words: &[String], feed: &[String]) {
+        let words = words.iter().chain(feed).map(String::as_str);
+        let block: Vec<&str> = ["G91", code].into_iter().chain(words).collect();
+        self.w.block(&block.join(" "));
+        self.w.block("G90");
+        self.motion = None;
     }
 
     /// A plan begins by going to a safe height: nobody knows where the machine stands over the part by then, so the
@@ -193,7 +242,7 @@ impl Emitter<'_> {
                 reached[i] = said;
                 words.push(format!("{}{text}", AXES[i]));
                 self.anchored[i] = false;
-                self.loose[i] = false;
+                self.loose[i] = None;
             }
         }
         self.at = self.frame.work_frame(&reached);
@@ -246,6 +295,7 @@ impl Emitter<'_> {
         // An axis that is not named stands where its rounded number took it.
         for i in (0..9).filter(|i| all || axes.contains(i)) {
             self.at[i] = end[i];
+            self.loose[i] = None;
         }
         self.anchored = [false; 9];
         if second.is_some() {
@@ -268,6 +318,10 @@ impl Emitter<'_> {
             if !self.options.stored_known {
                 return self.cannot("a feed move to a place of the machine (G53 G1; G53 is a rapid there)", view.source);
             }
+        }
+        if let Some(words) = self.step_from_probe(view) {
+            let feed = self.feed_words(view.state, view.start, view.end, view.source);
+            return self.incremental("G1", &words, &feed);
         }
         self.straight(view.start, view.end, view.state, view.source);
     }
@@ -353,14 +407,26 @@ impl Emitter<'_> {
         if !self.has_axes(&view.start.axes, &view.end.axes, view.source) {
             return;
         }
-        let moved: Vec<usize> = (0..9).filter(|i| view.start.axes[*i] != view.end.axes[*i]).collect();
-        let mut words = vec![format!("G38.{}", 2 + (kind & 3))];
-        words.extend(self.axis_words(view.start, view.end, view.source, &moved));
-        words.extend(self.feed_words(view.state, view.start, view.end, view.source));
-        self.w.block(&words.join(" "));
-        for i in moved {
-            self.loose[i] = true;
-            self.anchored[i] = false;
+        let before = self.loose;
+        let moves = |i: &usize| view.start.axes[*i] != view.end.axes[*i];
+        // Where another probe stopped, an axis stays unless it is named.
+        let moved: Vec<usize> = (0..9).filter(moves).filter(|i| before[*i].is_none() || self.given(*i, view.source)).collect();
+        let code = format!("G38.{}", 2 + (kind & 3));
+        if let Some(words) = self.step_from_probe(view) {
+            let feed = self.feed_words(view.state, view.start, view.end, view.source);
+            self.incremental(&code, &words, &feed);
+        } else {
+            let mut words = vec![code];
+            words.extend(self.axis_words(view.start, view.end, view.source, &moved));
+            words.extend(self.feed_words(view.state, view.start, view.end, view.source));
+            self.w.block(&words.join(" "));
+        }
+        let way: [f64; 3] = std::array::from_fn(|i| view.start.axes[i] + before[i].unwrap_or(0.0) - view.end.axes[i]);
+        let length = way.iter().map(|w| w * w).sum::<f64>().sqrt();
+        for i in (0..9).filter(|i| moved.contains(i) || before[*i].is_some()) {
+            let back = way.get(i).filter(|_| length > 0.0).map_or(0.0, |w| gr_canon::PROBE_STOPS_SHORT * w / length);
+            self.loose[i] = Some(back);
+            self.anchored[i] &= !moved.contains(&i);
         }
         self.motion = None;
     }

@@ -128,7 +128,7 @@ impl Emitter<'_> {
     /// Whether the machine coordinates are known in which the axes of a block stand.
     fn stands_known(&self, block: Option<Words>) -> bool {
         let mut named = (0..9).filter(|i| block.is_some_and(|w| w.has(AXES[*i].to_ascii_lowercase() as u8)));
-        self.options.stored_known && named.all(|i| self.anchored[i] && !self.loose[i])
+        self.options.stored_known && named.all(|i| self.anchored[i] && self.loose[i].is_none())
     }
 
     /// Writes G10 L2 for a work offset, called by its number or 0.
@@ -163,7 +163,8 @@ impl Emitter<'_> {
                 let mut there = *view.state;
                 let mut nowhere = gr_ir::Pose::default();
                 [Op::WorkOffset(number, *offset), Op::Rotation(rotation)].iter().for_each(|op| there.apply(op, &mut nowhere));
-                let place = there.work_frame(&self.frame.machine(&self.at));
+                let at = std::array::from_fn(|i| self.loose[i].map_or(self.at[i], |back| view.end.axes[i] + back));
+                let place = there.work_frame(&self.frame.machine(&at));
                 let words = self.changed_or_named(&place, &place, set);
                 return self.w.block(&format!("G10 L20 P{index} {}", words.join(" ")));
             }
@@ -203,13 +204,7 @@ impl Emitter<'_> {
         self.move_frame(view.state);
         let mut block = format!("G10 L20 P{n}");
         for i in (0..9).filter(|i| words.has(AXES[*i].to_ascii_lowercase() as u8)) {
-            let value = match self.named_here(i, known[i], view) {
-                Some(value) => value,
-                None => {
-                    self.cannot("a value for where a probe stopped that is not a plain number", view.source);
-                    view.end.axes[i]
-                }
-            };
+            let value = self.named_here(i, known[i], view);
             let (text, said) = self.w.axis_fine(i, value, self.w.places.max(9));
             block += &format!(" {}{text}", AXES[i]);
             self.at[i] = said;
@@ -218,12 +213,11 @@ impl Emitter<'_> {
         Some(block)
     }
 
-    /// What a block (G92, G10 L20) calls the place where an axis stands: where it was written to, which rounding has moved, or
-    /// where only the machine knows, the number of the source. None: that is no plain number.
-    fn named_here(&self, axis: usize, known: bool, view: &View<'_, '_>) -> Option<f64> {
-        let scale = if axis >= 3 && axis < 6 { 1f64.to_radians() } else if view.state.units == gr_ir::Units::Inch { 25.4 } else { 1.0 };
-        if self.loose[axis] {
-            return Some(self.literal(AXES[axis], view.source)? * scale);
+    /// What a block (G92, G10 L20) calls the place where an axis stands: where it was written to, which rounding has moved, or where a
+    /// probe stopped, what the simulation reckons with.
+    fn named_here(&self, axis: usize, known: bool, view: &View<'_, '_>) -> f64 {
+        if let Some(back) = self.loose[axis] {
+            return view.end.axes[axis] + back;
         }
         // Behind another work offset the place is not known any more; what rounding has moved it by still is.
         let unit = self.w.unit * 10f64.powi(-(self.w.places as i32));
@@ -233,17 +227,19 @@ impl Emitter<'_> {
         // what the source says. A lathe's may be a diameter.
         let near = |v: f64| (v - at).abs() <= 2.0 * unit + SAME_PLACE;
         let calls = sets_here(self.sources, view.source) || Words::at(self.sources, view.source.file, view.source.line).is_some_and(|w| w.g(920));
-        let literal = self.literal(AXES[axis], view.source).map(|v| v * scale).filter(|v| !near(*v) && !near(v / 2.0));
-        Some(literal.filter(|_| calls && view.state.local_offset != [0.0; 9]).unwrap_or(at))
+        let literal = self.literal(AXES[axis], view).filter(|v| !near(*v) && !near(v / 2.0));
+        literal.filter(|_| calls && view.state.local_offset != [0.0; 9]).unwrap_or(at)
     }
 
-    /// The plain number behind a letter of a source line.
-    fn literal(&self, letter: char, source: Source) -> Option<f64> {
-        let line = self.sources.line(source.file, source.line)?;
+    /// The plain number behind the letter of an axis in a source line, mm or rad.
+    pub fn literal(&self, letter: char, view: &View<'_, '_>) -> Option<f64> {
+        let line = self.sources.line(view.source.file, view.source.line)?;
         let code = line.split(['(', ';']).next()?.to_ascii_lowercase();
         let rest = code.split_once(letter.to_ascii_lowercase())?.1.trim_start();
         let digits: String = rest.chars().take_while(|c| c.is_ascii_digit() || matches!(c, '.' | '-' | '+')).collect();
-        digits.parse().ok()
+        let inch = view.state.units == gr_ir::Units::Inch;
+        let scale = if "ABC".contains(letter) { 1f64.to_radians() } else if inch { 25.4 } else { 1.0 };
+        Some(digits.parse::<f64>().ok()? * scale)
     }
 
     fn rotation(&mut self, angle: f64, view: &View<'_, '_>) {
@@ -275,7 +271,8 @@ impl Emitter<'_> {
             return;
         }
         let shift = match self.options.language {
-            Language::FanucMill => true,
+            // G52 and G92 are two shifts there, which add up: what G92 has shifted, G92 takes back.
+            Language::FanucMill => !self.shifted_by_place,
             // G92 refers to where the machine is, which nobody knows before the first move.
             Language::Linuxcnc => inserted || self.words(view.source).is_some_and(|w| w.g(520)),
             Language::Grbl if inserted && *offset != old => {
@@ -294,7 +291,7 @@ impl Emitter<'_> {
         let named = text.filter(|w| w.g(920) && w.names_axes());
         let shift = shift && named.is_none();
         let fanuc = self.options.language == Language::FanucMill;
-        if offset.iter().all(|v| *v == 0.0) && (!shift || inserted && !fanuc) && named.is_none() {
+        if offset.iter().all(|v| *v == 0.0) && !fanuc && (!shift || inserted) && named.is_none() {
             self.w.block("G92.1");
             return self.motion_unsure();
         }
@@ -305,14 +302,12 @@ impl Emitter<'_> {
         let said_there = |i: usize| spoken.is_some_and(|w| w.has(AXES[i].to_ascii_lowercase() as u8));
         for i in (0..9).filter(|i| offset[*i] != old[*i] || said_there(*i)) {
             // G52 names the shift, G92 what the present place is called; the place has been rounded before.
-            let value = if shift { Some(offset[i]) } else { self.named_here(i, known[i], view) };
-            let Some(value) = value else {
-                return self.cannot("a value for where a probe stopped that is not a plain number", view.source);
-            };
+            let value = if shift { offset[i] } else { self.named_here(i, known[i], view) };
             let (text, said) = self.w.axis_fine(i, value, places);
             words.push(format!("{}{text}", AXES[i]));
             if !shift {
                 self.at[i] = said;
+                self.anchored[i] |= self.loose[i].is_some();
             }
         }
         let code = if shift { "G52" } else { "G92" };
@@ -322,6 +317,7 @@ impl Emitter<'_> {
         if let Some(axis) = self.lacks(|i| words.iter().any(|w| w.starts_with(AXES[i]))) {
             return self.cannot(&format!("a shift of the {axis} axis"), view.source);
         }
+        self.shifted_by_place = !shift && offset.iter().any(|v| *v != 0.0);
         self.w.block(&format!("{code} {}", words.join(" ")));
         self.motion_unsure();
     }
@@ -377,7 +373,11 @@ impl Emitter<'_> {
                 return self.move_frame(view.state);
             }
         };
-        self.w.block(&block);
+        match self.options.language {
+            // Without a Z the axis moves by the length there.
+            Language::FanucMill => self.w.hold(&block, view.source),
+            _ => self.w.block(&block),
+        }
         self.motion_unsure();
         let old = self.frame.tool_offset;
         self.move_frame(view.state);
@@ -501,12 +501,14 @@ impl Emitter<'_> {
         let Some(which) = self.spindle_word(spindle, view.source) else {
             return;
         };
-        // G96 and G97 want their S in the same block.
-        let next = match self.op_after(view.index) {
-            Some(Op::SpindleSpeed { spindle: s, speed }) if s == spindle => Some(speed),
+        // G96 and G97 want their S in the same block; the feed of that block comes between the two.
+        let block = (view.index + 1..).map_while(|i| self.program.get(i)).take_while(|s| s.source == view.source);
+        let mut between = block.skip_while(|s| matches!(s.op, Op::FeedMode { .. } | Op::Feed { .. } | Op::Note(..)));
+        let next = between.next().and_then(|s| match s.op {
+            Op::SpindleSpeed { spindle: n, speed } if n == spindle => Some((s.index, speed)),
             _ => None,
-        };
-        let speed = next.map(|speed| format!(" S{}", self.speed_text(speed, surface.is_some()))).unwrap_or_default();
+        });
+        let speed = next.map(|(_, speed)| speed).map(|speed| format!(" S{}", self.speed_text(speed, surface.is_some()))).unwrap_or_default();
         match surface {
             Some(limit) => {
                 // A limit beyond any spindle stands for none.
@@ -516,9 +518,7 @@ impl Emitter<'_> {
             None if self.linuxcnc() => self.w.block(&format!("G97{speed}{which}")),
             None => self.w.block(speed.trim()),
         }
-        if next.is_some() {
-            self.done_until = view.index + 2;
-        }
+        self.speed_said = next.map(|(index, _)| index);
     }
 
     /// rpm, or m/min or feet/min of surface speed as the length unit says.
@@ -529,6 +529,9 @@ impl Emitter<'_> {
     }
 
     fn spindle_speed(&mut self, spindle: i32, speed: f64, view: &View<'_, '_>) {
+        if self.speed_said == Some(view.index) {
+            return;
+        }
         let surface = view.state.spindle(spindle).surface.is_some();
         let Some(which) = self.spindle_word(spindle, view.source) else {
             return;

@@ -1,7 +1,7 @@
 //! Lines, words and numbers.
 
 use super::{Language, Options};
-use gr_ir::Units;
+use gr_ir::{Source, Units};
 
 /// The text so far and how numbers look.
 pub(super) struct Writer {
@@ -15,6 +15,10 @@ pub(super) struct Writer {
     language: Language,
     numbers: Option<(u32, u32)>,
     line: String,
+    /// G43 with its H, or G49, that waits for a block with a Z: without one the axis moves by the length on a Fanuc control.
+    held: Option<(String, Source)>,
+    /// The program has asked for a length.
+    lengthened: bool,
 }
 
 impl Writer {
@@ -29,6 +33,8 @@ impl Writer {
             language: options.language,
             numbers: options.numbers,
             line: String::new(),
+            held: None,
+            lengthened: false,
         }
     }
 
@@ -39,8 +45,30 @@ impl Writer {
         self.lines.push(self.source);
     }
 
+    /// Keeps G43 or G49 for the next block that moves Z. One that takes no length away needs no such block.
+    pub fn hold(&mut self, block: &str, source: Source) {
+        if block == "G49" && !self.lengthened {
+            return self.block(block);
+        }
+        self.lengthened |= block != "G49";
+        self.held = Some((block.to_string(), source));
+    }
+
+    /// What is still kept, and where it was asked for.
+    pub fn release(&mut self) -> Option<(String, Source)> {
+        self.held.take()
+    }
+
     /// A block.
     pub fn block(&mut self, words: &str) {
+        let any = |of: &[&str]| words.split(' ').any(|w| of.contains(&w));
+        let moves = words.split(' ').any(|w| w.starts_with('Z')) && !any(&["G10", "G92", "G52", "G04", "G4"]);
+        // A place of the machine takes no length; on the way home from where it stands (G91 G28 Z0) the axis would move by it.
+        let home = any(&["G53", "G28", "G30"]);
+        let takes = |held: &str| moves && !(home && (held != "G49" || any(&["G91"])));
+        let taken = self.held.take_if(|(held, _)| takes(held));
+        let with = taken.map(|(held, _)| held.split_once(' ').map_or(format!("{held} {words}"), |(code, h)| format!("{code} {words} {h}")));
+        let words = with.as_deref().unwrap_or(words);
         if let Some((n, step)) = self.numbers {
             self.text.push_str(&format!("N{n} "));
             // Five digits are what every control takes.
