@@ -271,6 +271,42 @@ fn check_asks_about_stepnc() {
     assert!(unknown.0 == Some(1) && unknown.1.contains("job.toml") && unknown.1.contains("turn it"), "{}", unknown.1);
 }
 
+/// A restart of a plan names the axes that it brings somewhere: the others stay where nobody knows they are.
+#[test]
+fn a_plan_from_a_line_on() {
+    let part = "docs/examples/stepnc/case-study.p21";
+    let made = |machine: &str, target: &str| {
+        let o = run(&["build", part, "--machine", machine, "--target", target, "--from-line", "105", "-o", "-"]);
+        assert!(o.status.success(), "{}", text(&o.stderr));
+        text(&o.stdout)
+    };
+    let rapid = made(CELL, "rapid");
+    let first: Vec<&str> = rapid.lines().filter(|l| l.contains("Move") && l.contains("[[") && !l.contains("MoveAbsJ")).take(2).collect();
+    assert!(first.iter().all(|l| l.contains("[[-3,19.5,")), "{first:?}");
+    let mill = made("generic/mill3", "joint-gcode");
+    let (up, over) = (mill.lines().position(|l| l.starts_with("G0 ")).expect("a rapid"), mill.lines().filter(|l| l.starts_with("G0 ")).nth(1));
+    assert!(mill.lines().nth(up).is_some_and(|l| l.contains("X0 Y0 ")) && over.is_some_and(|l| l.contains("X-3 Y19.5 ")), "{mill}");
+}
+
+/// Behind a tool change the length of the tool before is in force until G43: across that is no matter.
+#[test]
+fn the_length_of_the_tool_before() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_string();
+    let tool = |n: u32, length: u32| format!("[[tool]]\nnumber = {n}\nname = \"t{n}\"\nposition = [0, 0, {length}]\ndiameter = 6\n");
+    let machine = format!("format = 1\nid = \"shop/mill\"\nextends = \"generic/mill3\"\n[frames.table]\nposition = [-100, -50, -300]\n{}{}", tool(1, 60), tool(2, 80));
+    std::fs::write(path("m.toml"), machine).unwrap();
+    std::fs::write(path("a.tbl"), "T1 P1 Z60 D6\nT2 P2 Z80 D6\n").unwrap();
+    let part = |height: &str| format!("G21 G90 G54\nG53 G0 Z0\nT1 M6\nG0 X10 Y10\nG43 H1 Z15\nG1 Z-1 F200\nG0 Z15\nG53 G0 Z0\nT2 M6\nG0 X20 Y20\n{height}\nG1 Z-1\nG0 Z15\nM30\n");
+    let told = |height: &str| {
+        std::fs::write(path("a.ngc"), part(height)).unwrap();
+        let o = run(&["build", &path("a.ngc"), "--machine", &path("m.toml"), "-t", &path("a.tbl"), "--target", "joint-gcode", "-o", "-"]);
+        assert!(o.status.success(), "{}", text(&o.stderr));
+        text(&o.stderr).matches("E0525").count()
+    };
+    assert_eq!((told("G43 Z15 H2"), told("G0 Z15")), (0, 1));
+}
+
 /// A plan that probes goes on from named places, whatever is measured.
 #[test]
 fn a_plan_that_probes() {

@@ -205,6 +205,8 @@ pub(crate) struct Gather<'a> {
     restarted: bool,
     /// Made from features: every move says all.
     planned: bool,
+    /// The operation cuts or names Z: a length counts. Across, that of the tool before may still be in force.
+    goes_along: bool,
     /// Whether lines go by increments.
     increments: Increments,
     /// What the frame in force is placed by.
@@ -284,6 +286,7 @@ impl<'a> Gather<'a> {
             inserted: false,
             restarted: false,
             planned: false,
+            goes_along: false,
             increments: Increments::default(),
             placed: None,
             path_said: false,
@@ -335,6 +338,7 @@ impl<'a> Gather<'a> {
             if view.index == self.closes {
                 self.retract();
             }
+            self.goes_along = view.op.cuts() || self.says_height(&view);
             self.rests_on_unnamed(program, &view, &mut unnamed);
             self.op(&view);
         }
@@ -374,6 +378,12 @@ impl<'a> Gather<'a> {
             }
             _ => self.action(view),
         }
+    }
+
+    /// Whether a move has a word for Z, or brings the tool home.
+    fn says_height(&self, view: &View<'_, '_>) -> bool {
+        let letters = || Letters::at(self.findings.sources, view.source.file, view.source.line);
+        view.op.moves() && (self.planned || self.inserted || letters().is_none_or(|l| l.has(b'z') || !l.names_axes()))
     }
 
     /// A mill's control has the spindle's nose where G43 finds no length, whatever the machine file has of the tool.
@@ -553,7 +563,7 @@ impl<'a> Gather<'a> {
         let (name, frame, mass) = match known {
             Some(t) => {
                 let file = self.machine.tool_length(t);
-                if length != 0.0 && (length - file).abs() > 1e-3 {
+                if length != 0.0 && (length - file).abs() > 1e-3 && self.goes_along {
                     let args = [number.to_string(), format!("{length:.3}"), format!("{file:.3}"), "the machine file holds".into()];
                     self.findings.once_each(code::ROBOT_TOOL_LENGTH, Some(self.source), &args);
                 }

@@ -117,9 +117,9 @@ impl Coordinates {
             return self.by;
         }
         let letters = match view.source.line {
-            _ if self.planned => None,
             // The way to a restart begins anywhere: it names what it changes.
             INSERTED => Some(Letters::default()),
+            _ if self.planned => None,
             line => Letters::at(sources, view.source.file, line),
         };
         let Some(letters) = letters else {

@@ -25,9 +25,9 @@ impl Gather<'_> {
     /// or because they change.
     fn named(&self, start: &Pose, end: &Pose, state: &State) -> [bool; 3] {
         let letters = match self.inserted {
-            _ if self.planned => None,
             // The way to a restart begins anywhere: it names what it changes.
             true => Some(Letters::default()),
+            false if self.planned => None,
             false => Letters::at(self.findings.sources, self.source.file, self.source.line),
         };
         let Some(letters) = letters else { return [true; 3] };
