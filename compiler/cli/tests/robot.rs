@@ -773,6 +773,74 @@ fn no_cut_turns_under_an_axis_of_the_machine() {
     assert!(found.is_empty() && moves.last().is_some_and(|l| l.contains(" Z50 B0")), "{found} {moves:?}");
 }
 
+/// After a retract to a place of the machine rotary axes are indexed with the slides where they are, and the next block that names the part's
+/// coordinates leads there; a cut that goes by one that no word has named since is told.
+#[test]
+fn an_index_leaves_the_slides_where_they_are() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_string();
+    let made = |base: &str, program: &str| {
+        let file = format!("format = 1\nid = \"shop/m\"\nextends = \"generic/{base}\"\n[frames.table]\nposition = [0, 0, -150]\n[[tool]]\nnumber = 1\nname = \"em10\"\nposition = [0, 0, 60]\n");
+        std::fs::write(path("m.toml"), file).unwrap();
+        std::fs::write(path("a.ngc"), format!("G21 G90 G17 G54\nT1 M6 G43 H1\nS6000 M3\nG0 X30 Y10 Z50\n{program}\nM5\nM2\n")).unwrap();
+        let o = run(&["build", &path("a.ngc"), "--machine", &path("m.toml"), "--target", "joint-gcode", "--message-format", "short", "-q"]);
+        (text_lines(&o.stdout).into_iter().filter(|l| l.starts_with("G0 ") || l.starts_with("G1 ")).collect::<Vec<_>>(), text(&o.stderr))
+    };
+    let place = |line: &String| line.split(" F").next().unwrap().to_string();
+    for (base, tilt, angles, y) in [("mill5-ac-table", "A", [-45, -60, -75, -90], "Y10"), ("mill5-bc-table", "B", [-45, -60, -75, -90], "Y10")] {
+        for angle in angles {
+            let (direct, found) = made(base, &format!("G0 X10 Y-50 Z-20 {tilt}{angle} C0\nG1 Y-9 F300\nX30"));
+            assert!(found.is_empty(), "{base} {angle}: {found}");
+            for retract in ["G53 G0 Z0", "G91 G28 Z0\nG90"] {
+                let (moves, found) = made(base, &format!("{retract}\nG0 {tilt}{angle} C0\nG0 X10 Y-50\nZ-20\nG1 Y-9 F300\nX30"));
+                assert!(found.is_empty(), "{base} {angle}: {found}");
+                // All along the way up there nothing slides.
+                let up: Vec<&String> = moves.iter().skip_while(|l| !l.contains(" Z0 ")).take_while(|l| l.contains(" Z0 ")).collect();
+                assert!(up.len() > 1 && up.iter().all(|l| l.starts_with(&format!("G0 X30 {y} Z0 "))) && up.last().unwrap().contains(&format!(" {tilt}{angle} ")), "{base} {angle}: {up:?}");
+                let cuts = |of: &[String]| of.iter().filter(|l| l.starts_with("G1 ")).map(place).collect::<Vec<_>>();
+                assert_eq!(cuts(&moves), cuts(&direct), "{base} {angle}");
+            }
+            // With a place of the part in the same block what isn't named stays in the part.
+            let (moves, found) = made(base, &format!("G53 G0 Z0\nG0 X10 Y-50 {tilt}{angle} C0\nZ-20\nG1 Y-9 F300\nX30"));
+            assert!(found.is_empty() && moves.last().map(place) == direct.last().map(place), "{base} {angle}: {found}");
+        }
+    }
+    // Back to the square table too.
+    let (moves, found) = made("mill5-ac-table", "G0 X10 Y-50 Z-20 A-90 C0\nG53 G0 Z0\nG0 A0 C90");
+    let up: Vec<&String> = moves.iter().skip_while(|l| !l.contains(" Z0 A-90 ")).collect();
+    assert!(found.is_empty() && up.len() > 10 && up.iter().all(|l| l.starts_with("G0 X10 Y-180 Z0 ")) && up.last().unwrap().contains(" A0 C90"), "{found} {up:?}");
+    for (program, line, axes) in [
+        ("G53 G0 Z0\nG0 A-90\nG0 X10 Z-20\nG1 X30 F300", 8, "in Y:"),
+        ("G53 G0 Z0\nG0 A-90\nG0 X10 Z-20\nG1 Y-9 F300", 8, "in Y:"),
+        ("G53 G0 Z0\nG0 A-90\nG0 X10 Y-50\nG1 Y-9 F300", 8, "in Z:"),
+        ("G53 G0 Z0\nG0 A-90\nG0 X10 Y-50\nG91 G1 Z-9 Y5 F300", 8, "in Z:"),
+        ("G53 G0 Z0\nG0 A-90\nG38.3 Z-50 F100", 7, "in Y:"),
+        ("G53 G0 Z0\nG1 A-90 F300", 6, "in Z:"),
+        // The way up leads the tool aside on a part that is tilted.
+        ("G0 A-45\nG53 G0 Z0\nG0 Z20\nG1 X20 F300", 8, "in Y:"),
+    ] {
+        let (moves, found) = made("mill5-ac-table", program);
+        assert!(moves.is_empty() && found.contains(&format!(":{line}:")) && found.contains("error[E0559]") && found.contains(axes) && found.matches("error").count() == 1, "{program}: {found}");
+    }
+    // Down from a height that is the machine's, over a place of the part.
+    let (moves, found) = made("mill5-ac-table", "G53 G0 Z0\nG0 A-45\nG0 A0\nG0 X5 Y6\nG1 Z2 F300");
+    assert!(found.is_empty() && moves.last().is_some_and(|l| l.starts_with("G1 X5 Y6 Z-88 A0 C0 ")), "{moves:?} {found}");
+}
+
+/// What a joint's limit is compared with is where the program's move sends it, and not where that was seen first.
+#[test]
+fn limits_tell_where_the_move_goes() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_string();
+    std::fs::write(path("m.toml"), "format = 1\nid = \"shop/m\"\nextends = \"generic/mill3\"\n[frames.table]\nposition = [0, 0, -10]\n").unwrap();
+    for (block, goes) in [("G0 X500", "500"), ("G1 X700 F500", "700"), ("G0 X410", "410"), ("G0 X300\nG2 X300 Y0 I80 J0 F500", "460"), ("G0 X300\nG3 X380 Y80 I80 J0 F500", "460")] {
+        std::fs::write(path("a.ngc"), format!("G21 G90 G54\nG0 X0 Y0 Z0\n{block}\nG0 X0 Y0\nM2\n")).unwrap();
+        let o = run(&["build", &path("a.ngc"), "--machine", &path("m.toml"), "--target", "joint-gcode", "--message-format", "short", "-q"]);
+        let found = text(&o.stderr);
+        assert!(found.contains(&format!("would have to go to {goes} mm, its limit is 400 mm")) && found.matches("E0507").count() == 1, "{block}: {found}");
+    }
+}
+
 /// On a part that the machine file puts somewhere the program goes on from where the machine stands: the places of `rs274` with the same
 /// place as a stored offset.
 #[test]

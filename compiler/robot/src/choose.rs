@@ -8,6 +8,7 @@
 
 use gr_ir::Source;
 use gr_machine::KinematicsError;
+use gr_machine::math::Frame;
 
 use crate::follow::{Follow, Stuck};
 use crate::gather::{Gathered, Item, Move, Way};
@@ -25,7 +26,8 @@ pub(crate) struct Chain {
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Why {
     Reach(KinematicsError),
-    Limit { joint: usize, value: f64, limit: f64 },
+    /// A joint beyond its limit: where that was seen, and how far the program's move sends it.
+    Limit { joint: usize, value: f64, limit: f64, farthest: f64 },
     Jump,
     Condition(gr_machine::Violation),
 }
@@ -150,7 +152,7 @@ impl Chooser<'_> {
             let mut sum = [0.0f64; 8];
             for i in moves.iter().step_by(step) {
                 let m = self.at(*i);
-                let tool = gr_machine::math::Frame { turn: self.g.turns[m.turn as usize], position: m.position };
+                let tool = Frame { turn: self.g.turns[m.turn as usize], position: m.position };
                 if self.solver.all(&Mount::new(self.g, m, spin).flange(&tool), &mut out).is_err() {
                     return f64::INFINITY;
                 }
@@ -191,7 +193,7 @@ impl Chooser<'_> {
     fn walk(&self, chain: Chain, spin: f64) -> Result<Vec<Node>, Fault> {
         let first = self.at(chain.first);
         let mut all = Branches::NONE;
-        let start = gr_machine::math::Frame { turn: self.g.turns[first.turn as usize], position: first.position };
+        let start = Frame { turn: self.g.turns[first.turn as usize], position: first.position };
         let place = |item: usize, share: f64, position: [f64; 3], source: Option<Source>, why: Why| Fault { item, share, position, source, why };
         let begin = |why: Why| place(chain.first, 1.0, first.position, first.source, why);
         if let Err(e) = self.solver.all(&Mount::new(self.g, first, spin).flange(&start), &mut all) {
@@ -229,14 +231,17 @@ impl Chooser<'_> {
                         Err(e) => Some(Why::Reach(e.clone())),
                         Ok(()) => self.advance(t, &all, &path, &mount, a, b),
                     };
-                    if let Some(why) = why {
+                    if let Some(mut why) = why {
                         t.alive = false;
+                        if let Why::Limit { joint, value, limit, farthest } = &mut why {
+                            *farthest = self.farthest(t, (i, chain.last), (from, before), (spin, b), (*joint, *value, *limit));
+                        }
                         let position = if why == Why::Jump { self.jumps_at(t, &path, &mount, a, b) } else { path.position(b) };
                         fault = furthest(fault, place(i, b, position, m.source, why));
                     }
                 }
             }
-            (from, before) = (gr_machine::math::Frame { turn: self.g.turns[m.turn as usize], position: m.position }, m);
+            (from, before) = (Frame { turn: self.g.turns[m.turn as usize], position: m.position }, m);
         }
         let nodes: Vec<Node> = tracks.iter().filter(|t| t.alive).flat_map(|t| self.turned(t, spin)).collect();
         match fault {
@@ -262,6 +267,52 @@ impl Chooser<'_> {
         }
         t.close = t.close.min(self.solver.closeness(&q).0);
         self.outside(t, &q)
+    }
+
+    /// How far the program's move sends a joint that is beyond its limit from this share of its first item on.
+    fn farthest(&self, t: &Track, (i, last): (usize, usize), (mut from, mut before): (Frame, &Move), (spin, since): (f64, f64), (joint, value, limit): (usize, f64, f64)) -> f64 {
+        const HALVINGS: u32 = 40;
+        let beyond = (value - limit).signum();
+        let coupled = self.limits.coupled_outside(&t.now).is_some_and(|(_, v, _)| v == value);
+        let reads = |q: &Joints| value + self.limits.change(joint, coupled, &t.now, q);
+        let (mut q, mut branch, mut all) = (t.now, t.now_in, Branches::NONE);
+        let mut farthest = value;
+        let source = self.at(i).source;
+        for m in (i..=last).map_while(|k| match &self.g.items[k] {
+            Item::Move(m) => (m.source == source && m.way != Way::Joint).then_some(Some(m)),
+            Item::Do(_) => Some(None),
+        }).flatten() {
+            let path = Path::new(self.g, self.solver, &handed_on(self.g, from, before, m, spin), m);
+            let mount = Mount::new(self.g, m, spin);
+            let follow = Follow { solver: self.solver, limits: self.limits, path: &path, mount: &mount };
+            let looks = path.looks();
+            let share = |k: usize| k as f64 / looks as f64;
+            let mut goes = |(a, q, branch): (f64, &Joints, u8), b: f64| {
+                self.solver.all(&mount.flange(&path.at(b)), &mut all).ok()?;
+                follow.step(&all, (q, branch), (a, b)).ok()
+            };
+            let begun = if std::ptr::eq(m, self.at(i)) { since } else { 0.0 };
+            let (mut a, mut peak) = (begun, None);
+            for b in (1..=looks).map(share).filter(|b| *b > begun) {
+                let Some(next) = goes((a, &q, branch), b) else { return farthest };
+                if (reads(&next.0) - farthest) * beyond > 0.0 {
+                    (farthest, peak) = (reads(&next.0), Some((a, q, branch)));
+                }
+                (a, (q, branch)) = (b, next);
+            }
+            // It turns round between two looks.
+            if let Some((low, p, branch)) = peak {
+                let (mut a, mut b) = (low, (low + 2.0 / looks as f64).min(1.0));
+                for _ in 0..HALVINGS {
+                    let [c, d] = [a + (b - a) / 3.0, b - (b - a) / 3.0];
+                    let [Some(at_c), Some(at_d)] = [c, d].map(|s| goes((low, &p, branch), s).map(|n| reads(&n.0))) else { break };
+                    if (at_c - farthest) * beyond > 1e-6 { farthest = at_c }
+                    if (at_d - at_c) * beyond > 0.0 { a = c } else { b = d }
+                }
+            }
+            (from, before) = (Frame { turn: self.g.turns[m.turn as usize], position: m.position }, m);
+        }
+        farthest
     }
 
     /// Where between two looks a track has to jump.
@@ -293,11 +344,11 @@ impl Chooser<'_> {
                 } else {
                     self.limits.min[i]
                 };
-                return Some(Why::Limit { joint: i, value, limit });
+                return Some(Why::Limit { joint: i, value, limit, farthest: value });
             }
         }
         if let Some((joint, value, limit)) = self.limits.coupled_outside(q) {
-            return Some(Why::Limit { joint, value, limit });
+            return Some(Why::Limit { joint, value, limit, farthest: value });
         }
         self.solver.violations(q).into_iter().next().map(Why::Condition)
     }

@@ -164,7 +164,7 @@ const NEAR: f64 = 1e-6;
 /// Largest corner where a program has G64 without a tolerance and the machine file no zone, mm.
 const CORNER: f64 = 0.5;
 /// A change of tool direction is cut so that no piece turns further, rad.
-const TURN_STEP: f64 = 5.0 * PI / 180.0;
+pub(crate) const TURN_STEP: f64 = 5.0 * PI / 180.0;
 
 pub(crate) struct Gather<'a> {
     machine: &'a Machine,

@@ -233,8 +233,9 @@ impl Run<'_> {
         if rapid {
             seconds = seconds.max(self.joint_time(&self.here.joints, &to.joints));
         }
-        // Without a turn a mill's axes go as the tool does.
-        let straight = self.program.machine.kind == gr_machine::Kind::Mill && arc.is_none() && self.here.quaternion == to.quaternion;
+        // Without a turn a mill's axes go as the tool does, and where only rotary axes turn the tool goes as they do.
+        let mill = self.program.machine.kind == gr_machine::Kind::Mill;
+        let straight = mill && arc.is_none() && (self.here.quaternion == to.quaternion || path.turns_alone());
         let looks = if straight { 1 } else { path.looks() };
         let looks = looks.max(self.options.interval.map_or(1, |t| libm::ceil(seconds / t - 1e-9).clamp(1.0, 1e9) as usize));
         let room = self.options.most.saturating_sub(self.points);

@@ -2,7 +2,7 @@
 
 use gr_machine::math::{Frame, M3, about, add, norm, product, rot_z, rotate, rotation_vector, scale, sub, transpose};
 
-use gr_machine::FiveAxis;
+use gr_machine::{FiveAxis, Kinematics};
 
 use crate::gather::{ArcPiece, Gathered, Move, Way};
 use crate::solver::Solver;
@@ -28,6 +28,8 @@ struct Rotary {
     /// From the base to the work frame, and from the flange to the tool.
     frame: M3,
     tool: M3,
+    /// The slides of a rapid that stay where they are, where it turns rotary axes alone, with the work frame and the tool.
+    still: Option<([f64; 3], Frame, Frame)>,
 }
 
 /// Further than this the rotary axes don't go in one move: it has been cut before, rad.
@@ -40,14 +42,29 @@ impl Rotary {
         let end = Frame { turn: g.turns[m.turn as usize], position: m.position };
         let (p, q) = (machine.exact(&mount.flange(start))?, machine.exact(&mount.flange(&end))?);
         let by = [3, 4].map(|i| crate::solver::whole_turns_off(q[i] - p[i]));
-        let (frame, tool) = (transpose(&mount.frame.turn), g.tools[usize::from(m.tool)].frame.turn);
-        by.iter().all(|v| v.abs() <= ROTARY).then_some(Rotary { machine, from: [p[3], p[4]], by, frame, tool })
+        let tip = g.tools[usize::from(m.tool)].frame;
+        let (frame, tool) = (transpose(&mount.frame.turn), tip.turn);
+        let stays = m.rapid && (0..3).all(|i| (q[i] - p[i]).abs() < STAYS);
+        let still = stays.then_some(([p[0], p[1], p[2]], mount.frame.inverse(), tip));
+        by.iter().all(|v| v.abs() <= ROTARY).then_some(Rotary { machine, from: [p[3], p[4]], by, frame, tool, still })
+    }
+    fn angles(&self, share: f64) -> [f64; 2] {
+        [0, 1].map(|i| self.from[i] + self.by[i] * share)
     }
     fn turn(&self, share: f64) -> M3 {
-        let angles = [0, 1].map(|i| self.from[i] + self.by[i] * share);
-        product(&self.frame, &product(&self.machine.turn(angles), &self.tool))
+        product(&self.frame, &product(&self.machine.turn(self.angles(share)), &self.tool))
+    }
+    /// The tool point where the slides stay.
+    fn position(&self, share: f64) -> Option<[f64; 3]> {
+        let ([x, y, z], work, tip) = self.still.as_ref()?;
+        let [a, b] = self.angles(share);
+        let flange = self.machine.forward_frame(&[*x, *y, *z, a, b]).ok()?;
+        Some(work.then(&flange).then(tip).position)
     }
 }
+
+/// Slides that go less far stay, mm.
+const STAYS: f64 = 1e-6;
 
 /// Longest stretch between two looks, mm and rad.
 const STEP: f64 = 10.0;
@@ -62,6 +79,11 @@ impl Path {
         let rotary = if a == b { None } else { Rotary::new(g, solver, start, m) };
         let length = arc.map_or_else(|| norm(sub(m.position, from)), |a| norm(sub(from, a.center)) * a.angle);
         Path { from, to: m.position, turn: *a, vector, angle: norm(vector), arc, rotary, length }
+    }
+
+    /// Whether it turns rotary axes alone.
+    pub fn turns_alone(&self) -> bool {
+        self.rotary.as_ref().is_some_and(|r| r.still.is_some())
     }
 
     /// Into how many stretches it is cut to be looked at.
@@ -80,7 +102,10 @@ impl Path {
                 let turned = rotate(&about(a.normal, a.angle * share), arm);
                 add(a.center, turned)
             }
-            None => [0, 1, 2].map(|i| self.from[i] + (self.to[i] - self.from[i]) * share),
+            None => {
+                let still = self.rotary.as_ref().and_then(|r| r.position(share));
+                still.unwrap_or_else(|| [0, 1, 2].map(|i| self.from[i] + (self.to[i] - self.from[i]) * share))
+            }
         }
     }
 

@@ -291,7 +291,7 @@ impl Planner<'_> {
                 let limit = amount(&gr_machine::Violation { value: v.limit, ..v.clone() });
                 self.findings.say(code::ROBOT_CONDITION, source, &[v.name.into(), v.what.clone(), amount(v), limit, at]);
             }
-            Why::Limit { joint, value, limit } => self.limit(chain, fault, source, (*joint, *value, *limit), (first, at)),
+            Why::Limit { joint, value, limit, farthest } => self.limit(chain, fault, source, (*joint, [*value, *farthest], *limit), (first, at)),
             Why::Jump => {
                 let why = format!("at {at} it is singular: the tool can't go on without a jump of joints");
                 if self.stands_at(fault, &m) {
@@ -303,8 +303,8 @@ impl Planner<'_> {
         }
     }
 
-    /// A joint beyond its limit; `first`: the line that the configuration was chosen for.
-    fn limit(&mut self, chain: Chain, fault: &Fault, source: Option<gr_ir::Source>, (joint, value, limit): (usize, f64, f64), (first, at): (u32, String)) {
+    /// A joint beyond its limit, where that is seen and at the farthest of its move; `first`: the line that the configuration was chosen for.
+    fn limit(&mut self, chain: Chain, fault: &Fault, source: Option<gr_ir::Source>, (joint, [value, farthest], limit): (usize, [f64; 2], f64), (first, at): (u32, String)) {
         let j = &self.machine.joints[joint];
         let (value, bound) = (j.show(value), j.show(limit));
         let Item::Move(m) = &self.g.items[fault.item] else { return };
@@ -316,7 +316,7 @@ impl Planner<'_> {
         if fault.share < 1.0 && m.way != Way::Joint && !other && self.stands(m) {
             return self.findings.say(code::ROBOT_LEAVES_WORKSPACE, source, &[at, why]);
         }
-        self.findings.say(code::ROBOT_JOINT_LIMIT, source, &[j.name.clone(), value, bound]);
+        self.findings.say(code::ROBOT_JOINT_LIMIT, source, &[j.name.clone(), j.show(farthest), bound]);
     }
 
     /// Whether the arm could stand at the place of a fault in some configuration.

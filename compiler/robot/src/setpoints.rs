@@ -379,7 +379,7 @@ impl<'a> Maker<'a> {
             speed,
             zone,
             length: 0.0,
-            rapid: false,
+            rapid,
             free: false,
             ours: false,
             probe: None,

@@ -8,7 +8,7 @@ mod stands;
 
 use gr_backends::from_line::INSERTED;
 use gr_backends::sources::{Words as Letters, is_hidden};
-use gr_ir::{ArcPlane, Builder, FileId, Marker, Op, Program, Source, Sources, State, View, plane_axes};
+use gr_ir::{ArcPlane, Builder, FileId, Marker, Op, Pose, Program, Source, Sources, State, View, plane_axes};
 use gr_machine::math::{Frame, V3};
 use gr_machine::{Kind, Machine};
 use gr_text::{Diagnostic, Severity, code};
@@ -295,6 +295,9 @@ pub fn settled(
             true => stands.goes(program, &out, &view, sources, &mut coordinates, place),
             false => stands.shifts(program, &out, &view, sources, &places),
         };
+        for axes in stands.way() {
+            out.push_to(view.op, &Pose { axes, ..*view.end }, view.source);
+        }
         let (op, pose) = told.unwrap_or_else(|why| {
             untold.get_or_insert((view.source, why));
             (view.op, *view.end)

@@ -277,6 +277,12 @@ impl Limits {
         }
     }
 
+    /// By how much a joint's own or coupled value changes between two positions.
+    pub fn change(&self, joint: usize, coupled: bool, p: &Joints, q: &Joints) -> f64 {
+        let by = self.coupling.filter(|_| coupled).map_or(0.0, |(_, with, factor, ..)| factor * (q[with] - p[with]));
+        q[joint] - p[joint] + by
+    }
+
     /// The whole turns (first and last) that bring a span of values into the limits; none when there are none.
     pub fn shifts(&self, joint: usize, low: f64, high: f64) -> Option<(i32, i32)> {
         const TURN: f64 = std::f64::consts::TAU;

@@ -439,7 +439,7 @@ fn a_rotary_axis_ends_at_its_limit() {
     let machine = gr_machine::builtin("generic/mill5-cb-head").unwrap();
     let found = plan(&program, &machine, &Texts::new([(FileId(0), text)]), &Options::default()).unwrap_err();
     let told: Vec<String> = found.iter().map(|d| format!("{} {}", d.code.def().code, d.message)).collect();
-    assert_eq!(told, ["E0507 joint C would have to go to 365°, its limit is 360°"]);
+    assert_eq!(told, ["E0507 joint C would have to go to 400°, its limit is 360°"]);
 }
 
 /// A mill's program keeps every word that is no motion; the rest is axis words with inverse time, which LinuxCNC reads.

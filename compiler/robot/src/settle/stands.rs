@@ -7,7 +7,7 @@ use gr_machine::math::{Frame, V3, add, dot, product, rot_z, solve, sub};
 use gr_machine::{Chain, Kind, Kinematics, Machine};
 
 use super::{By, Coordinates, Goal, Places, ROUNDING, Untold};
-use crate::gather::same_turn;
+use crate::gather::{TURN_STEP, same_turn};
 use crate::words::{Asked, Slides, Words, as_far_as_known, placed, started, work_shift};
 
 /// Follows a machine through its program.
@@ -23,6 +23,10 @@ pub(super) struct Stands<'a> {
     line: Option<(Source, Axes, Axes)>,
     /// Whether the program stores a reference point of its own, once that was asked.
     stores: Option<bool>,
+    /// Coordinates that a way of the slides has changed without a word, and by what each was known before.
+    strayed: [Option<By>; 3],
+    /// Places that the last move goes through before its end.
+    way: Vec<Axes>,
 }
 
 /// What the places of the machine are places of.
@@ -77,7 +81,7 @@ impl<'a> Stands<'a> {
             Kind::Robot => (Of::Place(machine.cell.machine_zero()?), [0.0; 3]),
             _ => return None,
         };
-        Some(Stands { machine, of, place: Frame::IDENTITY, last: Last::Home(home), shifted: Shifted::default(), level: None, line: None, stores: None })
+        Some(Stands { machine, of, place: Frame::IDENTITY, last: Last::Home(home), shifted: Shifted::default(), level: None, line: None, stores: None, strayed: [None; 3], way: Vec::new() })
     }
 
     /// Where it stands before the program. An arm's program says that itself.
@@ -145,6 +149,7 @@ impl<'a> Stands<'a> {
             end[level.axis] = level.real;
         }
         let turns = (3..6).any(|i| from[i] != end[i]);
+        self.rests_on_strayed(view, &from, &end, &to)?;
         match goal {
             Goal::Work => {
                 // An arm stands nowhere by itself.
@@ -152,11 +157,22 @@ impl<'a> Stands<'a> {
                 let held: Vec<usize> = (0..3).filter(|i| !to[*i] && stays(by[*i])).collect();
                 if !held.is_empty() && (turns || self.other_point(state)) {
                     let kept = end;
-                    self.hold(&mut end, &held, state)?;
-                    // The slides stay and the tool point doesn't: no cut is meant so.
-                    let led = [0, 1, 2].map(|i| held.contains(&i) && (end[i] - kept[i]).abs() > LED);
-                    if turns && view.op.feeds() && held.len() < 3 && led.contains(&true) {
-                        return Err(Untold::Rests(led, [end[0], end[1], end[2]]));
+                    let apart = self.apart(&end, &held, state);
+                    let square = || apart && self.apart(&from, &held, state);
+                    if turns && view.op == Op::Rapid && !to[..3].contains(&true) && (held.len() == 3 || !square()) {
+                        self.index(&from, &mut end, by, state)?;
+                    } else if apart {
+                        self.hold(&mut end, &held, state)?;
+                        // The slides stay and the tool point doesn't: no cut is meant so.
+                        let led = [0, 1, 2].map(|i| held.contains(&i) && (end[i] - kept[i]).abs() > LED);
+                        if turns && view.op.feeds() && held.len() < 3 && led.contains(&true) {
+                            return Err(Untold::Rests(led, [end[0], end[1], end[2]]));
+                        }
+                    } else {
+                        self.stay_on_part(&from, &mut end, &held, state)?;
+                        if turns && view.op.feeds() {
+                            return Err(Untold::Rests([0, 1, 2].map(|i| held.contains(&i)), [end[0], end[1], end[2]]));
+                        }
                     }
                 }
             }
@@ -164,7 +180,15 @@ impl<'a> Stands<'a> {
                 let home = Letters::at(sources, view.source.file, view.source.line).is_some_and(|l| l.g(280));
                 return Err(Untold::Stored(if home { "G28" } else { "G30" }));
             }
-            _ => self.to_machine(&mut end, view, (to, goal), turns, by, state)?,
+            _ => {
+                self.to_machine(&mut end, view, (to, goal), turns, by, state)?;
+                // What LinuxCNC leaves where it is: in a frame that is rotated it changes others too.
+                (0..3).filter(|i| !to[*i]).for_each(|i| self.strays(i, end[i] - from[i] - (b1[i] - b0[i]), by));
+                (0..3).filter(|i| to[*i]).for_each(|i| self.strayed[i] = None);
+            }
+        }
+        if matches!(goal, Goal::Work) {
+            (0..3).filter(|i| to[*i] && end[*i] == b1[*i]).for_each(|i| self.strayed[i] = None);
         }
         let op = if lags || end != *b1 { bent(view, &from, &end)? } else { view.op };
         self.last = Last::Moved(end, *state, self.place);
@@ -181,8 +205,72 @@ impl<'a> Stands<'a> {
         *self.stores.get_or_insert_with(|| stores_reference(program, sources).is_some())
     }
 
+    /// Whether these coordinates alone go along their own directions of the machine: no table has tilted others into them.
+    fn apart(&self, end: &Axes, axes: &[usize], state: &State) -> bool {
+        const FAR: f64 = 100.0;
+        let way = |k: usize| {
+            let mut moved = *end;
+            moved[k] += FAR;
+            Some(sub(self.slid(&moved, state, &self.place)?, self.slid(end, state, &self.place)?))
+        };
+        let across = |k: usize| way(k).is_none_or(|way| axes.iter().all(|i| dot(self.along(*i, state), way).abs() < ROUNDING * FAR));
+        (0..3).filter(|k| !axes.contains(k)).all(across)
+    }
+
+    /// Rotary axes alone, where the slides have come to a place of the machine: these stay, all along the way. What the program has
+    /// named in the part is elsewhere then.
+    fn index(&mut self, from: &Axes, end: &mut Axes, by: [By; 3], state: &State) -> Result<(), Untold> {
+        let kept = *end;
+        self.hold(end, &[0, 1, 2], state)?;
+        (0..3).for_each(|i| self.strays(i, end[i] - kept[i], by));
+        if matches!(self.machine.chain, Chain::FiveAxis(_)) {
+            let turned = libm::sqrt((3..6).map(|i| (end[i] - from[i]) * (end[i] - from[i])).sum());
+            let count = libm::ceil(turned / TURN_STEP - 1e-9).clamp(1.0, 10_000.0) as usize;
+            for k in 1..count {
+                let mut at: Axes = std::array::from_fn(|i| from[i] + (end[i] - from[i]) * k as f64 / count as f64);
+                self.hold(&mut at, &[0, 1, 2], state)?;
+                self.way.push(at);
+            }
+        }
+        Ok(())
+    }
+
+    /// Where a table has tilted, what no word says of the part stays in the part: a slide that stayed would lead along what is named.
+    fn stay_on_part(&self, from: &Axes, end: &mut Axes, held: &[usize], state: &State) -> Result<(), Untold> {
+        let mut here = *from;
+        if self.other_point(state) {
+            self.hold(&mut here, &[0, 1, 2], state)?;
+        }
+        held.iter().for_each(|i| end[*i] = here[*i]);
+        Ok(())
+    }
+
+    /// A coordinate of the part that the slides have changed by so much without a word, mm.
+    fn strays(&mut self, i: usize, by: f64, known: [By; 3]) {
+        if matches!(self.of, Of::Slides { .. }) && by.abs() > LED {
+            self.strayed[i].get_or_insert(known[i]);
+        }
+    }
+
+    /// A cut goes by no coordinate that an index or a way to a place of the machine has changed. From a height that was none of the part's
+    /// before it may come down along that axis.
+    fn rests_on_strayed(&self, view: &View<'_, '_>, from: &Axes, end: &Axes, to: &[bool; 9]) -> Result<(), Untold> {
+        if !view.op.feeds() && !matches!(view.op, Op::Probe(_)) {
+            return Ok(());
+        }
+        let straight = matches!(view.op, Op::Linear | Op::Probe(_));
+        let comes_down = |i: usize| straight && to[i] && (0..6).all(|k| k == i || from[k] == end[k]);
+        let rests = [0, 1, 2].map(|i| self.strayed[i].is_some_and(|known| known == By::Work || !comes_down(i)));
+        if rests.contains(&true) { Err(Untold::Rests(rests, [from[0], from[1], from[2]])) } else { Ok(()) }
+    }
+
+    /// Places that the last move goes through before its end.
+    pub fn way(&mut self) -> Vec<Axes> {
+        std::mem::take(&mut self.way)
+    }
+
     /// Keeps the slides where they stand along these coordinates.
-    fn hold(&mut self, end: &mut Axes, held: &[usize], state: &State) -> Result<(), Untold> {
+    fn hold(&self, end: &mut Axes, held: &[usize], state: &State) -> Result<(), Untold> {
         let why = Untold::Turned([0, 1, 2].map(|i| held.contains(&i)));
         let stands = self.slides().ok_or(why)?;
         let rows: Vec<(V3, f64)> = held.iter().map(|i| self.along(*i, state)).map(|a| (a, dot(a, stands))).collect();
@@ -194,7 +282,10 @@ impl<'a> Stands<'a> {
     fn to_machine(&mut self, end: &mut Axes, view: &View<'_, '_>, (to, goal): ([bool; 9], Goal), turns: bool, by: [By; 3], state: &State) -> Result<(), Untold> {
         let machine = view.state.machine(&view.end.axes);
         let machine = [machine[0], machine[1], machine[2]];
-        let axes: Vec<usize> = (0..3).filter(|i| to[*i] || !turns || by[*i] != By::Work).collect();
+        let mut axes: Vec<usize> = (0..3).filter(|i| to[*i] || !turns || by[*i] != By::Work).collect();
+        if turns && !self.apart(end, &axes, state) {
+            axes = vec![0, 1, 2];
+        }
         let apart = [0, 1, 2].map(|i| axes.contains(&i));
         let stands = self.slides().ok_or(Untold::Turned(apart))?;
         let work = self.place.turn;
