@@ -49,6 +49,8 @@ pub(super) struct Emitter<'a> {
     /// The axis stands where a probe stopped, which only the machine knows. By how much the simulation has it there from where the IR
     /// has it: the target.
     pub loose: [Option<f64>; 9],
+    /// Lines whose value only the machine knows.
+    pub unforeseen: std::collections::BTreeSet<(FileId, u32)>,
     /// The shift in force comes from G92, not from G52.
     pub shifted_by_place: bool,
     /// The operation whose S is written with G96 or G97 already.
@@ -109,6 +111,7 @@ impl<'a> Emitter<'a> {
             loose: [None; 9],
             speed_said: None,
             shifted_by_place: false,
+            unforeseen: std::collections::BTreeSet::new(),
             displaced: false,
             cycle: None,
             frame: state,
@@ -349,7 +352,9 @@ impl<'a> Emitter<'a> {
             Op::RigidTap { bottom, scale } => self.rigid_tap(view, bottom, scale),
             Op::Dwell(seconds) => self.dwell(seconds),
             // What is read of a probe is told where it is read, and steps from where it stopped are written as steps.
-            Op::RunTime("probe" | "where the probe stopped") => {}
+            Op::RunTime("probe" | "the result of a probe" | "where the probe stopped") => {}
+            // A line in a loop is told once.
+            Op::RunTime(_) if !self.unforeseen.insert((view.source.file, view.source.line)) => {}
             Op::RunTime(what) => self.say(code::EMIT_RUNTIME_VALUE, view.source, &[what.into()]),
             Op::Note(note, text) => self.note(note, text, view.source),
             Op::Override(Override::Feed, false) if self.tap_here(view) => {}
