@@ -7,7 +7,7 @@ use gr_accuracy::compensate::{self, Correction};
 use gr_ir::Sources;
 use gr_machine::math::norm;
 use gr_machine::{Kind, Machine};
-use gr_robot::{Options, Planned, plan};
+use gr_robot::{Options, Planned, Workingstep, plan};
 use gr_text::Diagnostic;
 use gr_text::figures::{duration, number};
 
@@ -87,8 +87,11 @@ fn take_job_of(motion: &mut Motion, path: &Path, machine: &Machine) -> Result<()
     motion.subs.push(path.to_path_buf());
     let file = motion.sources.add(name, text.clone());
     let clampings = gr_machine::parse_job(file, &text)?;
-    let found: Vec<Diagnostic> =
+    let mut found: Vec<Diagnostic> =
         misfits(&clampings, motion).into_iter().map(|(span, what)| Diagnostic::new(gr_text::code::JOB_BAD_VALUE, file, span, &[what])).collect();
+    let (misnamed, help) = misnamed(&clampings, motion);
+    let misnamed = misnamed.into_iter().map(|(span, what)| Diagnostic { help: help.clone(), ..Diagnostic::new(gr_text::code::JOB_BAD_VALUE, file, span, &[what]) });
+    found.extend(misnamed);
     if !found.is_empty() {
         return Err(found);
     }
@@ -104,34 +107,62 @@ fn take_job_of(motion: &mut Motion, path: &Path, machine: &Machine) -> Result<()
     Ok(())
 }
 
-/// Lines and workingsteps that the program doesn't have.
+/// Lines that the program doesn't have.
 fn misfits(clampings: &[gr_machine::Clamping], motion: &Motion) -> Vec<(gr_text::Span, String)> {
     let lines = motion.sources.get(gr_text::FileId(0)).map_or(0, |f| f.text.lines().count());
-    let mut steps: Vec<&str> = Vec::new();
-    for step in motion.program.steps() {
-        if let gr_ir::Op::Begin { marker: gr_ir::Marker::Workingstep, text, .. } = step.op
-            && !steps.contains(&text)
-        {
-            steps.push(text);
-        }
-    }
+    let planned = motion.program.steps().any(|s| Workingstep::begun_by(&s.op).is_some());
     let mut out = Vec::new();
     for c in clampings {
         match c.from_line {
-            Some((_, span)) if !steps.is_empty() => {
+            Some((_, span)) if planned => {
                 out.push((span, format!("a STEP-NC program has no order of lines: name the `workingsteps` of setup `{}`", c.name)));
             }
             Some((line, span)) if line as usize > lines => out.push((span, format!("line {line} is beyond the end of the program, which has {lines} lines"))),
             _ => {}
         }
-        for (step, span) in c.workingsteps.iter().filter(|(s, _)| !steps.contains(&s.as_str())) {
-            let known = steps.iter().take(20).copied().collect::<Vec<_>>().join(", ");
-            let more = if steps.len() > 20 { " …" } else { "" };
-            let hint = if steps.is_empty() { "G-code has none: use `from_line`".to_string() } else { format!("it has {known}{more}") };
-            out.push((*span, format!("the program has no workingstep `{step}`; {hint}")));
-        }
     }
     out
+}
+
+/// Workingsteps that the program doesn't have, or that two setups would make; and what helps.
+fn misnamed(clampings: &[gr_machine::Clamping], motion: &Motion) -> (Vec<(gr_text::Span, String)>, Option<String>) {
+    let mut steps: Vec<Workingstep> = Vec::new();
+    for step in motion.program.steps().filter_map(|s| Workingstep::begun_by(&s.op)) {
+        if !steps.contains(&step) {
+            steps.push(step);
+        }
+    }
+    // Instance names to whoever asked with one, and where names don't tell.
+    let list = |instances: bool| {
+        let mut all: Vec<&str> = Vec::new();
+        for s in &steps {
+            let shown = if instances || s.name.is_empty() { &s.instance } else { &s.name };
+            if !all.contains(&shown.as_str()) {
+                all.push(shown);
+            }
+        }
+        all.iter().take(20).copied().collect::<Vec<_>>().join(", ") + if all.len() > 20 { " …" } else { "" }
+    };
+    let mut out = Vec::new();
+    let mut before: Vec<(&str, &str)> = Vec::new();
+    for c in clampings {
+        for (called, span) in &c.workingsteps {
+            let meant: Vec<&Workingstep> = steps.iter().filter(|s| s.is_called(called)).collect();
+            if meant.is_empty() {
+                let hint = if steps.is_empty() { "G-code has none: use `from_line`".to_string() } else { format!("it has {}", list(called.starts_with('#'))) };
+                out.push((*span, format!("the program has no workingstep `{called}`; {hint}")));
+            }
+            // The same word twice is told by who reads the file.
+            let again = before.iter().find(|(other, _)| meant.iter().any(|s| s.is_called(other)));
+            if let Some((other, setup)) = again {
+                let whose = if *setup == c.name { "here".to_string() } else { format!("in setup `{setup}`") };
+                out.push((*span, format!("workingstep `{called}` stands {whose} too, as `{other}`")));
+            }
+            before.push((called, &c.name));
+        }
+    }
+    let help = (!steps.is_empty()).then(|| gr_machine::WORKINGSTEP_NAMES.to_string());
+    (out, help)
 }
 
 /// Makes a robot program.

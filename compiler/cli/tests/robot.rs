@@ -973,3 +973,118 @@ fn a_tool_of_a_mill_hangs_down() {
     let (z, said) = cut("[0, 0, -60]", None);
     assert!(z.is_none() && said.len() == 1 && said[0].contains("a tool of 60 mm has 60"), "{z:?} {said:?}");
 }
+
+/// A block with features on three of its sides (UFSC 2016, part 2), whose workingsteps have two names among them.
+const THREE_SIDES: &str = "tests/golden/ufsc2016/example2_3caras.p21";
+const SETUPS: [(&str, &[u32], [f64; 3]); 3] = [
+    ("XY", &[59, 74, 109, 124, 159, 174, 209, 224, 276], [0.0, 0.0, 0.0]),
+    ("XZ", &[329, 364, 379, 414, 429, 464, 479, 514, 529, 564, 579], [-90.0, 0.0, 0.0]),
+    ("ZY", &[615, 630, 665, 680, 715, 730], [0.0, 90.0, 0.0]),
+];
+
+/// A job that clamps it three times, each side upward and so high above the table.
+fn three_clampings(heights: [f64; 3]) -> String {
+    let one = |((name, steps, rotation), height): (&(&str, &[u32], [f64; 3]), f64)| {
+        let steps: Vec<String> = steps.iter().map(|s| format!("\"#{s}\"")).collect();
+        format!("[[setup]]\nname = \"{name}\"\nworkingsteps = [{}]\nposition = [0, 0, {height:?}]\nrotation = {rotation:?}\n", steps.join(", "))
+    };
+    SETUPS.iter().zip(heights).map(one).collect()
+}
+
+/// Machines that can't turn the tool make it in three clampings, an arm can: every cut ends, and every arc bends, where the plan has it.
+#[test]
+fn three_sides_in_three_clampings() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_string();
+    let units = ["--step-overlap", "percent", "--step-units", "step-modeler"];
+    let plan = run(&[&["build", THREE_SIDES, "--target", "motion"], &units[..]].concat());
+    let plan = gr_ir::text::parse(&text(&plan.stdout)).unwrap_or_else(|e| panic!("{e:?}"));
+    let tools: String = (1..=4).map(|n| format!("[[tool]]\nnumber = {n}\nname = \"t{n}\"\nposition = [0, 0, 70]\n")).collect();
+    let machines = [
+        ("adept/one", "[frames.table]\nposition = [300, 200, 745]\n".to_string(), [-215.0, -50.0, -50.0]),
+        ("generic/mill3", "[[joint]]\nname = \"Z\"\nmin = -900\n[frames.table]\nposition = [0, 0, -300]\n".to_string(), [0.0; 3]),
+        ("abb/irb2400", format!("[frames.table]\nposition = [850, 0, 500]\n[home]\njoints = [0, -20, 20, 0, 60, 0]\n{tools}"), [0.0; 3]),
+    ];
+    for (id, more, heights) in machines {
+        let file = format!("format = 1\nid = \"shop/m\"\ntitle = \"m\"\nextends = \"{id}\"\n{more}");
+        std::fs::write(path("m.toml"), &file).unwrap();
+        std::fs::write(path("job.toml"), three_clampings(heights)).unwrap();
+        let (machine, job, out) = (path("m.toml"), path("job.toml"), path("o.ngc"));
+        let args = ["build", THREE_SIDES, "--machine", &machine, "--job", &job, "--target", "joint-gcode", "--message-format", "short", "-o", &out];
+        let made = run(&[&args[..], &units].concat());
+        assert!(made.status.success(), "{id}: {}", text(&made.stderr));
+        let program = std::fs::read_to_string(&out).unwrap();
+        let stops: Vec<&str> = program.lines().filter(|l| l.starts_with("(MSG, setup") || *l == "M0").collect();
+        assert_eq!(stops, ["(MSG, setup XZ)", "M0", "(MSG, setup ZY)", "M0"], "{id}");
+
+        let machine = gr_machine::parse(gr_ir::FileId(0), &file).unwrap();
+        let tool = machine.tool_of_length(70.0);
+        let tip = |row: &str| {
+            let values = row.split(',').skip(1).zip(&machine.joints).map(|(v, j)| {
+                let v: f64 = v.parse().unwrap();
+                if j.kind == gr_machine::JointKind::Revolute { v.to_radians() } else { v }
+            });
+            machine.kinematics().forward_frame(&values.collect::<Vec<_>>()).unwrap().then(&tool).position
+        };
+        let table = std::fs::read_to_string(path("o-joint.csv")).unwrap();
+        let way: Vec<[f64; 3]> = table.lines().skip(1).map(tip).collect();
+        let apart = |a: [f64; 3], b: [f64; 3]| gr_machine::math::norm(gr_machine::math::sub(a, b));
+        let (mut cursor, mut place, mut at, mut cuts, mut arcs) = (plan.cursor(), gr_machine::math::Frame::IDENTITY, 0, 0, 0);
+        while let Some(view) = cursor.next() {
+            if let gr_ir::Op::Begin { marker: gr_ir::Marker::Workingstep, code, .. } = view.op {
+                let k = SETUPS.iter().position(|(_, steps, _)| steps.contains(&(code as u32))).unwrap();
+                let turn = gr_machine::math::euler(SETUPS[k].2.map(f64::to_radians));
+                place = machine.cell.table.then(&gr_machine::math::Frame { turn, position: [0.0, 0.0, heights[k]] });
+            }
+            if !matches!(view.op, gr_ir::Op::Linear | gr_ir::Op::Arc(_)) {
+                continue;
+            }
+            let end = place.apply(view.end.xyz());
+            let found = way[at..].iter().position(|p| apart(*p, end) < 1e-3).unwrap_or_else(|| panic!("{id}: no way to {:?} of line {}", view.end.xyz(), view.source.line + 1));
+            if let gr_ir::Op::Arc(arc) = view.op {
+                let middle = place.apply(gr_ir::geometry::ArcShape::new(&arc, view.start, view.end).point(0.5));
+                let off = way[at..=at + found].windows(2).map(|w| beside(middle, w[0], w[1])).fold(f64::INFINITY, f64::min);
+                assert!(off < 0.02, "{id}: {off} mm beside the arc of line {}", view.source.line + 1);
+                arcs += 1;
+            }
+            at += found;
+            cuts += 1;
+        }
+        assert_eq!((cuts, arcs), (575, 146), "{id}");
+    }
+}
+
+/// Distance of a place from the way between two others.
+fn beside(p: [f64; 3], a: [f64; 3], b: [f64; 3]) -> f64 {
+    use gr_machine::math::{dot, norm, scale, sub};
+    let (way, to) = (sub(b, a), sub(p, a));
+    let share = if norm(way) > 0.0 { (dot(way, to) / dot(way, way)).clamp(0.0, 1.0) } else { 0.0 };
+    norm(sub(to, scale(way, share)))
+}
+
+/// Workingsteps that share a name are told apart by their instance names; what is no such name, or is meant twice, is told.
+#[test]
+fn workingsteps_by_their_instance_names() {
+    let folder = tempfile::tempdir().unwrap();
+    let job = folder.path().join("job.toml");
+    let told = |setups: &[&str]| {
+        let one = |(i, steps): (usize, &&str)| format!("[[setup]]\nname = \"s{i}\"\nworkingsteps = [{steps}]\nposition = [0, 0, 0]\n");
+        std::fs::write(&job, setups.iter().enumerate().map(one).collect::<String>()).unwrap();
+        let made = run(&["check", THREE_SIDES, "--machine", "generic/mill3", "--step-overlap", "percent", "--step-units", "step-modeler", "--job", job.to_str().unwrap()]);
+        text(&made.stderr) + &text(&made.stdout)
+    };
+    let help = "workingsteps that share a name are told apart by their instance names, as in \"#59\"; `--target plan` lists them";
+    for (setups, what) in [
+        (&["\"Pocket_RGH\"", "\"Pocket_RGH\""][..], "workingstep `Pocket_RGH` stands in setup `s0` too"),
+        (&["\"Pocket_RGH\"", "\"#276\""], "workingstep `#276` stands in setup `s0` too, as `Pocket_RGH`"),
+        (&["\"#329\", \"Pocket_RGH\""], "workingstep `Pocket_RGH` stands here too, as `#329`"),
+        (&["\"Pocket\""], "the program has no workingstep `Pocket`; it has Plane Base Hole_RGH, Pocket_RGH"),
+        // It is in the file, and in no workplan.
+        (&["\"#48\""], "the program has no workingstep `#48`; it has #59, #74, #109"),
+    ] {
+        let all = told(setups);
+        assert!(all.contains("E0551") && all.contains(what) && all.contains(help), "{setups:?}: {all}");
+    }
+    let good = told(&["\"Plane Base Hole_RGH\"", "\"#276\"", "\"#329\""]);
+    assert!(!good.contains("E0551"), "{good}");
+}

@@ -16,6 +16,9 @@ impl Cartesian {
 
 const WORDS: [char; 6] = ['X', 'Y', 'Z', 'A', 'B', 'C'];
 
+/// How far a tool may be turned about an axis that isn't there, by rounding, rad: a part that is clamped turned gives no whole zeros.
+const LEAN: f64 = 1e-9;
+
 impl Kinematics for Cartesian {
     fn joint_count(&self) -> usize {
         self.joints.len()
@@ -35,8 +38,9 @@ impl Kinematics for Cartesian {
             return Err(KinematicsError::NotFinite);
         }
         // A tool that points along Z turns about itself without three axes.
-        let spins = self.joints.len() == 3 && all[3] == 0.0 && all[4] == 0.0;
-        if let Some(i) = (self.joints.len()..6).find(|i| all[*i] != 0.0 && !(spins && *i == 5)) {
+        let turned = |i: usize| all[i].abs() > LEAN;
+        let spins = self.joints.len() == 3 && !turned(3) && !turned(4);
+        if let Some(i) = (self.joints.len()..6).find(|i| turned(*i) && !(spins && *i == 5)) {
             return Err(KinematicsError::OutOfPlane { word: WORDS[i], value: all[i] });
         }
         let joints = (0..self.joints.len()).map(|i| all.get(i).copied().unwrap_or(0.0)).collect();
@@ -58,6 +62,8 @@ mod tests {
         assert_eq!(k.inverse(&turned), Err(KinematicsError::OutOfPlane { word: 'B', value: 0.1 }));
         let spun = Pose { rotation: [0.0, 0.0, 0.5], ..pose };
         assert_eq!(k.inverse(&spun).unwrap()[0].joints, [1.0, 2.0, 3.0]);
+        let rounded = Pose { rotation: [-1e-16, 3e-16, 0.5], ..pose };
+        assert_eq!(k.inverse(&rounded).unwrap()[0].joints, [1.0, 2.0, 3.0]);
         assert!(k.forward(&[1.0]).is_err());
     }
 }

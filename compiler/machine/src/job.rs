@@ -16,7 +16,7 @@ pub struct Clamping {
     pub place: Span,
     /// The line it begins at, from 1, and where that stands.
     pub from_line: Option<(u32, Span)>,
-    /// Workingsteps that are made in it, and where they stand.
+    /// Workingsteps that are made in it, by their names or instance names, and where they stand.
     pub workingsteps: Vec<(String, Span)>,
     /// The part on the table, as far as the setup says it.
     part: Frame,
@@ -52,7 +52,8 @@ pub fn parse_job(file: FileId, text: &str) -> Result<Vec<Clamping>, Vec<Diagnost
     }
     let mut found: Vec<Diagnostic> = keys::out_of_bounds(&root, JOB).into_iter().map(bad(code::JOB_BAD_VALUE)).collect();
     let setups: Vec<Clamping> = root.get("setup").map_or(&[][..], Node::list).iter().map(clamping).collect();
-    found.extend(faults(&setups).into_iter().map(|(place, what)| Diagnostic::new(code::JOB_BAD_VALUE, file, place, &[what])));
+    let told = |(place, what, help): Fault| Diagnostic { help: help.map(str::to_string), ..Diagnostic::new(code::JOB_BAD_VALUE, file, place, &[what]) };
+    found.extend(faults(&setups).into_iter().map(told));
     if setups.is_empty() {
         found.push(Diagnostic::new(code::JOB_BAD_VALUE, file, Span::default(), &["there is no setup in the job file".to_string()]));
     }
@@ -77,30 +78,36 @@ fn clamping(t: &Node) -> Clamping {
     }
 }
 
+/// What helps where workingsteps are named so that one can't be told from another.
+pub const WORKINGSTEP_NAMES: &str = "workingsteps that share a name are told apart by their instance names, as in \"#59\"; `--target plan` lists them";
+
+/// Where, what, and what helps.
+type Fault = (Span, String, Option<&'static str>);
+
 /// What setups can't be together.
-fn faults(setups: &[Clamping]) -> Vec<(Span, String)> {
+fn faults(setups: &[Clamping]) -> Vec<Fault> {
     let mut out = Vec::new();
     let mut last: Option<(u32, &str)> = None;
     for (i, s) in setups.iter().enumerate() {
         if setups[..i].iter().any(|e| e.name == s.name) {
-            out.push((s.place, format!("there is another setup with the name `{}`", s.name)));
+            out.push((s.place, format!("there is another setup with the name `{}`", s.name), None));
         }
         if s.from_line.is_none() && s.workingsteps.is_empty() {
-            out.push((s.place, format!("setup `{}` needs `from_line` or `workingsteps`", s.name)));
+            out.push((s.place, format!("setup `{}` needs `from_line` or `workingsteps`", s.name), None));
         }
         if let Some((line, place)) = s.from_line {
             if let Some((before, name)) = last.filter(|(before, _)| line <= *before) {
                 let what = format!("setup `{}` begins at line {line}, but setup `{name}` before it at line {before}: setups stand in the order of their lines", s.name);
-                out.push((place, what));
+                out.push((place, what, None));
             }
             last = Some((line, &s.name));
         }
         for (n, (step, place)) in s.workingsteps.iter().enumerate() {
             let same = |other: &Clamping| other.workingsteps.iter().any(|(o, _)| o == step);
             if s.workingsteps[..n].iter().any(|(o, _)| o == step) {
-                out.push((*place, format!("workingstep `{step}` stands here twice")));
+                out.push((*place, format!("workingstep `{step}` stands here twice"), None));
             } else if let Some(other) = setups[..i].iter().find(|e| same(e)) {
-                out.push((*place, format!("workingstep `{step}` stands in setup `{}` too", other.name)));
+                out.push((*place, format!("workingstep `{step}` stands in setup `{}` too", other.name), Some(WORKINGSTEP_NAMES)));
             }
         }
     }

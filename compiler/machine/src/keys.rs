@@ -364,7 +364,7 @@ pub(crate) static JOB: &[Key] = &[must("setup", Tables(SETUP), "Clampings of the
 static SETUP: &[Key] = &[
     must("name", Text, "Shown to the operator when the part is to be clamped so."),
     key("from_line", Whole(1, MOST_COUNTED), "Line of the program, from 1, at which the setup begins: a rapid to a height above the work."),
-    key("workingsteps", Texts, "Workingsteps of a STEP-NC program that are made in this setup."),
+    key("workingsteps", Texts, "Workingsteps of a STEP-NC program that are made in this setup: each by its name or, where several share one, its instance name, as in \"#59\"."),
     key("position", Numbers(3), "Zero point of the part on the table: X Y Z, mm. Left out: as [frames.part] of the machine file has it."),
     key("rotation", Numbers(3), "Turns of the part about the table's fixed X, Y, Z, degrees. Left out: as [frames.part] of the machine file has it."),
 ];

@@ -58,7 +58,7 @@ pub use cell::{Cell, Controller, Coupling, External, Rapid, Signal, Spindle, Too
 pub use doubts::doubts;
 pub use five_axis::{Carrier, FiveAxis, Rotary};
 pub use identify::{Fit, identify};
-pub use job::{Clamping, parse_job};
+pub use job::{Clamping, WORKINGSTEP_NAMES, parse_job};
 pub use keys::{job_schema, json_schema};
 pub use kinematics::{Control, Kinematics, KinematicsError, Pose, Solution, Violation};
 pub use library::{as_published, builtin, is_path, list, reference, source, suggestion};

@@ -22,7 +22,7 @@ use gr_backends::sources::Words as Letters;
 use crate::cell::Cells;
 use crate::settle::{Increments, leads_to, main_line};
 use crate::turns::Turns;
-use crate::{Action, Curves, Options, Step, Tool, WorkFrame, Zone};
+use crate::{Action, Curves, Options, Step, Tool, WorkFrame, Workingstep, Zone};
 
 /// How a move goes.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -230,7 +230,7 @@ pub(crate) struct Gather<'a> {
     cycle: Option<i32>,
     /// The first of what the end of the program does by itself: all it does where nothing moves any more.
     closes: usize,
-    workingstep: Option<String>,
+    workingstep: Option<Workingstep>,
     /// The pallet was exchanged just now: the stop that follows is that of M60.
     pallet: bool,
     /// Whether the program stores a reference point of its own, once that was asked.
@@ -465,11 +465,13 @@ impl<'a> Gather<'a> {
             Op::Note(_, text) if text.starts_with("interpreter:") => {}
             Op::Note(_, text) => self.act(Action::Comment(text.to_string())),
             Op::Begin { marker: Marker::Contour, .. } => {}
-            Op::Begin { marker, text, .. } if !text.is_empty() => {
-                if marker == Marker::Workingstep {
-                    self.workingstep = Some(text.to_string());
+            Op::Begin { text, .. } => {
+                if let Some(step) = Workingstep::begun_by(&view.op) {
+                    self.workingstep = Some(step);
                 }
-                self.act(Action::Comment(text.to_string()));
+                if !text.is_empty() {
+                    self.act(Action::Comment(text.to_string()));
+                }
             }
             // The shuttle that M30 and M60 move; M60 stops the program besides.
             Op::Stop(Stop::Pallet) => self.pallet = true,
@@ -793,6 +795,10 @@ impl<'a> Gather<'a> {
     fn go_to(&mut self, start: &Pose, end: &Pose, state: &State) {
         // What is not known of one says nothing of the others: all are asked.
         let (Some(frame), Some(tool), Some(turn)) = (self.work(state), self.tool(state), self.turn(end, state)) else { return };
+        if self.turns_before_coming(start, end) {
+            self.waiting = true;
+            return;
+        }
         let turn = self.turn_index(turn);
         if !self.leaves_probed(start, end) {
             return;
@@ -1043,8 +1049,8 @@ impl<'a> Gather<'a> {
 
     /// Retract, everything off.
     fn end(&mut self, pose: &Pose, state: &State) {
-        if self.waiting && !self.out.items.iter().any(|i| matches!(i, Item::Move(_))) {
-            // Rapids alone that left a coordinate where it was.
+        if self.waiting && (self.anew || !self.out.items.iter().any(|i| matches!(i, Item::Move(_)))) {
+            // Rapids alone that left a coordinate where it was, or only turned the tool.
             self.go_to(pose, pose, state);
             self.retract();
         } else if self.closes == usize::MAX {

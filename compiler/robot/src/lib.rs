@@ -49,7 +49,7 @@ mod turns;
 pub mod verify;
 pub mod words;
 
-pub use options::{Options, Planned, Setup, Singularity, Summary};
+pub use options::{Options, Planned, Setup, Singularity, Summary, Workingstep};
 pub use plan::plan;
 pub use program::{Action, Curves, MAX_JOINTS, RobotProgram, Step, Target, Tool, Word, WorkFrame, Zone, joint_seconds};
 pub use settle::{Brought, By, Coordinates, Settled, settled};

@@ -1,6 +1,6 @@
 //! What can be chosen when a program is planned, and what comes of it.
 
-use gr_ir::Source;
+use gr_ir::{Marker, Op, Source};
 use gr_machine::math::Frame;
 use gr_text::Diagnostic;
 
@@ -34,12 +34,34 @@ pub struct Setup {
     pub name: String,
     /// From this line of the main program on, from 0.
     pub from_line: Option<u32>,
-    /// For these workingsteps, wherever they stand.
+    /// For these workingsteps, wherever they stand: each by its name or its instance name, see [`Workingstep::is_called`].
     pub workingsteps: Vec<String>,
     /// The part's frame in the base, which then holds for every work offset; none = as the machine file has it.
     pub part: Option<Frame>,
     /// Where the job file says so.
     pub place: Source,
+}
+
+/// What a job file can call a workingstep.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Workingstep {
+    /// Its name in the exchange file, which others may have too; may be empty.
+    pub name: String,
+    /// Its instance name, `#59`, which it has alone.
+    pub instance: String,
+}
+
+impl Workingstep {
+    /// The one that an operation begins.
+    pub fn begun_by(op: &Op<'_>) -> Option<Workingstep> {
+        let Op::Begin { marker: Marker::Workingstep, code, text } = op else { return None };
+        Some(Workingstep { name: text.to_string(), instance: format!("#{code}") })
+    }
+
+    /// Whether a job file means it by this: its name or its instance name.
+    pub fn is_called(&self, what: &str) -> bool {
+        what == self.instance || what == self.name && !what.is_empty()
+    }
 }
 
 impl Default for Options {

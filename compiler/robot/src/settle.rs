@@ -13,7 +13,7 @@ use gr_machine::math::{Frame, V3};
 use gr_machine::{Kind, Machine};
 use gr_text::{Diagnostic, Severity, code};
 
-use crate::Setup;
+use crate::{Setup, Workingstep};
 use crate::words::{placed_by, tool};
 use stands::Stands;
 
@@ -308,25 +308,25 @@ pub fn settled(
 }
 
 /// Where the setups of a job put the part.
-struct Places<'a, 'p> {
+struct Places<'a> {
     setups: &'a [Setup],
     machine: &'a Machine,
-    workingstep: Option<&'p str>,
+    workingstep: Option<Workingstep>,
     /// That of the setup in force.
     part: Option<Frame>,
 }
 
-impl<'a, 'p> Places<'a, 'p> {
+impl<'a> Places<'a> {
     fn new(machine: &'a Machine, setups: &'a [Setup]) -> Self {
         Places { setups, machine, workingstep: None, part: None }
     }
 
     /// In the base, at an operation.
-    fn at(&mut self, program: &Program, view: &View<'_, 'p>) -> Frame {
-        if let Op::Begin { marker: Marker::Workingstep, text, .. } = view.op {
-            self.workingstep = Some(text);
+    fn at(&mut self, program: &Program, view: &View<'_, '_>) -> Frame {
+        if let Some(step) = Workingstep::begun_by(&view.op) {
+            self.workingstep = Some(step);
         }
-        self.part = setup_at(self.setups, self.workingstep, || main_line(program, view.source)).and_then(|i| self.setups[i].part);
+        self.part = setup_at(self.setups, self.workingstep.as_ref(), || main_line(program, view.source)).and_then(|i| self.setups[i].part);
         self.of(view.state.work)
     }
 
@@ -375,11 +375,11 @@ impl Settled {
 }
 
 /// Which setup of a job holds for a workingstep, or else at a line of the main program.
-pub(crate) fn setup_at(setups: &[Setup], workingstep: Option<&str>, line: impl FnOnce() -> u32) -> Option<usize> {
+pub(crate) fn setup_at(setups: &[Setup], workingstep: Option<&Workingstep>, line: impl FnOnce() -> u32) -> Option<usize> {
     if setups.is_empty() {
         return None;
     }
-    let named = workingstep.and_then(|w| setups.iter().position(|s| s.workingsteps.iter().any(|n| n == w)));
+    let named = workingstep.and_then(|w| setups.iter().position(|s| s.workingsteps.iter().any(|n| w.is_called(n))));
     named.or_else(|| {
         let line = line();
         setups.iter().rposition(|s| s.from_line.is_some_and(|l| l <= line))

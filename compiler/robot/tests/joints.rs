@@ -513,3 +513,42 @@ fn a_wrist_goes_straight_through() {
     let motion = gr_driver::lower("part.ngc", beside.clone().into(), &setup, None).program;
     assert!(plan(&motion, &machine, &Texts::new([(FileId(0), beside.as_str())]), &Options::default()).is_err());
 }
+
+/// A mill without rotary axes cuts a side of a part that is clamped on its other side: every arc stays one, at its middle too.
+#[test]
+fn arcs_on_the_side_of_a_turned_part() {
+    let side = |axes: [char; 3], axis: &str, plane: &str, sense: i32| {
+        let ([u, v, w], back) = (axes, -sense);
+        format!(
+            "motion 1\nfile 0 \"a.p21\"\nunits mm @0:1\nbegin workingstep code=7 \"side\" @0:1\nfeed 10 angular=0.2 @0:1\nrapid {u}=0 {v}=0 {w}=-5 axis={axis} @0:2\n\
+             linear {w}=2 @0:3\nlinear {u}=20 @0:4\nplane {plane} @0:5\narc {plane} turns={sense} center={} {v}=10 @0:5\narc {plane} turns={back} center={} {u}=18 {v}=12 @0:6\nclose workingstep @0:1\nend @0:7\n",
+            if plane == "xz" { "5,20" } else { "20,5" },
+            if plane == "xz" { "12,20" } else { "20,12" },
+        )
+    };
+    for (rotation, text) in [("[-90, 0, 0]", side(['x', 'z', 'y'], "0,-1,0", "xz", -1)), ("[0, 90, 0]", side(['y', 'z', 'x'], "-1,0,0", "yz", 1))] {
+        let file = format!("format = 1\nid = \"shop/m\"\ntitle = \"m\"\nextends = \"generic/mill3\"\n[[joint]]\nname = \"Z\"\nmin = -900\n[frames.part]\nposition = [115, 130, -140]\nrotation = {rotation}\n");
+        let machine = gr_machine::parse(FileId(0), &file).unwrap();
+        let program = gr_ir::text::parse(&text).unwrap_or_else(|e| panic!("{e:?}\n{text}"));
+        let made = plan(&program, &machine, &gr_ir::NoSources, &Options { own_words: true, ..Options::default() });
+        let made = made.unwrap_or_else(|e| panic!("{:?}", e.iter().map(|d| &d.message).collect::<Vec<_>>())).program;
+        let ways: [Vec<[f64; 3]>; 2] = [
+            joint_path(&made, &JointOptions::default()).unwrap().points().map(|p| p.tool.position).collect(),
+            setpoints(&made, &SetpointOptions::default()).unwrap().rows.iter().map(|r| [r.position[0], r.position[1], r.position[2]]).collect(),
+        ];
+        let (mut cursor, mut arcs) = (program.cursor(), 0);
+        while let Some(view) = cursor.next() {
+            let gr_ir::Op::Arc(arc) = view.op else { continue };
+            let shape = gr_ir::geometry::ArcShape::new(&arc, view.start, view.end);
+            for share in [0.25, 0.5, 0.75] {
+                let at = machine.cell.part_in_base().apply(shape.point(share));
+                for way in &ways {
+                    let off = way.windows(2).map(|w| to_segment(at, w[0], w[1])).fold(f64::INFINITY, f64::min);
+                    assert!(off <= 0.01, "{rotation}, {share} of the arc from {:?}: {off} mm", view.start.xyz());
+                }
+            }
+            arcs += 1;
+        }
+        assert_eq!(arcs, 2);
+    }
+}

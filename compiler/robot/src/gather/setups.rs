@@ -2,6 +2,7 @@
 //! a retract, a stop for the operator and a rapid from above, so the program must begin the setup at a rapid to a
 //! height above the work.
 
+use gr_ir::Pose;
 use gr_machine::Kind;
 use gr_machine::math::{dot, norm, rotate, scale, sub, transpose};
 use gr_text::code;
@@ -16,7 +17,7 @@ const HIGHER: f64 = 1e-6;
 impl Gather<'_> {
     /// Which setup of the job holds here.
     pub(super) fn setup(&self) -> Option<usize> {
-        setup_at(&self.options.setups, self.workingstep.as_deref(), || self.main_line)
+        setup_at(&self.options.setups, self.workingstep.as_ref(), || self.main_line)
     }
 
     fn setup_name(&self, setup: Option<usize>) -> String {
@@ -44,6 +45,12 @@ impl Gather<'_> {
         self.made(on);
         (self.at, self.at_change) = (None, None);
         self.anew = true;
+    }
+
+    /// A rapid of a plan that only turns the tool, or rises meanwhile, where the part was clamped anew: the tool stood there in the setup
+    /// before and isn't there any more. It comes to where the next rapid leads, and comes turned.
+    pub(super) fn turns_before_coming(&self, start: &Pose, end: &Pose) -> bool {
+        self.anew && self.planned && start.tool_axis != end.tool_axis && start.axes[..2] == end.axes[..2]
     }
 
     /// Setups that begin at lines follow each other; a loop would lead back.

@@ -400,7 +400,7 @@ impl<'a> Stands<'a> {
     }
 
     /// What moves nothing. Offsets that are set from where the machine stands are others than in the program's run.
-    pub fn shifts<'p>(&mut self, program: &Program, out: &Builder, view: &View<'_, 'p>, sources: &dyn Sources, places: &Places<'_, '_>) -> Told<'p> {
+    pub fn shifts<'p>(&mut self, program: &Program, out: &Builder, view: &View<'_, 'p>, sources: &dyn Sources, places: &Places<'_>) -> Told<'p> {
         let op = match view.op {
             Op::Begin { marker: Marker::Cycle, .. } => {
                 // Up to R it goes before; of several passes each begins where the one before has ended.
@@ -459,7 +459,7 @@ impl<'a> Stands<'a> {
     }
 
     /// G10.
-    fn work(&mut self, number: u8, out: &Builder, view: &View<'_, '_>, sources: &dyn Sources, places: &Places<'_, '_>) -> Result<(), Untold> {
+    fn work(&mut self, number: u8, out: &Builder, view: &View<'_, '_>, sources: &dyn Sources, places: &Places<'_>) -> Result<(), Untold> {
         let Some(letters) = Letters::at(sources, view.source.file, view.source.line).filter(|l| l.g(100)) else { return Ok(()) };
         if !sets_here(sources, view.source) {
             if number_of(sources, 'l', view.source) == Some(2) {
