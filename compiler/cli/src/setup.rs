@@ -185,6 +185,7 @@ pub fn assembled(args: &SetupArgs, lints: &LintArgs, from: &Path, sources: &mut 
             machine_tools(machine, &mut setup);
         }
     }
+    reader.startup(&setup);
     reader.remaps(&setup);
     if machine.as_ref().is_some_and(|m| m.kind == gr_machine::Kind::Robot) {
         // The tool point of a robot is the machine file's, with G43 and without; a tool it doesn't have is an error there.
@@ -477,6 +478,17 @@ impl Reader<'_> {
         match self.blamed {
             Some((file, span)) => self.show(&[Diagnostic::new(code::FILE_MISSING, file, span, std::slice::from_ref(&name))]),
             None => complain(self.renderer, self.sources, &name, code::FILE_MISSING, std::slice::from_ref(&name)),
+        }
+    }
+    /// A startup code with a mistake: what it should have set is not set.
+    fn startup(&mut self, setup: &Setup) {
+        let Some((said, (file, text))) = setup.ini.get("RS274NGC", "RS274NGC_STARTUP_CODE").zip(self.ini.clone()) else { return };
+        let options = gr_driver::Options::new(Setup { startup_code: false, ..setup.clone() });
+        let check = gr_driver::check_once("startup.ngc", format!("{said}\nM2\n"), options).check;
+        if let Some(fault) = check.diagnostics.iter().find(|d| d.severity == gr_text::Severity::Error) {
+            let place = text.find(said).map_or(Span::default(), |at| Span::new(at as u32, (at + said.len()) as u32));
+            let args = [said.to_string(), "RS274NGC_STARTUP_CODE".into(), fault.message.clone()];
+            self.show(&[Diagnostic::new(code::INI_VALUE, file, place, &args)]);
         }
     }
     /// Remapped codes whose subroutine is nowhere.

@@ -102,6 +102,11 @@ fn tables_and_settings() {
     for line in ["[TRAJ]\nSPINDLES = 9", "[AXIS_X]\nMAX_LIMIT = 400 # mm", "[EMCIO]\nTOOL_CHANGE_AT_G30 = YES", "[EMCIO]\nTOOL_TABLE = none.tbl"] {
         told("E0852", &[part.clone(), file("a.ini", &format!("{line}\n"))], "check -i a.ini a.ngc");
     }
+    for (code, told) in [("G20 G999", 1), ("G20 G64 P0.01", 0), ("G64 P0.1 M52 P1", 1)] {
+        let files = [part.clone(), file("a.ini", &format!("[RS274NGC]\nRS274NGC_STARTUP_CODE = {code}\n"))];
+        let (found, _) = codes(&files, "check -i a.ini a.ngc");
+        assert_eq!(found.iter().filter(|c| *c == "E0852").count(), told, "{code}: {found:?}");
+    }
     // What a strict check does not pass is not passed in set-up files either.
     let ini = file("a.ini", "[EMCIO]\nTOOL_CHANGE_AT_G30 = YES\n");
     let (found, status) = codes(&[part.clone(), ini], "check --strict -i a.ini a.ngc");
