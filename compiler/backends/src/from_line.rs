@@ -58,7 +58,7 @@ pub struct Restart {
     pub shifted: [Option<f64>; 9],
     /// By how much G10 L20 has changed the axes it named of work offsets, by their number: the same.
     pub kept: BTreeMap<u8, [Option<f64>; 9]>,
-    /// Offsets that it sets before it begins, axis by axis, mm and rad: G92 (0) and work offsets, by their number.
+    /// Offsets that it sets before it begins, axis by axis, mm and rad: G92 (0), work offsets by their number, the tool's (10).
     pub offsets: BTreeMap<u8, Axes>,
     /// How high and how far out it is brought there.
     pub room: Room,
@@ -152,6 +152,9 @@ pub fn from_line(
     Ok(Restart { program: restart, notes, goal, named, shifted, kept, offsets, room })
 }
 
+/// Where [`Restart::offsets`] has the tool's offset.
+const TOOL: u8 = 10;
+
 /// Offsets that a restart sets before its first source line; work offsets that the machine has kept are not among them.
 fn offsets(restart: &Program) -> BTreeMap<u8, Axes> {
     let Some(last) = restart.steps().filter(|s| s.source.line == INSERTED).last() else { return BTreeMap::new() };
@@ -160,8 +163,8 @@ fn offsets(restart: &Program) -> BTreeMap<u8, Axes> {
         Op::StoredOffset { number, offset, .. } => Some((number, offset)),
         _ => None,
     });
-    let local = restart.cursor_at(last.index).state().local_offset;
-    stored.chain([(0, local)]).collect()
+    let state = *restart.cursor_at(last.index).state();
+    stored.chain([(0, state.local_offset), (TOOL, state.tool_offset)]).collect()
 }
 
 /// By how much G10 L20 has changed the axes it named of work offsets.
@@ -435,7 +438,14 @@ struct Ahead {
 fn ahead(program: &Program, index: usize, places: &[Place; 9], sources: &dyn Sources) -> Ahead {
     let mut ahead = Ahead { needed: [false; 9], named: [None; 9] };
     let mut said = [false; 9];
-    for s in program.steps().skip(index).filter(|s| s.op.moves()) {
+    for s in program.steps().skip(index) {
+        if !s.op.moves() {
+            // What names the place where a probe stopped needs it.
+            let names = matches!(s.op, Op::LocalOffset(_) | Op::WorkOffset(..) | Op::StoredOffset { .. }) && (asks(&s, &[920], sources) || sets_here(sources, s.source));
+            let words = names.then(|| Words::at(sources, s.source.file, s.source.line)).flatten();
+            (0..9).filter(|i| places[*i] == Place::Probed && !said[*i]).for_each(|i| ahead.needed[i] |= words.is_some_and(|w| w.has(AXIS_LETTERS[i])));
+            continue;
+        }
         let words = Words::at(sources, s.source.file, s.source.line);
         for i in 0..9 {
             let drifts = places[i] == Place::Probed && !words.is_some_and(|w| w.has(AXIS_LETTERS[i]));

@@ -234,6 +234,13 @@ fn what_a_written_program_cannot_carry() {
         let line = if found.contains('\n') { "7" } else { "6" };
         told(code, &[file("a.ngc", &probed)], &restart.replace("line 6", &format!("line {line}")));
     }
+    for naming in ["G92 X-3", "G10 L20 P1 X-3"] {
+        let named = format!("G21 G90 G54 F50\nG0 X0 Y0 Z-5\nG38.2 X20\n{naming}\nG0 X-8\nG1 X5\nM2\n");
+        told("E0619", &[file("a.ngc", &named)], &restart.replace("line 6", "line 4"));
+    }
+    let measured = "G21 G90 G54 F50\nT1 M6\nG0 X0 Y0 Z10\nG38.2 Z-80\nG10 L10 P1 Z40.5\nG0 X5 Y5 Z20\nG43 H1\nG0 X1 Y1 Z30\nG1 Z5\nM2\n";
+    told("E0652", &[file("a.ngc", measured)], &restart.replace("line 6", "line 9"));
+    told("E0602", &[file("a.ngc", measured)], "build a.ngc --target rs274ngc -o a.nc");
     let stopped = "G21 G90 G94 G54 F50\nG0 X0 Y0 Z10\nG38.2 Z-10\nS1000 M3\nG1 X10\nM2\n";
     told("E0619", &[file("a.ngc", stopped)], &restart.replace("line 6", "line 5"));
     // Where G28 goes is known where its place is stored in a file.
@@ -317,6 +324,8 @@ fn a_translation_holds_on_every_machine_or_says_so() {
         "G21 G90\nG0 X1 Y1 Z1\nG38.2 Z-5 F10\nG10 L20 P1 Z2.5\nG0 Z5\nM2\n",
         "G21 G90\nG0 X10\nG10 L20 P1 X0\nG0 X5\nM2\n",
         "G21 G54 F100\no1 sub\nG0 Z1\no1 endsub\nG90 G0 X0 Y0 Z10\nG38.2 Z-10\nG91\no1 call\nG90 G0 X9\nG0 Z5\nM2\n",
+        // A datum set by a subroutine that is told which.
+        "G21 G90 G54 F100\no1 sub\nG38.2 Z-30\nG10 L20 P#1 Z#2\no1 endsub\nG0 X0 Y0 Z10\no1 call [1] [12.7]\nG0 Z20\nG1 X3\nM2\n",
         // A probe that touches twice.
         "G21 G90 G54 F100\nG0 X0 Y0 Z10\nG38.2 Z-10\nG91 G0 Z1\nG38.2 Z-2 F10\nG90 G10 L20 P1 Z0\nG0 Z5\nM2\n",
         "G21 G90 G54\nG0 X1 Y2 Z3\nG10 L20 P2 X50 Z[2+3]\nG10 L2 P3 X0 Y[1+1] R20\nG10 L2 P1 X0\nG55 G0 X3 Y4 Z5\nG92 X9\nG10 L20 P3 X1 Y1\nG56 G0 X1 Y1\nG10 L2 P6 Z0\nM2\n",

@@ -196,8 +196,9 @@ impl Emitter<'_> {
             }
             return None;
         }
-        let number = number_of(self.sources, 'p', view.source).filter(|p| *p == 0 || *p == u32::from(n));
-        if !here || number.is_none() || self.frame.work != n || self.frame.work_offset == *offset && !words.names_axes() {
+        // Where P is no plain number (P#1), it is the offset in force that changes.
+        let other = number_of(self.sources, 'p', view.source).is_some_and(|p| p != 0 && p != u32::from(n));
+        if !here || other || self.frame.work != n || self.frame.work_offset == *offset && !words.names_axes() {
             return None;
         }
         let known = self.anchored;
@@ -477,6 +478,11 @@ impl Emitter<'_> {
         }
         if words.is_empty() {
             return;
+        }
+        let touched = matches!(number_of(self.sources, 'l', view.source), Some(10 | 11));
+        if touched && (0..9).any(|i| self.loose[i].is_some() && said(AXES[i])) {
+            // The length is the simulation's.
+            self.say(code::EMIT_RUNTIME_VALUE, view.source, &["where the probe stopped".into()]);
         }
         self.w.block(&format!("G10 L1 P{tool} {}", words.join(" ")));
         self.tools.retain(|(n, _)| *n != tool);

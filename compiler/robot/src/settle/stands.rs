@@ -25,6 +25,8 @@ pub(super) struct Stands<'a> {
     stores: Option<bool>,
     /// Coordinates that a way of the slides has changed without a word, and by what each was known before.
     strayed: [Option<By>; 3],
+    /// Those of them that an index has changed.
+    indexed: [bool; 3],
     /// Places that the last move goes through before its end.
     way: Vec<Axes>,
 }
@@ -81,7 +83,7 @@ impl<'a> Stands<'a> {
             Kind::Robot => (Of::Place(machine.cell.machine_zero()?), [0.0; 3]),
             _ => return None,
         };
-        Some(Stands { machine, of, place: Frame::IDENTITY, last: Last::Home(home), shifted: Shifted::default(), level: None, line: None, stores: None, strayed: [None; 3], way: Vec::new() })
+        Some(Stands { machine, of, place: Frame::IDENTITY, last: Last::Home(home), shifted: Shifted::default(), level: None, line: None, stores: None, strayed: [None; 3], indexed: [false; 3], way: Vec::new() })
     }
 
     /// Where it stands before the program. An arm's program says that itself.
@@ -149,12 +151,21 @@ impl<'a> Stands<'a> {
             end[level.axis] = level.real;
         }
         let turns = (3..6).any(|i| from[i] != end[i]);
+        let comes = matches!(goal, Goal::Work) && view.op == Op::Rapid && !increments && to[..3].contains(&true);
+        // Coming to the part behind an index, the tool goes to where the program believes it, as LinuxCNC sends it: what it has not
+        // named is the height of the retract, and not what the turn has made of that.
+        let believed: [bool; 3] = std::array::from_fn(|i| comes && !to[i] && self.indexed[i] && self.strayed[i].is_some());
+        for i in (0..3).filter(|i| believed[*i]) {
+            end[i] = b1[i];
+            // A cut there has to name it still.
+            self.indexed[i] = false;
+        }
         self.rests_on_strayed(view, &from, &end, &to)?;
         match goal {
             Goal::Work => {
                 // An arm stands nowhere by itself.
                 let stays = |by: By| by == By::Machine || by == By::Nothing && matches!(self.of, Of::Slides { .. });
-                let held: Vec<usize> = (0..3).filter(|i| !to[*i] && stays(by[*i])).collect();
+                let held: Vec<usize> = (0..3).filter(|i| !to[*i] && !believed[*i] && stays(by[*i])).collect();
                 if !held.is_empty() && (turns || self.other_point(state)) {
                     let kept = end;
                     let apart = self.apart(&end, &held, state);
@@ -223,6 +234,7 @@ impl<'a> Stands<'a> {
         let kept = *end;
         self.hold(end, &[0, 1, 2], state)?;
         (0..3).for_each(|i| self.strays(i, end[i] - kept[i], by));
+        (0..3).for_each(|i| self.indexed[i] |= (end[i] - kept[i]).abs() > LED);
         if matches!(self.machine.chain, Chain::FiveAxis(_)) {
             let turned = libm::sqrt((3..6).map(|i| (end[i] - from[i]) * (end[i] - from[i])).sum());
             let count = libm::ceil(turned / TURN_STEP - 1e-9).clamp(1.0, 10_000.0) as usize;
