@@ -127,9 +127,9 @@ pub fn from_line(
         notes.push(Diagnostic::new(code::FROM_LINE_OFFSET_KEPT, file, span, &[]));
     }
     let lathe = approach::is_lathe(program);
-    let places = places(program, found.index, lathe, options.stored, sources);
-    let Ahead { needed, named } = ahead(program, found.index, &places, sources);
     let used = axes_used(program);
+    let places = places(program, found.index, (lathe, options.stored), &used, sources);
+    let Ahead { needed, named } = ahead(program, found.index, &places, sources);
     let lost = |i: &usize| matches!(places[*i], Place::Machine | Place::Probed) && needed[*i] && used[*i];
     let lost: Vec<String> = (0..9).filter(lost).map(|i| char::from(AXIS_LETTERS[i].to_ascii_uppercase()).to_string()).collect();
     if !lost.is_empty() {
@@ -398,9 +398,8 @@ enum Place {
 /// What a program has said about the places of its axes before an operation. Of axes that it never named, and of those
 /// that G28, G30 and G53 brought to a place of the machine, the numbers are only what a simulation takes them for, but where
 /// such places are `stored` in a file; where a probe stopped and how high the tool is after a tool change, only the machine knows.
-fn places(program: &Program, index: usize, lathe: bool, stored: bool, sources: &dyn Sources) -> [Place; 9] {
+fn places(program: &Program, index: usize, (lathe, stored): (bool, bool), used: &[bool; 9], sources: &dyn Sources) -> [Place; 9] {
     let mut places = [Place::Never; 9];
-    let used = axes_used(program);
     for s in program.steps().take(index) {
         if !s.op.moves() {
             if matches!(s.op, Op::ToolChange(_)) && !lathe && places[2] != Place::Never {

@@ -665,6 +665,8 @@ fn lengths_and_shifts_of_a_fanuc_control() {
     let text = "G21 G90 F100\nT1 M6\nG43 H1 G0 Z50\nG1 Z1\nG0 Z40\nG49\nM30\n";
     let notes = emit(&run(text), &options(Language::FanucMill), &Texts::new([(FileId(0), text)])).expect("written").notes;
     assert_eq!(notes.iter().map(|d| d.code.def().slug).collect::<Vec<_>>(), ["emit/dropped-note"]);
+    let shifted = errors("G21 G90 F100\nT1 M6\nG0 Z9\nG43 H1\nG92 Z10\nG0 Z50\nM30\n", Language::FanucMill);
+    assert_eq!(shifted, [("emit/not-expressible", "G92 Z10".to_string())]);
     assert_eq!(errors("G21 G90 F100\nT1 M6\nG43 H1\nG2 X2 I1 Z-1\nM30\n", Language::FanucMill)[0].0, "emit/not-expressible");
 }
 

@@ -187,6 +187,12 @@ fn exchange_files_and_plans() {
 fn what_a_written_program_cannot_carry() {
     let input = file("a.ngc", "G21 G90 F100\nM66 P0 L0\nG0 X#5399\nM2\n");
     told("E0602", &[input], "build a.ngc --target rs274ngc -o a.nc");
+    let looped = file("a.ngc", "G21 G90 F100\no1 repeat [5]\nM66 P0 L0\nG0 X#5399\no1 endrepeat\nM2\n");
+    told("E0602", &[looped], "build a.ngc --target rs274ngc -o a.nc");
+    // R of a Fanuc lathe's taper is no Y.
+    let taper = file("a.nc", "O1\nG21 G40 G99\nT0101\nG97 S500 M3\nG0 X50. Z2.\nG90 X46. Z-10. R-2. F.2\nX42. R-2.\nG0 X80.\nM30\n");
+    let (text, status) = output(&[taper], "build a.nc --dialect fanuc-turn --target rs274ngc");
+    assert_eq!((text.contains('Y'), text.contains("G1 X23 Z-10"), status), (false, true, Some(0)), "{text}");
     let arc = file("a.ngc", "G21 G90 G17 F100\nG0 X0.1234 Y0.5678 Z0\nG3 X10.7777 Y3.3333 R7.123\nM2\n");
     told("E0603", std::slice::from_ref(&arc), "build a.ngc --target rs274ngc --decimals 1 -o a.nc");
     // Compensation makes a spiral of an arc: its radii differ by 0.9 µm.

@@ -799,6 +799,9 @@ fn an_index_leaves_the_slides_where_they_are() {
                 assert!(up.len() > 1 && up.iter().all(|l| l.starts_with(&format!("G0 X30 {y} Z0 "))) && up.last().unwrap().contains(&format!(" {tilt}{angle} ")), "{base} {angle}: {up:?}");
                 let cuts = |of: &[String]| of.iter().filter(|l| l.starts_with("G1 ")).map(place).collect::<Vec<_>>();
                 assert_eq!(cuts(&moves), cuts(&direct), "{base} {angle}");
+                // X and Y first: at the height that the retract has in the program, 90 mm over the part, as `rs274` has it.
+                let (over, found) = made(base, &format!("G0 X10 Y-50 Z90 {tilt}{angle} C0"));
+                assert!(found.is_empty() && moves.iter().any(|l| Some(l) == over.last()), "{base} {angle}: {found} {over:?} {moves:?}");
             }
             // With a place of the part in the same block what isn't named stays in the part.
             let (moves, found) = made(base, &format!("G53 G0 Z0\nG0 X10 Y-50 {tilt}{angle} C0\nZ-20\nG1 Y-9 F300\nX30"));

@@ -43,17 +43,6 @@ impl<S: Sink> Interp<'_, S> {
         self.setup.dialect.family == Family::Fanuc
     }
 
-    /// What the control says of itself when it is switched on, where that is not as with LinuxCNC.
-    pub(crate) fn power_up(&mut self) {
-        if is_lathe(self.setup.dialect) {
-            self.emit(Call::SelectPlane(Plane::Xz));
-            self.emit(Call::SetFeedMode(0, 1));
-        }
-        if self.setup.dialect.family == Family::Grbl {
-            self.m.motion = 0;
-        }
-    }
-
     /// Codes with no place among those of LinuxCNC: true when it is one.
     pub(crate) fn take_fanuc_g(&mut self, n: i32) -> bool {
         if n == 670 && self.setup.dialect.code("G67").is_some() {

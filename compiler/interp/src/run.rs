@@ -359,6 +359,17 @@ impl<'a, S: Sink> Interp<'a, S> {
         self.run_startup();
     }
 
+    /// What the control says of itself when it is switched on, where that is not as with LinuxCNC.
+    fn power_up(&mut self) {
+        if crate::fanuc::is_lathe(self.setup.dialect) {
+            self.emit(Call::SelectPlane(gr_canon::Plane::Xz));
+            self.emit(Call::SetFeedMode(0, 1));
+        }
+        if self.setup.dialect.family == gr_spec::Family::Grbl {
+            self.m.motion = 0;
+        }
+    }
+
     /// Runs [RS274NGC]RS274NGC_STARTUP_CODE.
     fn run_startup(&mut self) {
         let Some(code) = self.setup.ini.get("rs274ngc", "rs274ngc_startup_code").filter(|_| self.setup.startup_code) else {

@@ -33,9 +33,10 @@ impl Emitter<'_> {
             _ if source.line == crate::from_line::INSERTED => false,
             Some(words) => {
                 let letter = AXES[axis].to_ascii_lowercase() as u8;
-                // R of a drilling cycle; that of an arc, of a thread, of roughing or of a taper (Fanuc lathes) is no place.
-                let roughing = || self.sources.increments() && !self.cycling || [700, 710, 711, 712, 720, 721, 722, 760].into_iter().any(|g| words.g(g));
-                words.has(letter) || (axis == self.across && words.has(b'r') && !self.rounding && !roughing())
+                // R of a drilling cycle; that of an arc, of a thread, of roughing or of any cycle of a Fanuc lathe is no place.
+                let roughing = || [700, 710, 711, 712, 720, 721, 722, 760].into_iter().any(|g| words.g(g));
+                let place = || !self.rounding && !self.sources.increments() && !roughing();
+                words.has(letter) || (axis == self.across && words.has(b'r') && place())
             }
             None => axis < 3,
         }

@@ -264,6 +264,10 @@ impl Emitter<'_> {
     fn local_offset(&mut self, offset: &Axes, view: &View<'_, '_>) {
         let (old, known) = (self.frame.local_offset, self.anchored);
         self.move_frame(view.state);
+        let names_z = self.words(view.source).is_some_and(|w| w.g(920) && w.has(b'z'));
+        if (names_z || offset[2] != old[2]) && self.w.release().is_some() {
+            return self.cannot("a shift of Z behind G43 or G49 without a move of Z", view.source);
+        }
         // Where the source says so it is said again: the control may know more than the simulation.
         let asked = [920, 921, 922, 923, 520].into_iter();
         let asked = self.words(view.source).is_some_and(|w| asked.clone().any(|g| w.g(g)));
@@ -514,7 +518,7 @@ impl Emitter<'_> {
             Op::SpindleSpeed { spindle: n, speed } if n == spindle => Some((s.index, speed)),
             _ => None,
         });
-        let speed = next.map(|(_, speed)| speed).map(|speed| format!(" S{}", self.speed_text(speed, surface.is_some()))).unwrap_or_default();
+        let speed = next.map(|(_, speed)| format!(" S{}", self.speed_text(speed, surface.is_some()))).unwrap_or_default();
         match surface {
             Some(limit) => {
                 // A limit beyond any spindle stands for none.

@@ -61,13 +61,7 @@ impl Writer {
 
     /// A block.
     pub fn block(&mut self, words: &str) {
-        let any = |of: &[&str]| words.split(' ').any(|w| of.contains(&w));
-        let moves = words.split(' ').any(|w| w.starts_with('Z')) && !any(&["G10", "G92", "G52", "G04", "G4"]);
-        // A place of the machine takes no length; on the way home from where it stands (G91 G28 Z0) the axis would move by it.
-        let home = any(&["G53", "G28", "G30"]);
-        let takes = |held: &str| moves && !(home && (held != "G49" || any(&["G91"])));
-        let taken = self.held.take_if(|(held, _)| takes(held));
-        let with = taken.map(|(held, _)| held.split_once(' ').map_or(format!("{held} {words}"), |(code, h)| format!("{code} {words} {h}")));
+        let with = self.with_held(words);
         let words = with.as_deref().unwrap_or(words);
         if let Some((n, step)) = self.numbers {
             self.text.push_str(&format!("N{n} "));
@@ -75,6 +69,17 @@ impl Writer {
             self.numbers = Some((if n + step > 99_999 { step } else { n + step }, step));
         }
         self.bare(words);
+    }
+
+    /// A block together with the length that is kept for it, where it is the one that moves Z.
+    fn with_held(&mut self, words: &str) -> Option<String> {
+        let (held, _) = self.held.as_ref()?;
+        let any = |of: &[&str]| words.split(' ').any(|w| of.contains(&w));
+        let moves = words.split(' ').any(|w| w.starts_with('Z')) && !any(&["G10", "G92", "G52", "G04", "G4"]);
+        // A place of the machine takes no length; on the way home from where it stands (G91 G28 Z0) the axis would move by it.
+        let takes = !any(&["G53", "G28", "G30"]) || held == "G49" && !any(&["G91"]);
+        let (held, _) = self.held.take_if(|_| moves && takes)?;
+        Some(held.split_once(' ').map_or(format!("{held} {words}"), |(code, h)| format!("{code} {words} {h}")))
     }
 
     /// Begins a block to which words are added.
