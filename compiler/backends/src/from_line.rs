@@ -2,6 +2,7 @@
 //! height, and the rest follows. The result is motion IR like any other, so every back end can write it.
 
 mod approach;
+mod heights;
 
 pub(crate) use approach::is_lathe;
 
@@ -9,8 +10,9 @@ use std::collections::BTreeMap;
 
 use crate::sources::{SYSTEMS, Words, is_hidden, sets_here};
 use gr_ir::Sources;
+use heights::{Heights, UPRIGHT};
 use gr_ir::{Axes, Builder, FrameId, Marker, Note, Op, Override, PathMode, Pose, Program, Source, State, Turn, Units};
-use gr_text::{Diagnostic, FileId, Span, code};
+use gr_text::{Diagnostic, FileId, code};
 
 /// Line number of operations that no source line asked for.
 pub const INSERTED: u32 = u32::MAX;
@@ -19,9 +21,10 @@ pub const INSERTED: u32 = u32::MAX;
 const SAME_HEIGHT: f64 = 1e-6;
 
 /// What can be chosen.
-#[derive(Clone, Copy, PartialEq, Debug, Default)]
-pub struct Options {
-    /// Height of the approach in the work frame in force, mm; none = the highest point of the program.
+#[derive(Clone, Copy, Default)]
+pub struct Options<'a> {
+    /// Height of the approach in the work frame in force, mm, along the tool where that is tilted; none = the highest point of the
+    /// program.
     pub safe_z: Option<f64>,
     /// Axes whose numbers rest on what no file names. The tool is brought there only where the program cuts before it
     /// names them.
@@ -30,9 +33,16 @@ pub struct Options {
     pub stored: bool,
     /// How high and how far out the approach goes, where that has been found before; goes before `safe_z`.
     pub room: Option<Room>,
+    /// Direction from the tool point to the spindle in the work frame, where a machine is known; else it is Z.
+    pub tool: Option<&'a ToolDirection<'a>>,
 }
 
-/// How high and how far out an approach goes, in the work frame in force, mm.
+type V3 = [f64; 3];
+
+/// Direction from the tool point to the spindle in the work frame; none where the machine can't tell it.
+pub type ToolDirection<'a> = dyn Fn(&Pose, &State) -> Option<V3> + 'a;
+
+/// How high and how far out an approach goes, in the work frame in force, mm; heights go along the tool where it is tilted.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Room {
     /// Above the part, spindle and all.
@@ -69,7 +79,7 @@ pub fn from_line(
     program: &Program,
     file: FileId,
     line: u32,
-    options: &Options,
+    options: &Options<'_>,
     sources: &dyn Sources,
 ) -> Result<Restart, Vec<Diagnostic>> {
     let target = line.saturating_sub(1);
@@ -97,15 +107,40 @@ pub fn from_line(
     if let Some(way) = found.repeated {
         notes.push(Diagnostic::new(code::FROM_LINE_INSIDE_LOOP, place.0, place.1, &[way]));
     }
-    let (state, pose) = (*cursor.state(), *cursor.pose());
+    let (state, mut pose) = (*cursor.state(), *cursor.pose());
+    // A program made from features says how the tool stands: as it goes on there, and not as the setup before has left it.
+    let next = options.tool.and_then(|_| program.steps().skip(found.index).find(|s| s.op.moves()));
+    (pose.tool_axis, pose.spin) = next.map_or((None, None), |s| (s.end.tool_axis, s.end.spin));
+    let lathe = approach::is_lathe(program);
+    let tilt = options.tool.filter(|_| !lathe).and_then(|tool| tool(&pose, &state)).filter(|up| up[2] < 1.0 - UPRIGHT);
+    let used = axes_used(program);
+    let places = places(program, found.index, (lathe, options.stored), &used, sources);
+    let Ahead { mut needed, named } = ahead(program, found.index, &places, sources);
+    let cuts = needed[..3].contains(&true);
+    // Along a tilted tool there is no way to one of them alone.
+    (0..3).for_each(|i| needed[i] |= tilt.is_some() && cuts && places[i] == Place::Named);
+    let tilted = |i: usize| cuts && tilt.is_some_and(|up| up.get(i).is_some_and(|v| v.abs() > UPRIGHT));
+    let lost = |i: &usize| match places[*i] {
+        Place::Machine | Place::Probed => needed[*i] && used[*i],
+        Place::Never => tilted(*i),
+        Place::Named => false,
+    };
+    let lost: Vec<String> = (0..9).filter(lost).map(|i| char::from(AXIS_LETTERS[i].to_ascii_uppercase()).to_string()).collect();
+    if !lost.is_empty() {
+        return Err(vec![Diagnostic::new(code::FROM_LINE_PLACE_OF_MACHINE, place.0, place.1, &[lost.join(" ")])]);
+    }
     let length = length_to_come(program, found.index, &state);
+    let heights = Heights { program, state: &state, begins: &pose, tilt, sources };
+    let own = heights.of(&pose, &state);
     let safe = match (options.room, options.safe_z) {
         (Some(room), _) => room.safe,
         // What is asked for is the height of the tool; where its length is not in force yet, the spindle goes higher.
         (None, Some(z)) => z + length.unwrap_or(0.0),
         (None, None) => {
-            let top = top(program, &state);
-            notes.push(no_height(place, top));
+            let top = heights.top().unwrap_or(own);
+            if tilt.is_none() || cuts {
+                notes.push(Diagnostic::new(code::FROM_LINE_NO_SAFE_HEIGHT, place.0, place.1, &[heights.show(top)]));
+            }
             top
         }
     };
@@ -115,36 +150,28 @@ pub fn from_line(
     if length == Some(0.0) {
         notes.push(Diagnostic::new(code::FROM_LINE_BARE_SPINDLE, place.0, place.1, &[state.tool.to_string()]));
     }
-    let found_room = || Room { safe: safe.max(pose.axes[2]), lowest: approach::lowest_crossing(program, &state), out: approach::outmost(program, &state) };
+    let found_room = || Room { safe: safe.max(own), lowest: heights.lowest_crossing(), out: approach::outmost(program, &state) };
     let room = options.room.unwrap_or_else(found_room);
     if let Some(lowest) = room.lowest.filter(|lowest| room.safe < lowest - SAME_HEIGHT) {
-        let heights = [room.safe, lowest].map(|z| format!("{z:.3}"));
-        notes.push(Diagnostic::new(code::FROM_LINE_LOW_HEIGHT, place.0, place.1, &heights));
+        notes.push(Diagnostic::new(code::FROM_LINE_LOW_HEIGHT, place.0, place.1, &[room.safe, lowest].map(|h| heights.show(h))));
     }
     let kept = kept_here(program, found.index, sources);
     if let Some((_, source)) = kept.values().next() {
         let (file, span) = sources.place(*source);
         notes.push(Diagnostic::new(code::FROM_LINE_OFFSET_KEPT, file, span, &[]));
     }
-    let lathe = approach::is_lathe(program);
-    let used = axes_used(program);
-    let places = places(program, found.index, (lathe, options.stored), &used, sources);
-    let Ahead { needed, named } = ahead(program, found.index, &places, sources);
-    let lost = |i: &usize| matches!(places[*i], Place::Machine | Place::Probed) && needed[*i] && used[*i];
-    let lost: Vec<String> = (0..9).filter(lost).map(|i| char::from(AXIS_LETTERS[i].to_ascii_uppercase()).to_string()).collect();
-    if !lost.is_empty() {
-        return Err(vec![Diagnostic::new(code::FROM_LINE_PLACE_OF_MACHINE, place.0, place.1, &[lost.join(" ")])]);
-    }
     // The tool does not go down where nobody knows what is below it.
     let beside = (0..2).any(|i| places[i] == Place::Named && options.unsure[i] && !needed[i] && used[i]);
     let down = beside && needed[2];
     let known = std::array::from_fn(|i| match i {
+        // Its rotary axes turn where the machine stands, and the program goes on from there.
+        0..3 if tilt.is_some() && !needed[i] => false,
         2 if beside && !down => false,
         _ => places[i] == Place::Named && (needed[i] || !options.unsure[i] || down && i < 2),
     });
     // On a lathe no height is safe, and a cut has none that nobody named: the program begins as it begins itself.
-    let wait = !known[2] && !lathe && !needed[2] && used[2];
-    let from = From { index: found.index, line, known, wait, lathe };
+    let wait = !known[2] && !lathe && !needed[2] && used[2] && tilt.is_none();
+    let from = From { index: found.index, line, known, wait, lathe, tilt };
     let restart = build(program, &from, &state, &pose, &room, sources);
     let goal = std::array::from_fn(|i| known[i].then_some(pose.axes[i]));
     let (shifted, kept) = (shifted(program, found.index, sources), set_from_here(program, found.index, sources));
@@ -205,10 +232,6 @@ fn shifted(program: &Program, index: usize, sources: &dyn Sources) -> [Option<f6
 /// What the program itself does before an operation.
 fn own(program: &Program, index: usize) -> impl Iterator<Item = gr_ir::Step<'_>> {
     program.steps().take(index).skip(crate::begins(program))
-}
-
-fn no_height(place: (FileId, Span), top: f64) -> Diagnostic {
-    Diagnostic::new(code::FROM_LINE_NO_SAFE_HEIGHT, place.0, place.1, &[format!("{top:.3}")])
 }
 
 struct Found {
@@ -343,18 +366,6 @@ fn inside_cycle(program: &Program, index: usize) -> bool {
     depth > 0
 }
 
-/// The highest point of the whole program, in the work frame of a state.
-fn top(program: &Program, state: &State) -> f64 {
-    let mut highest = f64::NEG_INFINITY;
-    let mut cursor = program.cursor();
-    while let Some(view) = cursor.next() {
-        if view.op.moves() {
-            highest = highest.max(view.state.machine(&view.end.axes)[2]);
-        }
-    }
-    if highest.is_finite() { highest - state.machine(&[0.0; 9])[2] } else { 0.0 }
-}
-
 /// By how much the length that a later block asks for (G43), before the tool is changed again, is longer than what is in
 /// force; none where no tool is in the spindle or its length is in force. 0: it is asked for, and nobody knows it.
 fn length_to_come(program: &Program, index: usize, state: &State) -> Option<f64> {
@@ -382,6 +393,8 @@ struct From {
     /// The tool stays at the safe height until a block says how high.
     wait: bool,
     lathe: bool,
+    /// Direction of a tilted tool.
+    tilt: Option<V3>,
 }
 
 /// What a program has said about the place of an axis.
@@ -490,7 +503,7 @@ fn build(program: &Program, from: &From, state: &State, pose: &Pose, room: &Room
             .for_each(|op| begins.apply(op, &mut pose));
     }
     // It is said before the offsets are, which give it its number.
-    let far = Pose::at(begins.work_frame(&state.machine(&far)));
+    let far = Pose { tool_axis: pose.tool_axis, spin: pose.spin, ..Pose::at(begins.work_frame(&state.machine(&far))) };
     let mut out = Builder::from_state(far, begins);
     out.names_of(program);
     let source = Source { line: INSERTED, ..Source::default() };
@@ -524,7 +537,7 @@ fn build(program: &Program, from: &From, state: &State, pose: &Pose, room: &Room
     if from.lathe && !from.known[2] {
         start(&mut restore);
     } else {
-        approach::Approach { program, index, state, goal, approached, room }.make(&mut restore, start);
+        approach::Approach { program, index, state, goal, approached, tilt: from.tilt, room }.make(&mut restore, start);
     }
     let mut out = restore.out;
     let mut rest = program.cursor_at(index);

@@ -8,7 +8,7 @@ use gr_backends::from_line::Restart;
 use gr_backends::rs274ngc;
 use gr_backends::{Texts, joint};
 use gr_canon::{Printer, Units};
-use gr_ir::{Program, Source};
+use gr_ir::{Pose, Program, Source, State};
 use gr_machine::Machine;
 use gr_planner::Tool;
 use gr_robot::along::is_planned;
@@ -367,10 +367,15 @@ fn calls(unit: &Unit, program: String, tools: Option<gr_interp::ToolTable>) -> V
 
 fn of_motion(mut motion: Motion, unit: &Unit, goal: &Goal<'_>) -> Result<Built, String> {
     let rests = goal.machine.filter(|_| crate::robot::is_for_machine(goal)).and_then(|m| elsewhere::rests(unit, &motion, m));
-    if let Some(from) = goal.from_line {
-        restart(&mut motion, unit, from, goal.machine.is_some() && crate::robot::is_for_machine(goal));
+    let faulty = |motion: &Motion| motion.found.iter().any(|d| d.severity == gr_text::Severity::Error);
+    // A job names the workingsteps of the whole program, also those that a restart leaves behind.
+    if !faulty(&motion) && let Err(found) = crate::robot::take_job(&mut motion, goal) {
+        return Ok(built(motion, Vec::new(), found));
     }
-    if motion.found.iter().any(|d| d.severity == gr_text::Severity::Error) {
+    if let Some(from) = goal.from_line {
+        restart(&mut motion, unit, from, goal.machine.filter(|_| crate::robot::is_for_machine(goal)));
+    }
+    if faulty(&motion) {
         return Ok(built(motion, Vec::new(), Vec::new()));
     }
     if let Some(machine) = goal.machine {
@@ -381,9 +386,6 @@ fn of_motion(mut motion: Motion, unit: &Unit, goal: &Goal<'_>) -> Result<Built, 
         if let Some(rests) = rests {
             return Ok(built(motion, Vec::new(), vec![rests]));
         }
-    }
-    if let Err(found) = crate::robot::take_job(&mut motion, goal) {
-        return Ok(built(motion, Vec::new(), found));
     }
     let name = stem(&unit.path);
     let mut corrected = None;
@@ -449,10 +451,13 @@ fn built(motion: Motion, artifacts: Vec<Artifact>, more: Vec<Diagnostic>) -> Bui
     Built { artifacts, written: None, found, sources: motion.sources, subs: motion.subs, missing: motion.missing, tools, table, summary: None }
 }
 
-/// Lets the program begin later. `placed`: a machine file says where the part is.
-fn restart(motion: &mut Motion, unit: &Unit, (line, safe_z): (u32, Option<f64>), placed: bool) {
+/// Lets the program begin later; the machine's file says where the part is and how the tool is tilted.
+fn restart(motion: &mut Motion, unit: &Unit, (line, safe_z): (u32, Option<f64>), machine: Option<&Machine>) {
+    let placed = machine.is_some();
+    let turns = machine.map(gr_robot::Turns::new);
+    let tool = |pose: &Pose, state: &State| turns.as_ref()?.up(pose, state);
     let begin = |motion: &Motion, unsure| {
-        let options = gr_backends::from_line::Options { safe_z, unsure, stored: !unit.setup.params.is_empty(), room: None };
+        let options = gr_backends::from_line::Options { safe_z, unsure, stored: !unit.setup.params.is_empty(), room: None, tool: Some(&tool) };
         gr_backends::from_line::from_line(&motion.program, FileId(0), line, &options, &texts(motion))
     };
     let mut unsure = [false; 9];

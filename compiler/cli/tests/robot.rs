@@ -643,9 +643,11 @@ fn a_five_axis_mill_restarts() {
             let last = |of: &[String]| of[of.len() - 2..].to_vec();
             assert_eq!(last(&part), last(&whole), "{base} {line}");
             assert!(part.len() < 250, "{base} {line}: {}", part.len());
-            // The way up names Z alone.
+            // The way up names Z alone; where the tool will be tilted the rotary axes turn first.
             let home = [format!("{tilt}{}", home[0]), format!("{turn}{}", home[1])];
-            assert!(part[0].starts_with("G0 X30 Y20 Z") && home.iter().all(|word| part[0].contains(word)), "{base} {line}: {}", part[0]);
+            let upright = home.iter().all(|word| part[0].contains(word));
+            let turns = || part[0].starts_with("G0 X30 Y20 Z0 ") && part[1].starts_with("G0 X30 Y20 Z0 ");
+            assert!(part[0].starts_with("G0 X30 Y20 Z") && if line == "5" { upright } else { turns() }, "{base} {line}: {part:?}");
             if line == "7" {
                 let begins = part.iter().position(|l| l.starts_with("G1 ")).unwrap();
                 let cuts = |of: &[String]| of.iter().filter(|l| l.starts_with("G1 ")).cloned().collect::<Vec<_>>();
@@ -663,6 +665,75 @@ fn a_five_axis_mill_restarts() {
     std::fs::write(path("a.ngc"), "G21 G90 G17 G54\nG0 X0 Y0 Z50 A0\nG1 Z-60 F300\nG1 X10\nG0 Z50\nM2\n").unwrap();
     let o = run(&["build", &path("a.ngc"), "--machine", "generic/mill3", "--target", "joint-gcode", "--from-line", "4", "--safe-z", "60", "-q"]);
     assert!(o.status.success(), "{}", text(&o.stderr));
+}
+
+/// In a section where the table tilts the part a restart turns the rotary axes first, where the machine stands, and comes along the tool.
+#[test]
+fn a_restart_comes_along_a_tilted_tool() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_string();
+    std::fs::write(path("m.toml"), "format = 1\nid = \"shop/m\"\nextends = \"generic/mill5-ac-table\"\n[frames.table]\nposition = [0, 0, -150]\n[[tool]]\nnumber = 1\nname = \"em10\"\nposition = [0, 0, 60]\n").unwrap();
+    // The side that looks along Y, with rapids 50 mm along the tool.
+    let side = "G21 G90 G17 G54\nG53 G0 Z0\nT1 M6\nS6000 M3\nG43 H1\nG0 A-90 C0\nG0 X10 Y50\nZ-20\nG1 Y9 F300\nX30 F800\nG0 Y50\nM5\nG53 G0 Z0\nM2\n";
+    std::fs::write(path("a.ngc"), side).unwrap();
+    let made = |more: &[&str]| {
+        let o = run(&[&["build", &path("a.ngc"), "--machine", &path("m.toml"), "--target", "joint-gcode", "--message-format", "short", "-q"], more].concat());
+        let rows = text_lines(&o.stdout).into_iter().filter(|l| l.starts_with("G0 ") || l.starts_with("G1 ")).collect::<Vec<_>>();
+        (rows.iter().map(|l| l.split(" F").next().unwrap().to_string()).collect::<Vec<_>>(), text(&o.stderr))
+    };
+    let whole = made(&[]).0;
+    let [from, to] = ["G1 X10 Y-180 Z-281 A-90 C0", "G1 X30 Y-180 Z-281 A-90 C0"];
+    assert!(whole.iter().any(|l| l == from) && whole.iter().any(|l| l == to), "{whole:?}");
+    let turned = |rows: &[String]| {
+        let up: Vec<&String> = rows.iter().take_while(|l| l.starts_with("G0 X0 Y0 Z0 ")).collect();
+        assert!(up.len() > 10 && up.last().is_some_and(|l| l.ends_with("A-90 C0")), "{rows:?}");
+        rows[up.len()..].to_vec()
+    };
+    for (more, level, told) in [(&[][..], "Z-240", true), (&["--safe-z", "70"], "Z-220", false)] {
+        let (rows, found) = made(&[&["--from-line", "10"], more].concat());
+        let way = turned(&rows);
+        let over = [format!("G0 X0 Y0 {level} A-90 C0"), format!("G0 X10 Y-180 {level} A-90 C0")];
+        let down = ["G0 X10 Y-180 Z-279 A-90 C0", "G1 X10 Y-180 Z-281 A-90 C0", to].map(String::from);
+        let expected = [&over[..], &down].concat();
+        assert_eq!(way[..expected.len()], expected[..], "{more:?}");
+        assert_eq!(found.contains("E0614") && found.contains("50.000 mm along the tilted tool"), told, "{found}");
+    }
+    // Before the section has said all, its own blocks lead there: the retract's height is that of the whole program.
+    for (line, first) in [("7", "G0 X10 Y-290 Z-240 A-90 C0"), ("8", "G0 X10 Y-290 Z-240 A-90 C0")] {
+        let way = turned(&made(&["--from-line", line]).0);
+        assert!(way[0] == first && whole.ends_with(&way), "{line}: {way:?} {whole:?}");
+    }
+}
+
+/// A length that comes into force under a tool that is tilted against the part leads it aside; X and Y are gone to with the rapid that
+/// follows, and a cut says that it has none.
+#[test]
+fn a_length_under_a_tilted_tool() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_string();
+    let file = |base: &str| {
+        let tools: String = [(1, 60), (2, 90)].map(|(n, z)| format!("[[tool]]\nnumber = {n}\nname = \"t{n}\"\nposition = [0, 0, {z}]\n")).concat();
+        let joints: String = ["X", "Y", "Z"].map(|j| format!("[[joint]]\nname = \"{j}\"\nmin = -1900\nmax = 1900\n")).concat();
+        format!("format = 1\nid = \"shop/m\"\nextends = \"generic/{base}\"\n{joints}[frames.table]\nposition = [0, 0, -150]\n{tools}")
+    };
+    for (base, tilt) in [("mill5-ac-table", "A-45 C0"), ("mill5-bc-table", "B-45 C0"), ("mill5-b-head-c-table", "B45 C0"), ("mill5-cb-head", "B45 C0")] {
+        std::fs::write(path("m.toml"), file(base)).unwrap();
+        let cuts = |program: &str| {
+            std::fs::write(path("a.ngc"), format!("G21 G90 G17 G54\nG53 G0 Z0\nT2 M6\nS6000 M3\n{program}\nG0 Z50\nM5\nM2\n")).unwrap();
+            let o = run(&["build", &path("a.ngc"), "--machine", &path("m.toml"), "--target", "joint-gcode", "--message-format", "short", "-q"]);
+            let rows = text_lines(&o.stdout).into_iter().filter(|l| l.starts_with("G1 ")).collect::<Vec<_>>();
+            (rows.iter().map(|l| l.split(" F").next().unwrap().to_string()).collect::<Vec<_>>(), text(&o.stderr))
+        };
+        let (direct, found) = cuts(&format!("G0 {tilt}\nG43 H2 X10 Y-50 Z50\nG1 Z-2 F300\nX20"));
+        assert!(found.is_empty() && direct.len() == 2, "{base}: {found}");
+        for order in ["G0 X10 Y-50\nG43 Z50 H2", "G0 X10 Y-50\nG43 H2\nG0 Z50", "G43 H2\nG0 X10 Y-50\nZ50", "G0 X10 Y-50 Z60\nG43 H2\nG0 X10\nZ50", "G43 H2\nG0 X10 Y-50 Z50\nG49\nG53 G0 Z0\nX10 Y-50\nG43 H2 Z50"] {
+            let (rows, found) = cuts(&format!("G0 {tilt}\n{order}\nG1 Z-2 F300\nX20"));
+            let told = found.lines().filter(|l| !l.contains("E0555")).count();
+            assert!(rows == direct && told == 0, "{base} {order}: {rows:?} {direct:?} {found}");
+        }
+        let (rows, found) = cuts(&format!("G0 {tilt}\nG0 X10 Y-50 Z60\nG43 H2\nG1 Z-2 F300\nX20"));
+        assert!(rows.is_empty() && found.contains(":8:") && found.matches("error[E0556]").count() == 1, "{base}: {rows:?} {found}");
+    }
 }
 
 /// Part 1 of UFSC 2016 on the IRB 140, from the command line as the page says: the rows of table 5.3, and the printed points.
@@ -1054,6 +1125,20 @@ fn three_sides_in_three_clampings() {
             cuts += 1;
         }
         assert_eq!((cuts, arcs), (575, 146), "{id}");
+        if id != "generic/mill3" {
+            continue;
+        }
+        // A restart has the rows of the whole program, in the setups that are left.
+        let rows = |text: &str| text.lines().filter(|l| l.starts_with("G1 ")).map(String::from).collect::<Vec<_>>();
+        let whole = rows(&program);
+        for (line, stops) in [("126", 2), ("346", 1), ("381", 1), ("632", 0), ("700", 0)] {
+            let made = run(&[&args[..], &units, &["--from-line", line]].concat());
+            assert!(made.status.success(), "{line}: {}", text(&made.stderr));
+            let program = std::fs::read_to_string(&out).unwrap();
+            let rest = rows(&program);
+            assert!(rest.len() > 5 && rest.len() < whole.len() && whole.ends_with(&rest), "{line}: {} of {}", rest.len(), whole.len());
+            assert_eq!(program.lines().filter(|l| l.starts_with("(MSG, setup")).count(), stops, "{line}");
+        }
     }
 }
 

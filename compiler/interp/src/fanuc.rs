@@ -2,7 +2,7 @@
 //! coordinates (G68, G69), G80 that goes back to the motion before the cycle. Sources stand with the rows of the
 //! dialects.
 
-use gr_canon::{Axes, Call, Plane, Sink};
+use gr_canon::{Axes, Call, Sink};
 use gr_gcode::Binary;
 use gr_spec::{Dialect, Family, code, rs274};
 

@@ -195,6 +195,8 @@ pub(crate) struct Gather<'a> {
     probed: Option<probing::Probed>,
     /// The tool offset moved the program's coordinates while the tool stood still.
     offset: bool,
+    /// Of these directions.
+    shifted: [bool; 3],
     /// That was told.
     offset_told: bool,
     /// Directions in which the program believes the tool at a place because of its words.
@@ -281,6 +283,7 @@ impl<'a> Gather<'a> {
             rapids: false,
             probed: None,
             offset: false,
+            shifted: [false; 3],
             offset_told: false,
             said: [!mill; 3],
             inserted: false,
@@ -315,6 +318,7 @@ impl<'a> Gather<'a> {
     pub fn run(&mut self, program: &Program) {
         let mut unnamed = places::Unnamed::new(program, self.machine);
         self.closes = closing(program);
+        self.workingstep = crate::settle::led_to(program);
         self.planned = program.steps().any(|s| matches!(s.op, Op::Begin { marker: Marker::Workingstep, .. }));
         let mut cursor = program.cursor();
         while let Some(view) = cursor.next() {
@@ -417,6 +421,8 @@ impl<'a> Gather<'a> {
         }
         if self.at.is_some() && !self.exchanged {
             if !(0..3).all(same) {
+                let before = if self.offset { self.shifted } else { [false; 3] };
+                self.shifted = [0, 1, 2].map(|i| before[i] || !same(i));
                 (self.offset, self.offset_told) = (true, false);
             }
             return;

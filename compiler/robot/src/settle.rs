@@ -286,7 +286,7 @@ pub fn settled(
     let mut out = Builder::from_state(stands.begins(program.start(), program.start_state()), *program.start_state());
     out.names_of(program);
     let (mut untold, mut any) = (None, machine.kind == Kind::Mill);
-    let mut places = Places::new(machine, setups);
+    let mut places = Places::new(program, machine, setups);
     let mut cursor = program.cursor();
     while let Some(view) = cursor.next() {
         let place = places.at(program, &view);
@@ -317,8 +317,8 @@ struct Places<'a> {
 }
 
 impl<'a> Places<'a> {
-    fn new(machine: &'a Machine, setups: &'a [Setup]) -> Self {
-        Places { setups, machine, workingstep: None, part: None }
+    fn new(program: &Program, machine: &'a Machine, setups: &'a [Setup]) -> Self {
+        Places { setups, machine, workingstep: led_to(program), part: None }
     }
 
     /// In the base, at an operation.
@@ -403,6 +403,12 @@ pub(crate) fn leads_to(program: &Program, source: Source) -> Source {
         }
     }
     own
+}
+
+/// The workingstep that the way to a restart leads to.
+pub(crate) fn led_to(program: &Program) -> Option<Workingstep> {
+    program.steps().next().filter(|s| s.source.line == INSERTED)?;
+    program.steps().find_map(|s| Workingstep::begun_by(&s.op))
 }
 
 /// The line of the main program that asked for an operation, itself or through calls.

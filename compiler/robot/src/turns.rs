@@ -2,7 +2,7 @@
 //! program made from features states.
 
 use gr_ir::{Pose, State};
-use gr_machine::math::{M3, dot, euler, norm, product, rot_x, rot_z, scale, sub};
+use gr_machine::math::{M3, V3, dot, euler, norm, product, rot_x, rot_z, scale, sub};
 use gr_machine::{Chain, Control, Kind, Machine, Orientation};
 use gr_text::{Code, code};
 use std::f64::consts::PI;
@@ -52,8 +52,7 @@ impl<'a> Turns<'a> {
 
     /// How the tool is turned without any rotary word: an arm's points straight down.
     pub fn still(&self) -> M3 {
-        let down = self.machine.kind == Kind::Robot && !self.planar && self.control != Control::Position;
-        if down { rot_x(PI) } else { euler([0.0; 3]) }
+        if self.down() { rot_x(PI) } else { euler([0.0; 3]) }
     }
 
     /// How the tool is turned in the work frame; else why nobody knows.
@@ -62,6 +61,17 @@ impl<'a> Turns<'a> {
         let turn = self.unrotated(pose, state)?;
         let turned = state.rotation != 0.0 && pose.tool_axis.is_none();
         Ok(if turned { product(&rot_z(-state.rotation), &turn) } else { turn })
+    }
+
+    /// The direction from the tool point to the spindle in the work frame; none where it isn't known.
+    pub fn up(&self, pose: &Pose, state: &State) -> Option<V3> {
+        let z = self.of(pose, state).ok()?.map(|row| row[2]);
+        Some(if self.down() { scale(z, -1.0) } else { z })
+    }
+
+    /// The Z of the tool's frame goes to the work: an arm's, and not a machine tool's.
+    fn down(&self) -> bool {
+        self.machine.kind == Kind::Robot && !self.planar && self.control != Control::Position
     }
 
     fn unrotated(&self, pose: &Pose, state: &State) -> Result<M3, Unread> {

@@ -3,7 +3,7 @@
 
 use gr_ir::{FeedMode, Op, Plane, Pose, Program, State, Turn};
 
-use super::{Restore, Room, axes_used};
+use super::{Restore, Room, UPRIGHT, V3, axes_used};
 
 /// How far before the place rapid ends and feed begins, mm.
 const CLEARANCE: f64 = 2.0;
@@ -18,6 +18,8 @@ pub(super) struct Approach<'a> {
     pub goal: Pose,
     /// Axes that go there; of the others nobody knows where they are.
     pub approached: [bool; 9],
+    /// Direction from the tool point to the spindle, where that isn't Z.
+    pub tilt: Option<V3>,
     /// How high and how far out.
     pub room: &'a Room,
 }
@@ -46,6 +48,8 @@ impl Approach<'_> {
         let mut ways = Ways { at: *restore.out.pose(), approached: self.approached, places: Vec::new(), start: 0 };
         if self.approached[0] && is_lathe(self.program) {
             self.turning(&mut ways);
+        } else if let Some(up) = self.tilt {
+            self.along(&mut ways, up);
         } else {
             self.from_above(&mut ways);
         }
@@ -71,6 +75,23 @@ impl Approach<'_> {
         ways.start = ways.places.len();
         let rapids = self.room.lowest.unwrap_or(safe);
         ways.go([2], |_| if height < safe { (height + CLEARANCE).max(rapids).min(safe) } else { safe });
+    }
+
+    /// Beside a tilted tool the rotary axes turn first, where the machine stands.
+    fn along(&self, ways: &mut Ways, up: V3) {
+        let height: f64 = (0..3).map(|i| self.goal.axes[i] * up[i]).sum();
+        let safe = self.room.safe;
+        let over = |to: f64| move |i: usize| self.goal.axes[i] + up[i] * (to - height);
+        ways.go(3..9, |i| self.goal.axes[i]);
+        if (0..3).any(|i| !self.approached[i] && up[i].abs() > UPRIGHT) {
+            // The program says that height itself before it cuts; up there it goes on.
+            ways.start = ways.places.len();
+            return ways.go(0..3, |i| self.goal.axes[i]);
+        }
+        ways.go(0..3, over(safe));
+        ways.start = ways.places.len();
+        let rapids = self.room.lowest.unwrap_or(safe);
+        ways.go(0..3, over((height + CLEARANCE).max(rapids).min(safe)));
     }
 
     fn turning(&self, ways: &mut Ways) {
@@ -113,21 +134,6 @@ impl Approach<'_> {
         restore.push(Op::FeedMode { spindle: s.feed_spindle, mode: s.feed_mode });
         restore.push(Op::Feed { linear: s.feed, angular: s.feed_angular });
     }
-}
-
-/// How low the rapids of the program go sideways, in the work frame of a state.
-pub(super) fn lowest_crossing(program: &Program, state: &State) -> Option<f64> {
-    let zero = state.machine(&[0.0; 9])[2];
-    let mut lowest: Option<f64> = None;
-    let mut cursor = program.cursor();
-    while let Some(view) = cursor.next() {
-        let [from, to] = [view.start, view.end].map(|p| view.state.machine(&p.axes));
-        if view.op == Op::Rapid && (from[0] != to[0] || from[1] != to[1]) {
-            let low = from[2].min(to[2]) - zero;
-            lowest = Some(lowest.map_or(low, |l| l.min(low)));
-        }
-    }
-    lowest
 }
 
 /// Turning: the first cut is in the plane of X and Z, and nothing ever moves in Y.

@@ -2,6 +2,7 @@
 
 use gr_backends::sources::Words as Letters;
 use gr_ir::{Op, Pose, State};
+use gr_machine::Kind;
 use gr_machine::math::{add, sub};
 use gr_text::code;
 
@@ -56,19 +57,26 @@ impl Gather<'_> {
             Op::Nurbs { .. } => (named[0], named[1]) = (true, true),
             _ => {}
         }
-        let straight = matches!(op, Op::Linear | Op::Rapid);
-        if !straight && (0..3).any(|i| named[i] && lag[i] != 0.0) {
-            self.nowhere(add(start.xyz(), lag), start.xyz());
-            return None;
-        }
         // An increment goes on from where the tool stands; the way to a restart has none.
         let increments = !self.inserted && self.increments.at(self.findings.sources, self.source);
-        self.tell_offset(start.xyz(), lag, named.map(|n| !n || increments));
+        // A tilted tool is aside then of what a mill's program has named before: its control knows of no such way, and brings it there.
+        let aside = [0, 1, 2].map(|i| self.machine.kind == Kind::Mill && lag[i] != 0.0 && self.said[i] && !self.shifted[i] && !named[i]);
+        let cut_aside = op != Op::Rapid && aside.contains(&true);
+        let straight = matches!(op, Op::Linear | Op::Rapid);
+        if cut_aside || !straight && (0..3).any(|i| named[i] && lag[i] != 0.0) {
+            self.nowhere(add(start.xyz(), lag), start.xyz());
+            // Told once: what follows is looked at from where this cut ends.
+            self.offset = false;
+            (self.at, self.at_change) = (None, None);
+            return None;
+        }
+        let goes = [0, 1, 2].map(|i| named[i] && !increments || aside[i]);
+        self.tell_offset(start.xyz(), lag, goes.map(|goes| !goes));
         let (mut from, mut to) = (*start, *end);
         for i in 0..3 {
             from.axes[i] += lag[i];
-            to.axes[i] += if named[i] && !increments { 0.0 } else { lag[i] };
-            self.said[i] |= named[i] && !increments;
+            to.axes[i] += if goes[i] { 0.0 } else { lag[i] };
+            self.said[i] |= goes[i];
         }
         Some((op, from, to))
     }

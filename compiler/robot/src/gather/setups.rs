@@ -120,7 +120,8 @@ impl Gather<'_> {
         // A restart leaves out the setups that are done.
         let restart = self.begun.iter().filter_map(|i| self.options.setups[*i].from_line).min().filter(|_| self.restarted);
         for (i, s) in self.options.setups.iter().enumerate() {
-            if s.from_line.zip(restart).is_some_and(|(begins, restart)| begins < restart) {
+            let done = self.restarted && !s.workingsteps.is_empty();
+            if done || s.from_line.zip(restart).is_some_and(|(begins, restart)| begins < restart) {
                 continue;
             }
             if !self.begun.contains(&i) && !self.findings.bad() {

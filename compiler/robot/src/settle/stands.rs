@@ -6,7 +6,7 @@ use gr_ir::{Arc, ArcPlane, Axes, Builder, Marker, Op, Pose, Program, Source, Sou
 use gr_machine::math::{Frame, V3, add, dot, product, rot_z, solve, sub};
 use gr_machine::{Chain, Kind, Kinematics, Machine};
 
-use super::{By, Coordinates, Goal, Places, ROUNDING, Untold};
+use super::{By, Coordinates, Goal, INSERTED, Places, ROUNDING, Untold};
 use crate::gather::{TURN_STEP, same_turn};
 use crate::words::{Asked, Slides, Words, as_far_as_known, placed, started, work_shift};
 
@@ -27,6 +27,9 @@ pub(super) struct Stands<'a> {
     strayed: [Option<By>; 3],
     /// Those of them that an index has changed.
     indexed: [bool; 3],
+    /// How far beside those of the program's run the coordinates are that a control knows which has the part where it is and nothing of
+    /// tilted tables, mm: what LinuxCNC's interpreter has with this place as a stored offset.
+    beside: V3,
     /// Places that the last move goes through before its end.
     way: Vec<Axes>,
 }
@@ -83,7 +86,7 @@ impl<'a> Stands<'a> {
             Kind::Robot => (Of::Place(machine.cell.machine_zero()?), [0.0; 3]),
             _ => return None,
         };
-        Some(Stands { machine, of, place: Frame::IDENTITY, last: Last::Home(home), shifted: Shifted::default(), level: None, line: None, stores: None, strayed: [None; 3], indexed: [false; 3], way: Vec::new() })
+        Some(Stands { machine, of, place: Frame::IDENTITY, last: Last::Home(home), shifted: Shifted::default(), level: None, line: None, stores: None, strayed: [None; 3], indexed: [false; 3], beside: [0.0; 3], way: Vec::new() })
     }
 
     /// Where it stands before the program. An arm's program says that itself.
@@ -95,6 +98,7 @@ impl<'a> Stands<'a> {
                 self.turn_home(&slides.turning, &mut axes, state);
                 if let Some(at) = self.unslid(*home, &axes, state) {
                     axes[..3].copy_from_slice(&at);
+                    self.beside = sub(at, start.xyz());
                 }
             }
             _ => self.last = Last::Moved(start.axes, *state, self.place),
@@ -127,8 +131,11 @@ impl<'a> Stands<'a> {
         if place != self.place {
             if matches!(self.of, Of::Slides { .. }) {
                 // The machine stands still, the part is elsewhere.
-                let tip = self.place.then(&work_shift(state)).apply([from[0], from[1], from[2]]);
-                from[..3].copy_from_slice(&place.then(&work_shift(state)).inverse().apply(tip));
+                let (old, new) = (self.place.then(&work_shift(state)), place.then(&work_shift(state)).inverse());
+                let seen = |at: V3| new.apply(old.apply(at));
+                self.beside = sub(seen(add(view.start.xyz(), self.beside)), view.start.xyz());
+                let at = seen([from[0], from[1], from[2]]);
+                from[..3].copy_from_slice(&at);
             }
             self.place = place;
         }
@@ -152,15 +159,18 @@ impl<'a> Stands<'a> {
         }
         let turns = (3..6).any(|i| from[i] != end[i]);
         let comes = matches!(goal, Goal::Work) && view.op == Op::Rapid && !increments && to[..3].contains(&true);
-        // Coming to the part behind an index, the tool goes to where the program believes it, as LinuxCNC sends it: what it has not
+        // Coming to the part behind an index, the tool goes to where its control believes it, as LinuxCNC sends it: what it has not
         // named is the height of the retract, and not what the turn has made of that.
         let believed: [bool; 3] = std::array::from_fn(|i| comes && !to[i] && self.indexed[i] && self.strayed[i].is_some());
         for i in (0..3).filter(|i| believed[*i]) {
-            end[i] = b1[i];
+            end[i] = b1[i] + self.beside[i];
             // A cut there has to name it still.
             self.indexed[i] = false;
         }
         self.rests_on_strayed(view, &from, &end, &to)?;
+        if view.source.line == INSERTED && view.op == Op::Rapid && to[..3] == [true; 3] && !turns {
+            self.way.extend(self.level_with(&from, &end, state));
+        }
         match goal {
             Goal::Work => {
                 // An arm stands nowhere by itself.
@@ -193,6 +203,7 @@ impl<'a> Stands<'a> {
             }
             _ => {
                 self.to_machine(&mut end, view, (to, goal), turns, by, state)?;
+                self.believes(view, &to, state);
                 // What LinuxCNC leaves where it is: in a frame that is rotated it changes others too.
                 (0..3).filter(|i| !to[*i]).for_each(|i| self.strays(i, end[i] - from[i] - (b1[i] - b0[i]), by));
                 (0..3).filter(|i| to[*i]).for_each(|i| self.strayed[i] = None);
@@ -200,10 +211,39 @@ impl<'a> Stands<'a> {
         }
         if matches!(goal, Goal::Work) {
             (0..3).filter(|i| to[*i] && end[*i] == b1[*i]).for_each(|i| self.strayed[i] = None);
+            (0..3).filter(|i| to[*i] && !increments).for_each(|i| self.beside[i] = 0.0);
         }
         let op = if lags || end != *b1 { bent(view, &from, &end)? } else { view.op };
         self.last = Last::Moved(end, *state, self.place);
         Ok((op, Pose { axes: end, ..*view.end }))
+    }
+
+    /// What the control believes where the axes that a move names have come to places of the machine.
+    fn believes(&mut self, view: &View<'_, '_>, to: &[bool; 9], state: &State) {
+        let frame = self.place.then(&work_shift(state));
+        let machine = view.state.machine(&view.end.axes);
+        let mut tip = frame.apply(add(view.start.xyz(), self.beside));
+        (0..3).filter(|i| to[*i]).for_each(|i| tip[i] = machine[i] - state.tool_offset[i]);
+        self.beside = sub(frame.inverse().apply(tip), view.end.xyz());
+    }
+
+    /// Beside a tilted tool, where the way to a restart has turned the rotary axes: along the tool, so far out as the goal is.
+    fn level_with(&self, from: &Axes, end: &Axes, state: &State) -> Option<Axes> {
+        let up = self.up(end, state)?;
+        let far = dot(up, std::array::from_fn(|i| end[i] - from[i]));
+        let mut at = *from;
+        (0..3).for_each(|i| at[i] += up[i] * far);
+        (up[2] < 1.0 - 1e-9 && far.abs() > LED).then_some(at)
+    }
+
+    /// The direction from the tool point to the spindle, in the work frame.
+    fn up(&self, axes: &Axes, state: &State) -> Option<V3> {
+        let Of::Slides { kinematics, slides, .. } = &self.of else { return None };
+        let asked = Asked { tip: [0.0; 3], tool: Frame::IDENTITY, rotary: self.rotary(axes, state, &self.place)? };
+        let joints = as_far_as_known(self.machine, &started(self.machine, &asked, &slides.sliding, &slides.turning), &slides.turning);
+        let turn = kinematics.forward_frame(&joints).ok()?.turn;
+        let work = Frame { position: [0.0; 3], ..self.place.then(&work_shift(state)) };
+        Some(work.inverse().apply(turn.map(|row| row[2])))
     }
 
     /// The part isn't where the program's run has it.
@@ -457,6 +497,7 @@ impl<'a> Stands<'a> {
         if letters.g(920) {
             let lag = lag(out, view);
             named(letters).for_each(|i| local[i] += lag[i]);
+            named(letters).filter(|i| *i < 3).for_each(|i| self.beside[i] = 0.0);
             *kept = *local;
         } else if letters.g(921) {
             (*local, *kept) = ([0.0; 9], [0.0; 9]);

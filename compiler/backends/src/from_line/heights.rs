@@ -1,0 +1,86 @@
+//! How high the moves of a program go: along Z, or along a tool that is tilted where the program begins.
+
+use gr_ir::{Op, Pose, Program, Sources, State, View};
+
+use super::V3;
+use crate::sources::{Words, is_hidden};
+
+/// A tool whose direction has a Z no smaller than 1 less this stands upright.
+pub(super) const UPRIGHT: f64 = 1e-9;
+
+/// The heights of a program's moves, in the work frame of a state.
+pub(super) struct Heights<'a> {
+    pub program: &'a Program,
+    pub state: &'a State,
+    /// Where it begins. A tilted tool has heights only among moves in which it stands so.
+    pub begins: &'a Pose,
+    /// Direction from the tool point to the spindle, where that isn't Z.
+    pub tilt: Option<V3>,
+    pub sources: &'a dyn Sources,
+}
+
+impl Heights<'_> {
+    /// Of a place.
+    pub fn of(&self, pose: &Pose, state: &State) -> f64 {
+        let machine = state.machine(&pose.axes);
+        match self.tilt {
+            None => machine[2] - self.state.machine(&[0.0; 9])[2],
+            Some(up) => {
+                let at = self.state.work_frame(&machine);
+                (0..3).map(|i| at[i] * up[i]).sum()
+            }
+        }
+    }
+
+    /// Of the highest point of the program; none where it has no moves.
+    pub fn top(&self) -> Option<f64> {
+        self.fold(f64::max, |view| view.op.moves().then(|| self.of(view.end, view.state)))
+    }
+
+    /// How low its rapids go sideways.
+    pub fn lowest_crossing(&self) -> Option<f64> {
+        self.fold(f64::min, |view| {
+            let [from, to] = [view.start, view.end].map(|p| view.state.machine(&p.axes));
+            let sideways = match self.tilt {
+                None => from[0] != to[0] || from[1] != to[1],
+                Some(up) => {
+                    let [from, to] = [from, to].map(|at| self.state.work_frame(&at));
+                    let by: V3 = std::array::from_fn(|i| to[i] - from[i]);
+                    let along: f64 = (0..3).map(|i| by[i] * up[i]).sum();
+                    (0..3).any(|i| (by[i] - along * up[i]).abs() > 1e-6)
+                }
+            };
+            (view.op == Op::Rapid && sideways).then(|| self.of(view.start, view.state).min(self.of(view.end, view.state)))
+        })
+    }
+
+    /// As text: `Z 50.000`, or so many millimetres along the tool.
+    pub fn show(&self, height: f64) -> String {
+        match self.tilt {
+            None => format!("Z {height:.3}"),
+            Some(_) => format!("{height:.3} mm along the tilted tool"),
+        }
+    }
+
+    fn fold(&self, pick: fn(f64, f64) -> f64, of: impl Fn(&View<'_, '_>) -> Option<f64>) -> Option<f64> {
+        let mut found: Option<f64> = None;
+        let mut cursor = self.program.cursor();
+        while let Some(view) = cursor.next() {
+            if let Some(height) = of(&view).filter(|_| self.counts(&view)) {
+                found = Some(found.map_or(height, |f| pick(f, height)));
+            }
+        }
+        found
+    }
+
+    /// Beside a tilted tool only moves of the part count in which it stands so.
+    fn counts(&self, view: &View<'_, '_>) -> bool {
+        if self.tilt.is_none() {
+            return true;
+        }
+        let turned = [view.start, view.end].iter().any(|p| p.axes[3..6] != self.begins.axes[3..6] || p.tool_axis != self.begins.tool_axis);
+        let words = || Words::at(self.sources, view.source.file, view.source.line);
+        let machine = || words().is_some_and(|w| [280, 300, 530].into_iter().any(|g| w.g(g)) || !w.names_axes() && is_hidden(self.program, view.index));
+        !turned && !machine()
+    }
+}
