@@ -120,8 +120,10 @@ pub fn from_line(
     // Along a tilted tool there is no way to one of them alone.
     (0..3).for_each(|i| needed[i] |= tilt.is_some() && cuts && places[i] == Place::Named);
     let tilted = |i: usize| cuts && tilt.is_some_and(|up| up.get(i).is_some_and(|v| v.abs() > UPRIGHT));
+    // At the height of a cut that is known, a place beside it that isn't.
+    let down_there = !lathe && needed[2] && places[2] == Place::Named;
     let lost = |i: &usize| match places[*i] {
-        Place::Machine | Place::Probed => needed[*i] && used[*i],
+        Place::Machine | Place::Probed => used[*i] && (needed[*i] || *i < 2 && down_there),
         Place::Never => tilted(*i),
         Place::Named => false,
     };
@@ -161,7 +163,12 @@ pub fn from_line(
         notes.push(Diagnostic::new(code::FROM_LINE_OFFSET_KEPT, file, span, &[]));
     }
     // The tool does not go down where nobody knows what is below it.
-    let beside = (0..2).any(|i| places[i] == Place::Named && options.unsure[i] && !needed[i] && used[i]);
+    let doubtful = |i: usize| match places[i] {
+        Place::Named => options.unsure[i],
+        Place::Machine | Place::Probed => !lathe,
+        Place::Never => false,
+    };
+    let beside = (0..2).any(|i| doubtful(i) && !needed[i] && used[i]);
     let down = beside && needed[2];
     let known = std::array::from_fn(|i| match i {
         // Its rotary axes turn where the machine stands, and the program goes on from there.

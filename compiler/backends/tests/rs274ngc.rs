@@ -495,6 +495,21 @@ fn a_restart_goes_to_no_place_of_the_machine() {
     let error = from_line::from_line(&run(text), FileId(0), 15, &o, &texts).expect_err("no start");
     assert_eq!(error[0].code.def().slug, "from-line/place-of-machine");
     assert!(error[0].message.contains(" in Y,"), "{}", error[0].message);
+    // Beside a place that only the machine knows nothing goes down, whether the cut goes on or is done.
+    let beside = "G21 G90 G54 F100\nS1000 M3\nG0 X0 Y0 Z20\nG53 G0 Y14.5\nG0 X5\nG1 Z-1\nX30\nG0 Z20\nX40 Y7\nZ5\nG1 Z-1\nY9\nM2\n";
+    let texts = Texts::new([(FileId(0), beside)]);
+    for (line, ways) in [(6, None), (7, None), (8, Some("Z100 / X30 / Z20 / X40 Y7")), (9, Some("Z100 / X30 / X40 Y7 / Z5")), (12, Some("Z100 / X40 Y7 / Z20 / G1 Z-1"))] {
+        match (from_line::from_line(&run(beside), FileId(0), line, &o, &texts), ways) {
+            (Ok(restart), Some(ways)) => {
+                let written = emit(&restart.program, &options(Language::Linuxcnc), &texts).expect("written").text;
+                let moves = written.lines().skip_while(|l| !l.starts_with("G0")).filter(|l| l.contains(['X', 'Y', 'Z']));
+                let found = moves.map(|l| l.trim_start_matches("G0 ")).collect::<Vec<_>>().join(" / ");
+                assert!(found.starts_with(ways), "{line}: {found}");
+            }
+            (Err(told), None) => assert!(told[0].message.contains(" in Y,"), "{line}: {}", told[0].message),
+            (other, _) => panic!("{line}: {other:?}"),
+        }
+    }
 }
 
 /// On a lathe the tool comes from outside, in a bore from the front, and goes in by feed.
@@ -678,6 +693,16 @@ fn surface_speed_and_feed_in_one_block() {
         same(&text, &options(Language::Linuxcnc), 1e-3);
         assert!(write(&text, &options(Language::Linuxcnc)).contains("G96 D2500 S180\n"));
     }
+}
+
+/// A speed in the block of a move stays there for grbl: a laser under M3 would stop at a block without motion, and burn.
+#[test]
+fn grbl_has_speeds_in_the_block_of_a_move() {
+    let text = "G21 G90\nM3 S0\nG0 X5 Y5\nG1 F3000\nX5.1 S200\nX5.2 S190\nX5.3 S0 F2000\nG0 X9 S7\nS50\nG2 X11 I1 S60 F100\nG1 X11 S9\nM5\nM2\n";
+    same(text, &options(Language::Grbl), 1e-3);
+    let written = write(text, &options(Language::Grbl));
+    let lines: Vec<&str> = written.lines().skip_while(|l| *l != "M3").collect();
+    assert_eq!(lines, ["M3", "G0 X5 Y5", "G1 X5.1 F3000 S200", "X5.2 S190", "X5.3 F2000 S0", "G0 X9 S7", "S50", "G2 X11 Y5 I1 J0 F100 S60", "S9", "G1 X11", "M5", "M2"]);
 }
 
 /// Steps from where a probe stopped are steps, and what the place is called is what the source says, whatever the simulation

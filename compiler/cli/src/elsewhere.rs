@@ -32,6 +32,7 @@ pub fn differs(unit: &Unit, source: &Motion, (written, begins): (&str, Option<u3
         let (file, span) = gr_backends::Sources::place(&crate::emit::texts(source), place);
         Some(Diagnostic::new(code, file, span, args))
     };
+    starts_as(unit, &source.program, &mut there);
     let again = |setup: &Setup| motion_of("<translation>", written.to_string(), setup).program;
     let differs_elsewhere = || {
         // Of a program that begins later, the way to its first block is its own.
@@ -118,6 +119,25 @@ fn start_of(program: &Program, setup: &Setup) -> [f64; 9] {
         *v = if (3..6).contains(&i) { v.to_degrees() } else { *v / length };
     }
     at
+}
+
+/// A translation of an arm's program begins where the arm stands: its file says that.
+pub fn starts_as(source: &Unit, program: &Program, setup: &mut Setup) {
+    if source_is_of_an_arm(source) {
+        setup.start = start_of(program, setup);
+    }
+}
+
+/// A program in Cartesian coordinates of an arm: where that stands before it is no matter of the machine that runs it.
+fn source_is_of_an_arm(unit: &Unit) -> bool {
+    unit.setup.dialect.family == Family::Ufmg2008
+}
+
+/// Axes that move, but not in the first move.
+fn moved_late(program: &Program) -> [bool; 9] {
+    let moves = || program.steps().filter(|s| s.op.moves());
+    let changes = |s: &gr_ir::Step<'_>, i: usize| s.start.axes[i] != s.end.axes[i];
+    std::array::from_fn(|i| moves().next().is_some_and(|first| !changes(&first, i)) && moves().any(|s| changes(&s, i)))
 }
 
 /// Axes whose place a restart knows only because the simulation takes something for given that no file says.
@@ -252,7 +272,8 @@ fn first(
     other: impl Fn(Change<'_>) -> Program,
 ) -> Option<(Difference, Unknown)> {
     let told = motion.found.iter().any(|d| d.code == code::RUN_VALUE_UNKNOWN);
-    let counts = |u: &Unknown| (*u != Unknown::Probe || !told) && u.is(&unit.setup, motion);
+    // An arm has no offsets in store and no tools.
+    let counts = |u: &Unknown| (*u != Unknown::Probe || !told) && (*u == Unknown::Start || !source_is_of_an_arm(unit)) && u.is(&unit.setup, motion);
     let unknown: Vec<Unknown> = Unknown::ALL.into_iter().filter(counts).collect();
     let look = |which: &[Unknown], machine: &Numbers| {
         let change = |setup: &Setup| {
@@ -262,9 +283,13 @@ fn first(
         };
         let a = begun(unit, &change(&unit.setup), motion.begun)?;
         let from = motion.begun.map(|_| start_of(&a, &unit.setup));
+        let late = moved_late(&a);
         let change = |setup: &Setup| {
+            let arm = source_is_of_an_arm(unit).then_some(setup.start);
             let mut setup = change(setup);
-            setup.start = from.unwrap_or(setup.start);
+            // What an arm's program never moves, or brings to a place at once, is where its start doesn't count.
+            let start = arm.map(|arm| std::array::from_fn(|i| if late[i] { setup.start[i] } else { arm[i] }));
+            setup.start = from.or(start).unwrap_or(setup.start);
             setup
         };
         let found = diff(&a, &other(&change), tolerance).differences;

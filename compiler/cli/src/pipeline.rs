@@ -170,6 +170,9 @@ pub fn motion(unit: &Unit, machine: Option<&gr_machine::Machine>) -> Result<(Mot
 
 /// Motion of a program on another machine, unchecked.
 pub fn motion_with(unit: &Unit, setup: &Setup) -> Motion {
+    if setup.dialect.family == Family::Ufmg2008 {
+        return ufmg(&unit.name(), &unit.text, setup.dialect, None);
+    }
     Motion { increments: increments(setup), ..plain(gr_driver::lower(&unit.name(), unit.text.clone(), setup, None)) }
 }
 

@@ -329,6 +329,25 @@ fn reference_ufmg2008() {
     assert_eq!((space.lines().count(), joints.lines().count()), (program.lines().count() + 1, program.lines().count() + 1));
 }
 
+/// Words that a program in the coordinates of the arm leaves out keep their values, also in what is made of it; what it moves later than at
+/// once depends on where the machine stands.
+#[test]
+fn programs_of_the_arm_become_others() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    for (program, told) in [("G0 X110 Y40\nG1 X100 Y50 F20\n", false), ("G1 X120 Y20 C-80 F20\nG2 X100 Y20 I110 J20 K0\n", false), ("G0 X110\nG1 Y40 F20\n", true)] {
+        std::fs::write(at.join("a.g"), program).unwrap();
+        for words in [&["build", "a.g"][..], &["build", "a.g", "--to", "fanuc-mill"], &["build", "a.g", "--to", "grbl"], &["verify", "a.g"], &["verify", "a.g", "--machine", "ufmg/plano-3r"]] {
+            if program.contains('C') && words.contains(&"grbl") {
+                continue;
+            }
+            let o = in_folder(at, words);
+            let fails = told && words[0] == "verify";
+            assert_eq!((code(&o) != 0, text(&o.stderr).contains("E0607")), (fails, told), "{program} {words:?}: {}", whole(&o));
+        }
+    }
+}
+
 #[test]
 fn other_commands() {
     insta::assert_snapshot!("explain", whole(&run(&["explain", "E0203"])));

@@ -192,6 +192,12 @@ fn what_a_written_program_cannot_carry() {
     // R of a Fanuc lathe's taper is no Y.
     let taper = file("a.nc", "O1\nG21 G40 G99\nT0101\nG97 S500 M3\nG0 X50. Z2.\nG90 X46. Z-10. R-2. F.2\nX42. R-2.\nG0 X80.\nM30\n");
     let (text, status) = output(&[taper], "build a.nc --dialect fanuc-turn --target rs274ngc");
+    // Another limit of the spindle's speed leaves the cutting speed in force.
+    let limit = file("a.nc", "O1\nG21 G40 G99\nG50 S2500\nT0101\nG96 S180 M3\nG0 X52. Z2.\nG1 Z-20. F.25\nG0 X60.\nG50 S2000\nG0 X50. Z2.\nG1 Z-20. F.1\nG0 X60.\nM5\nM30\n");
+    for more in ["", " --from-line 10"] {
+        let (text, status) = output(std::slice::from_ref(&limit), &format!("build a.nc --dialect fanuc-turn --target rs274ngc{more}"));
+        assert!(status == Some(0) && text.contains("G96 D2000 S180\n"), "{more}: {text}");
+    }
     assert_eq!((text.contains('Y'), text.contains("G1 X23 Z-10"), status), (false, true, Some(0)), "{text}");
     let arc = file("a.ngc", "G21 G90 G17 F100\nG0 X0.1234 Y0.5678 Z0\nG3 X10.7777 Y3.3333 R7.123\nM2\n");
     told("E0603", std::slice::from_ref(&arc), "build a.ngc --target rs274ngc --decimals 1 -o a.nc");

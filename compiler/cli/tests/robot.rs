@@ -896,6 +896,9 @@ fn an_index_leaves_the_slides_where_they_are() {
         let (moves, found) = made("mill5-ac-table", program);
         assert!(moves.is_empty() && found.contains(&format!(":{line}:")) && found.contains("error[E0559]") && found.contains(axes) && found.matches("error").count() == 1, "{program}: {found}");
     }
+    // A feed that names all three comes to the part like a rapid.
+    let [(by_feed, found), (by_rapid, _)] = ["G1 X10 Y-50 Z-20 F5000", "G0 X10 Y-50 Z-20"].map(|come| made("mill5-ac-table", &format!("G53 G0 Z0\nG0 A-45\n{come}\nG1 Y-9 F300")));
+    assert!(found.is_empty() && by_feed.last().map(place) == by_rapid.last().map(place), "{found} {by_feed:?}");
     // Down from a height that is the machine's, over a place of the part.
     let (moves, found) = made("mill5-ac-table", "G53 G0 Z0\nG0 A-45\nG0 A0\nG0 X5 Y6\nG1 Z2 F300");
     assert!(found.is_empty() && moves.last().is_some_and(|l| l.starts_with("G1 X5 Y6 Z-88 A0 C0 ")), "{moves:?} {found}");

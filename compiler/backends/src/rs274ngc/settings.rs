@@ -518,7 +518,10 @@ impl Emitter<'_> {
             Op::SpindleSpeed { spindle: n, speed } if n == spindle => Some((s.index, speed)),
             _ => None,
         });
-        let speed = next.map(|(_, speed)| format!(" S{}", self.speed_text(speed, surface.is_some()))).unwrap_or_default();
+        // Another limit (G50 S of a Fanuc lathe) leaves the speed in force, which LinuxCNC's G96 wants to hear again.
+        let in_force = Some(view.state.spindle(spindle)).filter(|s| surface.is_some() && s.surface.is_some()).map(|s| s.speed);
+        let speed = next.map(|(_, speed)| speed).or(in_force);
+        let speed = speed.map(|speed| format!(" S{}", self.speed_text(speed, surface.is_some()))).unwrap_or_default();
         match surface {
             Some(limit) => {
                 // A limit beyond any spindle stands for none.
@@ -548,7 +551,18 @@ impl Emitter<'_> {
         };
         let text = self.speed_text(speed, surface);
         let text = if self.linuxcnc() { text } else { text.trim_end_matches('.').to_string() };
+        if self.options.language == Language::Grbl && self.goes_on(view) {
+            return self.w.speed = Some(text);
+        }
         self.w.block(&format!("S{text}{which}"));
+    }
+
+    /// Whether the spindle turns and the line of a speed moves as well: a laser goes on with its beam at another power, where a block
+    /// without motion stops it and burns.
+    fn goes_on(&self, view: &View<'_, '_>) -> bool {
+        let block = (view.index + 1..).map_while(|i| self.program.get(i)).take_while(|s| s.source == view.source);
+        let mut next = block.skip_while(|s| matches!(s.op, Op::FeedMode { .. } | Op::Feed { .. } | Op::Note(..)));
+        view.state.spindle(0).turn != Turn::Stop && next.next().is_some_and(|s| s.op.moves() && s.start.axes != s.end.axes)
     }
 
     fn spindle_turn(&mut self, spindle: i32, turn: Turn, source: Source) {

@@ -17,6 +17,8 @@ pub(super) struct Writer {
     line: String,
     /// G43 with its H, or G49, that waits for a block with a Z: without one the axis moves by the length on a Fanuc control.
     held: Option<(String, Source)>,
+    /// The spindle's speed that goes with the next block.
+    pub speed: Option<String>,
     /// The program has asked for a length.
     lengthened: bool,
 }
@@ -34,6 +36,7 @@ impl Writer {
             numbers: options.numbers,
             line: String::new(),
             held: None,
+            speed: None,
             lengthened: false,
         }
     }
@@ -61,7 +64,7 @@ impl Writer {
 
     /// A block.
     pub fn block(&mut self, words: &str) {
-        let with = self.with_held(words);
+        let with = self.with_held(words).or_else(|| Some(format!("{words} S{}", self.speed.take()?)));
         let words = with.as_deref().unwrap_or(words);
         if let Some((n, step)) = self.numbers {
             self.text.push_str(&format!("N{n} "));

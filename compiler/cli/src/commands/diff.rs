@@ -196,6 +196,7 @@ pub fn verify(global: &Global, args: &VerifyArgs) -> Exit {
         setup.tools = crate::exchange::tool_table(table);
         setup.machine_units = gr_canon::Units::Mm;
     }
+    crate::elsewhere::starts_as(&unit, &a.program, &mut setup);
     let b = motion_of("<translation>", text, &setup);
     let tolerance = Tolerance { rate: 1e-3, ..Tolerance::within(crate::emit::allowed(&args.options)) };
     let mut result = diff(&a.program, &b.program, &tolerance);

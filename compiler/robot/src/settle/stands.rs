@@ -167,7 +167,10 @@ impl<'a> Stands<'a> {
             // A cut there has to name it still.
             self.indexed[i] = false;
         }
-        self.rests_on_strayed(view, &from, &end, &to)?;
+        let comes_from_afar = to[..3] == [true; 3] && !increments && view.op == Op::Linear;
+        if !comes_from_afar {
+            self.rests_on_strayed(view, &from, &end, &to)?;
+        }
         if view.source.line == INSERTED && view.op == Op::Rapid && to[..3] == [true; 3] && !turns {
             self.way.extend(self.level_with(&from, &end, state));
         }
