@@ -299,7 +299,7 @@ fn first(
         // What differs on every machine is told elsewhere.
         let new = |d: &Difference| d.aspect == Aspect::Path && motion.begun.is_none() || look(&[], machine).is_none();
         let Some(all) = look(&unknown, machine).filter(new) else { continue };
-        let alone = unknown.iter().find_map(|u| look(&[*u], machine).map(|d| (d, *u)));
+        let alone = unknown.iter().find_map(|u| look(&[*u], machine).filter(new).map(|d| (d, *u)));
         return Some(alone.unwrap_or((all, unknown[0])));
     }
     None

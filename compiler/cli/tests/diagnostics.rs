@@ -445,6 +445,12 @@ fn what_a_control_has_in_store() {
         let plain = file("a.ngc", path);
         assert!(codes(&[plain], &format!("build a.ngc --target rs274ngc --from-line {line} --safe-z 60 -o a.nc")).0.is_empty());
     }
+    // What is told is what makes the difference, also beside one that is the same on every machine.
+    let hole = "G21 G90 G17 G54 G40 G49\nM3 S1000\nG0 X0 Y0 Z10\nG81 X10 Y10 Z-3 R2 F100\nX20\nG80\nG1 Z-1\nX30\nG0 Z50\nM5\nM2\n";
+    for to in ["grbl", "fanuc-mill", "linuxcnc"] {
+        let (text, _) = output(&[file("a.ngc", hole)], &format!("build a.ngc --target rs274ngc --to {to} -o a.nc"));
+        assert!(text.contains("E0607") && text.contains("G98 or G99"), "{to}: {text}");
+    }
     // LinuxCNC takes another place for the present one where the frame is turned under a shift: the number is the source's.
     let turned = file("a.ngc", "G21 G90 G17 G54 F100\nG0 X0 Y0 Z5\nG10 L2 P1 R0\nG10 L20 P1 X24\nG0 X1 Y2 Z30\nM2\n");
     let stored = file("a.var", "5210 1\n5211 7\n5212 1\n5213 2\n5220 1\n5221 10\n5222 3\n5230 30\n");
