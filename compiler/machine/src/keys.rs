@@ -234,7 +234,7 @@ static PLACE: &[Key] = &[
 ];
 
 static FRAMES: &[Key] = &[
-    key("base", Table(PLACE), "The machine in the cell."),
+    key("base", Table(PLACE), "Where the machine stands in the cell, for people (`machine show`): the table and all other frames are given in the base, so no program depends on it."),
     key("table", Table(PLACE), "The table in the base."),
     key("part", Table(PLACE), "The part on the table."),
     key(

@@ -22,8 +22,11 @@ pub fn import_urdf(id: &str, text: &str, tip: Option<&str>) -> Result<Import, St
     let robot = urdf_rs::read_from_string(text).map_err(|e| format!("the file is no URDF: {e}"))?;
     let mut notes = Vec::new();
     let path = to_tool(&robot, tip, &mut notes)?;
-    let mut base = controller_base(&robot, &path)?;
-    let (links, names, speeds, tip) = chain(&path, &mut notes)?;
+    let base = controller_base(&robot, &path)?;
+    let stand = standing(&path);
+    let stands = path[..stand].iter().fold(Frame::IDENTITY, |f, j| f.then(&placed(j)));
+    let mut base = base.map(|b| stands.inverse().then(&b));
+    let (links, names, speeds, tip) = chain(&path[stand..], &mut notes)?;
     let chain = Serial::new(links, tip);
     if path.iter().any(|j| j.mimic.is_some()) {
         notes.push("joints that imitate others are taken as joints of their own".to_string());
@@ -31,11 +34,14 @@ pub fn import_urdf(id: &str, text: &str, tip: Option<&str>) -> Result<Import, St
     let mut toml = format!("# Made from the URDF `{}`. Lengths in mm, angles in degrees, time in seconds.\n", robot.name);
     let title = robot.name.replace(['"', '\\', '\n'], " ");
     let _ = write!(toml, "format = 1\nid = \"{id}\"\ntitle = \"{title}\"\nkind = \"robot\"\nsource = \"URDF {title}\"\norientation = \"abc-euler-xyz\"\n\n[kinematics]\n");
+    let closed = |fit: &crate::Fit, before: &str| {
+        let list = |v: &[f64]| v.iter().map(|x| tidy(*x)).collect::<Vec<_>>().join(", ");
+        let (lengths, offsets, signs) = (list(&fit.arm.lengths()), list(&fit.arm.offsets().map(f64::to_degrees)), list(&fit.arm.signs()));
+        format!("{before}kind = \"opw\"\n# a1 a2 b c1 c2 c3 c4\n{before}lengths = [{lengths}]\n{before}offsets = [{offsets}]\n{before}signs = [{signs}]\n")
+    };
     match identify(&chain) {
         Ok(fit) if fit.flange == Frame::IDENTITY => {
-            let list = |v: &[f64]| v.iter().map(|x| tidy(*x)).collect::<Vec<_>>().join(", ");
-            let _ = writeln!(toml, "kind = \"opw\"\n# a1 a2 b c1 c2 c3 c4\nlengths = [{}]", list(&fit.arm.lengths()));
-            let _ = writeln!(toml, "offsets = [{}]\nsigns = [{}]", list(&fit.arm.offsets().map(f64::to_degrees)), list(&fit.arm.signs()));
+            toml += &closed(&fit, "");
             joints(&mut toml, &chain, &names, &speeds, false);
         }
         other => match from_controller(&chain, base) {
@@ -49,14 +55,23 @@ pub fn import_urdf(id: &str, text: &str, tip: Option<&str>) -> Result<Import, St
                 base = None;
             }
             None => {
-                notes.push(match other {
-                    Ok(_) => "its flange is turned against the one of the closed form; its joint frames are kept".to_string(),
+                notes.push(match &other {
+                    Ok(_) => "its last link is turned against the tool flange of the closed form (Z out of it); its joint frames are kept. Robot languages need the closed form: \
+                              import to the link `tool0`, if there is one (`--tip`), or take the lines `# kind = \"opw\"` in the file, if the flange of the robot's panel is turned as theirs"
+                        .to_string(),
                     Err(why) => format!("no closed form: {why}; its dimensions are not those of `kind = \"ur\"` either; inverse kinematics will search"),
                 });
+                toml += &other.as_ref().map_or(String::new(), |fit| closed(fit, "# "));
                 let _ = writeln!(toml, "kind = \"origins\"\ntip = [{}]", place(chain.tip()));
                 joints(&mut toml, &chain, &names, &speeds, true);
             }
         },
+    }
+    if !same(&stands, &Frame::IDENTITY) {
+        let (pose, link) = (Pose::from_frame(&stands), &path[stand - 1].child.link);
+        let list = |v: V3| v.map(tidy).join(", ");
+        let _ = write!(toml, "\n# The link `{link}` in the first link of the URDF.\n[frames.base]\nposition = [{}]\nrotation = [{}]\n", list(pose.position), list(pose.rotation.map(f64::to_degrees)));
+        notes.push(format!("the arm stands on the link `{link}`, at [{}] (mm, degrees) in the first link of the URDF: the machine file counts from there, give table and frames so; `[frames.base]` only says where that is", place(&stands)));
     }
     if let Some(base) = base.filter(|b| !same(b, &Frame::IDENTITY)) {
         let pose = Pose::from_frame(&base);
@@ -93,6 +108,13 @@ fn controller_base(robot: &urdf_rs::Robot, path: &[&urdf_rs::Joint]) -> Result<O
         }
     }
     Ok(None)
+}
+
+/// How many joints lead from the root to the arm's own first link, called `base_link` (ROS-Industrial's name) where the root is something
+/// else: the floor, a pedestal or a ceiling.
+fn standing(path: &[&urdf_rs::Joint]) -> usize {
+    let fixed = path.iter().take_while(|j| !moves(j));
+    fixed.enumerate().filter(|(_, j)| j.child.link.ends_with("base_link")).map(|(i, _)| i + 1).last().unwrap_or(0)
 }
 
 fn same(a: &Frame, b: &Frame) -> bool {

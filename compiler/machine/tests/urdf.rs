@@ -99,6 +99,36 @@ fn imported_arms_equal_their_urdf() {
     }
 }
 
+/// An arm that hangs, or stands beside the root, is the same arm: its base is its own first link, and only where that is differs.
+#[test]
+fn an_arm_counts_from_its_own_first_link() {
+    let (id, chain, _) = rows().into_iter().find(|r| r.0 == "abb/irb2400").unwrap();
+    let upright = urdf(&chain, [0.0, 1.5708, 0.0]);
+    let plain = import_urdf("test/arm", &upright, None).unwrap();
+    for (place, told) in [("xyz=\"0 0 2.5\" rpy=\"3.14159265 0 0\"", "position = [0, 0, 2500]\nrotation = [180, 0, 0]"), ("xyz=\"1 0.5 0.8\" rpy=\"0 0.3 0\"", "position = [1000, 500, 800]")] {
+        let mount = format!("<link name=\"world\"/>\n<joint name=\"mount\" type=\"fixed\"><parent link=\"world\"/><child link=\"base_link\"/><origin {place}/></joint>\n</robot>");
+        let import = import_urdf("test/arm", &upright.replace("</robot>", &mount), None).unwrap();
+        let (own, base) = import.toml.split_once("\n# The link `base_link` in the first link").unwrap();
+        assert_eq!(own.trim(), plain.toml.trim(), "{id}");
+        assert!(base.contains("[frames.base]") && base.contains(told), "{base}");
+        assert!(import.notes.iter().any(|n| n.contains("the arm stands on the link `base_link`")), "{:?}", import.notes);
+        let machine = parse(FileId(0), &import.toml).unwrap();
+        let q = [0.3, -0.2, 0.4, 0.5, -0.6, 0.7];
+        let (p, r) = machine.kinematics().forward_frame(&q).unwrap().error_to(&plain.chain.forward_frame(&q).unwrap());
+        assert!(norm(p) < 1e-6 && norm(r) < 1e-9);
+    }
+}
+
+/// Where only the last link is turned, the closed form stands in the file for whoever knows the robot's flange.
+#[test]
+fn a_turned_flange_shows_the_way_out() {
+    let (_, chain, _) = rows().into_iter().find(|r| r.0 == "abb/irb2400").unwrap();
+    let import = import_urdf("test/arm", &urdf(&chain, [0.0; 3]), None).unwrap();
+    assert!(import.notes.iter().any(|n| n.contains("`--tip`")), "{:?}", import.notes);
+    assert!(import.toml.contains("# kind = \"opw\"\n# a1 a2 b c1 c2 c3 c4\n# lengths = [100, -135, 0, 615, 705, 755, 85]") && import.toml.contains("\nkind = \"origins\""), "{}", import.toml);
+    assert!(parse(FileId(0), &import.toml).is_ok());
+}
+
 #[test]
 fn arms_without_closed_form_keep_their_frames() {
     let (_, chain, _) = rows().into_iter().next().unwrap();

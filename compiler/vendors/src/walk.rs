@@ -217,7 +217,7 @@ impl<'p> Cx<'p> {
         let home_known = joints.len() + self.machine.cell.external.len() <= MAX_JOINTS;
         if !ok || !home_known {
             let kind = match self.traits.arms {
-                Arms::Spherical => "arms with six joints and a spherical wrist",
+                Arms::Spherical => "arms with six joints and a spherical wrist (`kind = \"opw\"`)",
                 Arms::Six => "arms with six joints",
                 Arms::Any => "robot arms with four to six joints",
             };
