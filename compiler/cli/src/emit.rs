@@ -782,7 +782,7 @@ fn line_numbers(text: &str) -> Result<(u32, u32), String> {
 /// The lines of a program.
 pub fn texts(motion: &Motion) -> Texts<'_> {
     let texts = Texts::new(motion.sources.iter().map(|(id, f)| (id, &*f.text)));
-    if motion.plan.is_some() { texts.instances() } else { texts.with_increments(motion.increments) }
+    if motion.plan.is_some() { texts.instances() } else { texts.with_increments(motion.increments).with_offset_numbers(motion.offset_numbers) }
 }
 
 fn joints(motion: &Motion, goal: &Goal<'_>) -> Result<Made, String> {

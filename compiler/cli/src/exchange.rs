@@ -231,7 +231,7 @@ pub fn motion(unit: &Unit) -> Result<(Motion, Checked), Checked> {
 fn moving(unit: &Unit, program: gr_ir::Program, plan: Plan) -> Motion {
     let mut sources = Sources::default();
     sources.add(unit.name(), unit.text.clone());
-    Motion { program, sources, subs: Vec::new(), missing: Vec::new(), found: Vec::new(), plan: Some(plan), setups: Vec::new(), increments: false, no_tool_table: false, begun: None }
+    Motion { program, sources, subs: Vec::new(), missing: Vec::new(), found: Vec::new(), plan: Some(plan), setups: Vec::new(), increments: false, offset_numbers: false, no_tool_table: false, begun: None }
 }
 
 /// The process of a file, with errors of reading it only.

@@ -136,6 +136,8 @@ pub struct Motion {
     pub setups: Vec<gr_robot::Setup>,
     /// U V W of the text are increments of X Y Z: a lathe's.
     pub increments: bool,
+    /// H and D of the text hold: a Fanuc mill's.
+    pub offset_numbers: bool,
     /// There is no tool table.
     pub no_tool_table: bool,
     /// Where it begins instead of at its beginning.
@@ -165,7 +167,7 @@ pub fn motion(unit: &Unit, machine: Option<&gr_machine::Machine>) -> Result<(Mot
     let motion = gr_driver::lower(&unit.name(), unit.text.clone(), &unit.setup, Some(&unit.rules()));
     let sought = || motion.subs.iter().chain(&motion.missing).cloned().collect();
     let checked = if motion.clean { unit.told(Checked::nothing()) } else { unit.check().map_err(|c| Checked { sought: sought(), ..c })? };
-    Ok((Motion { increments: increments(&unit.setup), no_tool_table: gr_interp::assumed(&unit.setup.tools), ..plain(motion) }, checked))
+    Ok((Motion { no_tool_table: gr_interp::assumed(&unit.setup.tools), ..worded(plain(motion), &unit.setup) }, checked))
 }
 
 /// Motion of a program on another machine, unchecked.
@@ -173,12 +175,12 @@ pub fn motion_with(unit: &Unit, setup: &Setup) -> Motion {
     if setup.dialect.family == Family::Ufmg2008 {
         return ufmg(&unit.name(), &unit.text, setup.dialect, None);
     }
-    Motion { increments: increments(setup), ..plain(gr_driver::lower(&unit.name(), unit.text.clone(), setup, None)) }
+    worded(plain(gr_driver::lower(&unit.name(), unit.text.clone(), setup, None)), setup)
 }
 
-/// Whether U V W are increments of X Y Z.
-fn increments(setup: &Setup) -> bool {
-    setup.dialect.id == "fanuc-turn"
+/// The same, with what words of the text mean that LinuxCNC reads otherwise.
+fn worded(motion: Motion, setup: &Setup) -> Motion {
+    Motion { increments: setup.dialect.id == "fanuc-turn", offset_numbers: setup.dialect.id == "fanuc-mill", ..motion }
 }
 
 /// Motion of a text of our own making.
@@ -191,7 +193,7 @@ fn plain(motion: gr_driver::Motion) -> Motion {
     for (name, text) in motion.texts {
         sources.add(name, text);
     }
-    Motion { program: motion.program, sources, subs: motion.subs, missing: motion.missing, found: Vec::new(), plan: None, setups: Vec::new(), increments: false, no_tool_table: false, begun: None }
+    Motion { program: motion.program, sources, subs: motion.subs, missing: motion.missing, found: Vec::new(), plan: None, setups: Vec::new(), increments: false, offset_numbers: false, no_tool_table: false, begun: None }
 }
 
 /// Motion of a program for a machine, in whatever language it is.
@@ -199,7 +201,7 @@ pub fn motion_for(name: &str, text: &str, setup: &Setup, machine: &gr_machine::M
     if setup.dialect.family == Family::Ufmg2008 {
         return ufmg(name, text, setup.dialect, Some(machine));
     }
-    Motion { increments: increments(setup), ..motion_of(name, text.to_string(), setup) }
+    worded(motion_of(name, text.to_string(), setup), setup)
 }
 
 /// The UFMG 2008 language has commands of its own and no interpreter state.
@@ -212,5 +214,5 @@ fn ufmg(name: &str, text: &str, dialect: &'static gr_spec::Dialect, machine: Opt
     found.extend(more);
     let mut sources = Sources::default();
     sources.add(name, text);
-    Motion { program, sources, subs: Vec::new(), missing: Vec::new(), found, plan: None, setups: Vec::new(), increments: false, no_tool_table: false, begun: None }
+    Motion { program, sources, subs: Vec::new(), missing: Vec::new(), found, plan: None, setups: Vec::new(), increments: false, offset_numbers: false, no_tool_table: false, begun: None }
 }

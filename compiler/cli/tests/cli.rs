@@ -327,6 +327,16 @@ fn reference_ufmg2008() {
     assert_eq!(first(&space, 3), "t;X;Y;Z;A;B;C|0;100;0;0;0;0;-90|0,025;50;50;0;0;0;-60");
     assert_eq!(first(&joints, 3), "t;J1;J2;J3|0;90;-90;-90|0,025;136,92;-93,84;-103,07");
     assert_eq!((space.lines().count(), joints.lines().count()), (program.lines().count() + 1, program.lines().count() + 1));
+    // What it writes it reads: the first line, with F0, is where it begins.
+    let o = in_folder(at, &["check", "b.g"]);
+    assert_eq!(code(&o), 0, "{}", whole(&o));
+    let o = in_folder(at, &["build", "b.g", "--target", "motion"]);
+    assert!(code(&o) == 0 && text(&o.stdout).contains("rapid x=90 y=-90 z=-90 @0:1"), "{}", whole(&o));
+    for (program, good) in [("G00 X5 F0\nG01 X5 F0\n", true), ("G00 X5 F0\nG01 X6 F0\n", false), ("G01 X5 F0\nG01 X6\n", false), ("G02 X5 I3 J0 K0 F0\n", false)] {
+        std::fs::write(at.join("c.g"), program).unwrap();
+        let o = in_folder(at, &["check", "c.g"]);
+        assert_eq!((code(&o) == 0, text(&o.stderr).contains("E0239")), (good, !good), "{program}{}", whole(&o));
+    }
 }
 
 /// Words that a program in the coordinates of the arm leaves out keep their values, also in what is made of it; what it moves later than at
@@ -726,6 +736,35 @@ fn another_dialects_words_are_named() {
         told += &text(&in_folder(folder.path(), &["check", "a.ngc", "-q"]).stderr);
     }
     insta::assert_snapshot!(told);
+}
+
+/// H of a Fanuc mill holds, H0 is no length: what is written says which length is meant, also where no table knows it.
+#[test]
+fn offset_numbers_of_a_fanuc_mill_are_written() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    let program = "O1\nG21 G90 G54 G17 F100.\nT1 M6\nG0 X0 Y0\nG43 Z50. H3\nG1 Z-1.\nG0 Z40. H2\nZ30.\nT2 M6\nG43 Z20.\nG43 H0 Z200.\nG0 Z180.\nG41 D0 G1 X20.\nX30.\nG40 X0\nM30\n";
+    std::fs::write(at.join("a.nc"), program).expect("writable");
+    std::fs::write(at.join("t.tbl"), "T1 P1 Z100 D10\nT2 P2 Z150 D20\nT3 P3 Z120 D6\n").expect("writable");
+    let mut told = String::new();
+    for to in ["fanuc-mill", "linuxcnc"] {
+        let mut written = Vec::new();
+        for tools in [&[][..], &["-t", "t.tbl"]] {
+            let mut args = vec!["build", "a.nc", "--dialect", "fanuc-mill", "--target", "rs274ngc", "--to", to];
+            args.extend(tools);
+            let o = in_folder(at, &args);
+            assert!(o.status.success(), "{}", whole(&o));
+            let text = String::from_utf8_lossy(&o.stdout).into_owned();
+            written.push(text.lines().filter(|l| !l.starts_with('(')).collect::<Vec<_>>().join("\n"));
+        }
+        assert_eq!(written[0], written[1], "the same words with a tool table");
+        told += &format!("{to}\n{}\n\n", written[0]);
+    }
+    insta::assert_snapshot!(told);
+    // Which number it is, nobody knows here.
+    std::fs::write(at.join("b.nc"), "O1\nG21 G90\n#1=2\nT1 M6\nG43 Z50. H#1\nM30\n").expect("writable");
+    let o = in_folder(at, &["build", "b.nc", "--dialect", "fanuc-mill", "--target", "rs274ngc"]);
+    assert!(!o.status.success() && text(&o.stderr).contains("--tools"), "{}", whole(&o));
 }
 
 /// U and W of a lathe are X and Z by increments: no axis U or W is written.

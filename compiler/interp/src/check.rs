@@ -206,7 +206,8 @@ impl<S: Sink> Interp<'_, S> {
                 if b.motion != 0 && b.motion != 10 {
                     return Err(fault(code::MOTION_G53, rs274::RT_G53_MOTION, "needs G0 or G1").at(b'g'));
                 }
-                if self.goes_by_increments() {
+                // grbl takes machine coordinates as they are under G91 too (1.1, gcode.c).
+                if self.goes_by_increments() && self.setup.dialect.family != gr_spec::Family::Grbl {
                     let f = fault(code::MOTION_G53, rs274::RT_G53_INCREMENTAL, "is not possible in incremental mode");
                     return Err(f.at(b'g'));
                 }

@@ -392,12 +392,19 @@ impl<S: Sink> Interp<'_, S> {
         if !matches!(plane, Plane::Xy | Plane::Xz) {
             return Err(Fault::new(code::COMP_NOT_HERE, rs274::COMP_PLANE).arg(format!("the plane is {}, it must be G17 or G18", plane.code())));
         }
-        if self.m.side() != Side::Off {
+        let twice = self.m.side() != Side::Off;
+        if twice && !self.is_fanuc() {
             return Err(Fault::new(code::COMP_NOT_HERE, rs274::COMP_TWICE).arg("it is on already"));
         }
         let (radius, orientation) =
             if g % 10 == 1 { self.comp_from_words(g, plane)? } else { self.comp_from_tool(g, plane)? };
         let right = (g / 10 == 42) != (radius < 0.0);
+        if twice {
+            // A Fanuc control may be told again what is in force; another side or radius needs a corner of its own.
+            let same = right == (self.m.side() == Side::Right) && radius.abs() == self.m.comp_radius;
+            let on = if same { Ok(()) } else { Err("it is on already, with another side or radius") };
+            return on.map_err(|why| Fault::new(code::COMP_NOT_HERE, rs274::COMP_TWICE).arg(why));
+        }
         self.emit_queued(Call::Comment(
             format!("interpreter: cutter radius compensation on {}", if right { "right" } else { "left" }).into(),
         ));
@@ -428,17 +435,10 @@ impl<S: Sink> Interp<'_, S> {
         let row = match self.block.get(b'd') {
             None => tools.get(0),
             Some(d) => {
-                let number = (d + 0.5) as i32;
-                if (f64::from(number) - d).abs() >= 0.0001 {
-                    return Err(Fault::new(code::COMP_TOOL_WORD, rs274::COMP_D_INTEGER)
-                        .arg("D is the number of a tool, a whole number")
-                        .arg(g / 10)
-                        .at(b'd'));
-                }
-                if number < 0 {
-                    return Err(Fault::new(code::COMP_TOOL_WORD, rs274::COMP_D_NEGATIVE)
-                        .arg("D is negative")
-                        .at(b'd'));
+                let number = radius_number(d, g)?;
+                // On a Fanuc control offset number 0 is no offset.
+                if number == 0 && self.is_fanuc() {
+                    return Ok((0.0, 0));
                 }
                 // The spindle's row counts last.
                 let spindle = || tools.get(0).filter(|t| number == 0 || t.number == number);
@@ -487,6 +487,21 @@ fn corner_angle(beta: f64) -> f64 {
     } else {
         beta
     }
+}
+
+/// The number that a D word of G41 or G42 names.
+pub(crate) fn radius_number(d: f64, g: i16) -> Res<i32> {
+    let number = (d + 0.5) as i32;
+    if (f64::from(number) - d).abs() >= 0.0001 {
+        return Err(Fault::new(code::COMP_TOOL_WORD, rs274::COMP_D_INTEGER)
+            .arg("D is the number of a tool, a whole number")
+            .arg(g / 10)
+            .at(b'd'));
+    }
+    if number < 0 {
+        return Err(Fault::new(code::COMP_TOOL_WORD, rs274::COMP_D_NEGATIVE).arg("D is negative").at(b'd'));
+    }
+    Ok(number)
 }
 
 /// Only G0 and G1 know how to go beside a contour.

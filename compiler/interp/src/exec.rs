@@ -90,6 +90,7 @@ impl<S: Sink> Interp<'_, S> {
     }
 
     fn convert_feed_mode(&mut self) {
+        let before = self.m.feed_mode;
         match self.block.g(Group::Feed) {
             930 => {
                 self.remark("interpreter: feed mode set to inverse time");
@@ -107,6 +108,10 @@ impl<S: Sink> Interp<'_, S> {
                 self.m.feed_mode = 2;
                 self.emit_queued(Call::SetFeedMode(self.m.active_spindle, 1));
             }
+        }
+        // LinuxCNC forgets F also where the mode stays as it is; other controls do not (grbl 1.1, gcode.c; Fanuc: F is modal).
+        if self.m.feed_mode == before && self.setup.dialect.family != gr_spec::Family::Linuxcnc {
+            return;
         }
         self.m.feed = 0.0;
         self.emit_queued(Call::SetFeedRate(0.0));
@@ -179,7 +184,9 @@ impl<S: Sink> Interp<'_, S> {
             }
         }
         if let Some(g) = self.todo(Group::Retract, step::RETRACT) {
-            not_with_comp(self.m.comp_side, rs274::RT_COMP_RETRACT, "a change of the retract mode")?;
+            if !self.is_fanuc() {
+                not_with_comp(self.m.comp_side, rs274::RT_COMP_RETRACT, "a change of the retract mode")?;
+            }
             let name = if g == 980 { "old_z" } else { "r_plane" };
             self.remark(&format!("interpreter: retract mode set to {name}"));
             self.m.retract_r = u8::from(g == 990);
@@ -277,14 +284,16 @@ impl<S: Sink> Interp<'_, S> {
 
     /// G61, G61.1, G64.
     pub(crate) fn convert_path(&mut self, g: i16, tolerance: f64, naive: f64, planner: Option<f64>) -> Res {
-        not_with_comp(self.m.comp_side, rs274::RT_COMP_CONTROL_MODE, "a change of the path mode")?;
+        if !self.is_fanuc() {
+            not_with_comp(self.m.comp_side, rs274::RT_COMP_CONTROL_MODE, "a change of the path mode")?;
+        }
         match g {
             610 => {
-                self.emit(Call::SetMotionControlMode(PathMode::ExactPath));
+                self.emit_queued(Call::SetMotionControlMode(PathMode::ExactPath));
                 self.m.path_mode = 0;
             }
             611 => {
-                self.emit(Call::SetMotionControlMode(PathMode::ExactStop));
+                self.emit_queued(Call::SetMotionControlMode(PathMode::ExactStop));
                 self.m.path_mode = 1;
             }
             _ => {
@@ -292,14 +301,14 @@ impl<S: Sink> Interp<'_, S> {
                 self.m.path_mode = 2;
                 self.m.tolerance = path;
                 match planner {
-                    Some(r) if r <= 0.0 => self.emit(Call::SetPlannerMode(0, -1.0)),
-                    Some(r) => self.emit(Call::SetPlannerMode(1, r.clamp(0.1, 1.0))),
+                    Some(r) if r <= 0.0 => self.emit_queued(Call::SetPlannerMode(0, -1.0)),
+                    Some(r) => self.emit_queued(Call::SetPlannerMode(1, r.clamp(0.1, 1.0))),
                     None => {}
                 }
-                self.emit(Call::SetMotionControlMode(PathMode::Continuous(path)));
+                self.emit_queued(Call::SetMotionControlMode(PathMode::Continuous(path)));
                 let naive = if naive >= 0.0 { naive } else { path };
                 self.m.naivecam = naive;
-                self.emit(Call::SetNaivecamTolerance(naive));
+                self.emit_queued(Call::SetNaivecamTolerance(naive));
             }
         }
         Ok(())

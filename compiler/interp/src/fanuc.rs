@@ -17,6 +17,8 @@ const TURN: &str = "fanuc-turn";
 /// Increments of a lathe, and the axis that each moves.
 const INCREMENTS: [(u8, u8); 4] = [(b'u', b'x'), (b'v', b'y'), (b'w', b'z'), (b'h', b'c')];
 const INCREMENT_MASK: u32 = letters(b"uvwh");
+/// Words of a mill that name offsets.
+const OFFSET_NUMBERS: u32 = letters(b"dh");
 const LETTERS: [u8; 9] = *b"xyzabcuvw";
 const CENTRES: [u8; 3] = *b"ijk";
 
@@ -62,6 +64,9 @@ impl<S: Sink> Interp<'_, S> {
         if self.block.ends_modal {
             self.end_modal()?;
         }
+        if !is_lathe(self.setup.dialect) {
+            self.offset_numbers()?;
+        }
         match self.block.turning {
             -1 => {}
             500 => return self.clamp_spindle("G50"),
@@ -89,6 +94,50 @@ impl<S: Sink> Interp<'_, S> {
             self.leave_cycle();
             self.block.g[Group::Motion as usize] = -1;
             self.block.g_mask &= !(1 << Group::Motion as u32);
+        }
+        Ok(())
+    }
+
+    /// H and D of a machining center hold until the next one, whatever block names them. H under G43 changes the length in force
+    /// (Series 0i/30i operator's manual, machining center system, tool length offset, cutter compensation).
+    fn offset_numbers(&mut self) -> Res {
+        let (length, side) = (self.block.g(Group::ToolLength), self.block.g(Group::CutterComp));
+        if !self.block.has_any_of(OFFSET_NUMBERS) && length == -1 && side == -1 {
+            return Ok(());
+        }
+        let needs = |name: &str, letter: &str| Fault::new(code::WORD_MISSING, rs274::SILENT).arg(name).arg(letter).at(b'g');
+        if let Some(d) = self.block.get(b'd') {
+            let number = crate::comp::radius_number(d, side.max(410))?;
+            if self.m.comp_side != 0 && side != 400 && number != self.m.radius_number {
+                let what = format!("D{number} while D{} is in force", self.m.radius_number);
+                return Err(Fault::new(code::CODE_NOT_CARRIED_OUT, rs274::RT_D_UNUSED).arg(what).arg("Cutter compensation").at(b'd'));
+            }
+            self.m.radius_number = number;
+            self.block.unset(b'd');
+        }
+        if matches!(side, 410 | 420) {
+            if self.m.radius_number < 0 {
+                return Err(needs(&crate::check::code_name(side), "D"));
+            }
+            self.block.set(b'd', f64::from(self.m.radius_number));
+        }
+        let mut length = length;
+        if let Some(h) = self.block.get(b'h') {
+            if h < 0.0 {
+                return Err(Fault::new(code::WORD_NEGATIVE, rs274::RT_NEGATIVE_H).arg('H').at(b'h'));
+            }
+            self.m.length_number = crate::eval::to_int(h);
+            self.block.unset(b'h');
+            if length == -1 && self.m.length_on != 0 {
+                length = 430;
+                self.block.set_g(Group::ToolLength as usize, length);
+            }
+        }
+        if length == 430 {
+            if self.m.length_number < 0 {
+                return Err(needs("G43", "H"));
+            }
+            self.block.set(b'h', f64::from(self.m.length_number));
         }
         Ok(())
     }

@@ -81,6 +81,10 @@ pub struct Modal {
     pub length_of: i32,
     /// Tool that was in the spindle when that length was put in force, 0 = none.
     pub length_set_with: i32,
+    /// Fanuc mill: numbers of the length offset (H) and the radius offset (D) that were named last, −1 = none yet.
+    pub length_number: i32,
+    #[expect(missing_docs, reason = "see length_number")]
+    pub radius_number: i32,
     /// Canned cycle repeats.
     pub cycle_l: i32,
     /// Tool orientation 0 … 9 for lathe compensation.
@@ -158,8 +162,10 @@ pub struct Modal {
     /// Axes X Y Z, by bits, that a block sent to a place of the machine (G28, G30, G53), and no word to one of the work frame
     /// since. How high that is there, only the machine knows.
     pub parked: u8,
+    /// G43 is in force (or what LinuxCNC has beside it).
+    pub length_on: u8,
     /// Always 0; keeps the size a multiple of eight.
-    pub pad: [u8; 6],
+    pub pad: [u8; 5],
 }
 
 impl Modal {
@@ -232,6 +238,7 @@ impl State {
         modal.pocket = 1;
         modal.origin_index = 1;
         modal.n_number = -1;
+        (modal.length_number, modal.radius_number) = (-1, -1);
         State { modal, queue: Queue::default(), world: World::new(), saved: None, tools: None, world_tools: None }
     }
     /// The bytes that make two states the same state (`-0.0` counts as `0.0`), tool tables and queue aside.

@@ -189,7 +189,10 @@ impl<S: Sink> Interp<'_, S> {
         let h = self.block.get(b'h').map(to_int);
         let mut offset: Axes = [0.0; 9];
         let mut length_of = 0;
+        // Offset number 0 of a Fanuc control is no offset; in LinuxCNC it is the tool in the spindle.
+        let off = g == 490 || g == 430 && h == Some(0) && self.is_fanuc();
         match g {
+            _ if off => {}
             430 => {
                 let index = match h {
                     Some(h) => match self.find_tool(h, b'h')? {
@@ -224,7 +227,8 @@ impl<S: Sink> Interp<'_, S> {
         }
         m.tool_offset = offset;
         m.length_of = length_of;
-        m.length_set_with = if g == 490 { 0 } else { loaded };
+        m.length_set_with = if off { 0 } else { loaded };
+        m.length_on = u8::from(g != 490);
         // 2.10 shows the offset that applies, not the loaded tool's.
         if self.setup.version == Version::V2_10 {
             let stored = self.machine_axes(&offset);

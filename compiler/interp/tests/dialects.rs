@@ -608,6 +608,77 @@ fn a_fanuc_g53_is_a_rapid_of_its_own() {
     }
 }
 
+/// Machining center, tool length offset and cutter compensation: H and D hold, number 0 is no offset, H under G43 changes the length.
+#[test]
+fn fanuc_offset_numbers() {
+    let of = |text: &str, call: &str| -> Vec<String> {
+        let (calls, outcome) = run_in("fanuc-mill", &format!("G20 G90 F9.\n{text}M30\n"));
+        assert!(outcome.findings.is_empty(), "{text}{:?}", outcome.findings);
+        calls.iter().filter(|c| c.starts_with(call)).map(|c| c.split(' ').nth(2).unwrap_or_default().to_string()).collect()
+    };
+    let lengths = |text: &str| of(text, "USE_TOOL_LENGTH_OFFSET");
+    assert_eq!(lengths("T1 M6\nG43 Z5. H1\nG0 Z4. H2\nH0\nH1\nG49\nH2\nG43 Z5.\nT1 M6\nG43 Z5.\nG43 H0 Z9.\nG49\n"), [
+        "1.5000,", "1.0000,", "0.0000,", "1.5000,", "0.0000,", "1.0000,", "1.0000,", "0.0000,", "0.0000,"
+    ]);
+    assert_eq!(lengths("T1 M6 D1 H1\nG43 Z5.\n"), ["1.5000,"]);
+    let path = |text: &str| -> Vec<String> {
+        let (calls, outcome) = run_in("fanuc-mill", &format!("G20 G90 F9.\nT2 M6\n{text}G1 X4.\nG40 X5.\nM30\n"));
+        assert!(outcome.findings.is_empty(), "{text}{:?}", outcome.findings);
+        calls.iter().filter(|c| c.starts_with("STRAIGHT_FEED")).map(|c| c.split(", ").nth(1).unwrap_or_default().to_string()).collect()
+    };
+    let beside = path("G41 D1 G1 X1.\n");
+    assert_eq!(beside, ["0.1250", "0.1250", "0.0000"]);
+    for text in ["G0 X0 D1\nG41 G1 X1.\n", "D1\nG41 G1 X1.\n", "G41 D1 G1 X1.\nG41 D1\n", "G41 D1 G1 X1.\nG41\nG98\nG99\nG61\nG64\n", "G41 D1 G1 X1.\nD1\n"] {
+        assert_eq!(path(text), beside, "{text}");
+    }
+    assert_eq!(path("D1\nG41 D0 G1 X1.\n"), ["0.0000"; 3]);
+    for (text, expected) in [
+        ("G43 Z5.\n", code::WORD_MISSING),
+        ("G41 G1 X5.\n", code::WORD_MISSING),
+        ("D1.5\n", code::COMP_TOOL_WORD),
+        ("G41 D1 G1 X5.\nX9. D2\nG40\n", code::CODE_NOT_CARRIED_OUT),
+        ("G41 D1 G1 X5.\nG42 X9.\nG40\n", code::COMP_NOT_HERE),
+    ] {
+        let (_, outcome) = run_in("fanuc-mill", &format!("G20 G90 F9.\nT1 M6\n{text}M30\n"));
+        let found: Vec<_> = outcome.findings.iter().map(|f| f.fault.code).collect();
+        assert_eq!(found, [expected], "{text}");
+    }
+    // In LinuxCNC 0 is the tool in the spindle.
+    let (calls, _) = run_in("linuxcnc", "G20 G90\nT1 M6\nG43 H0\nM2\n");
+    assert!(calls.iter().any(|c| c.starts_with("USE_TOOL_LENGTH_OFFSET(0.0000 0.0000 1.5000")), "{calls:?}");
+}
+
+/// grbl 1.1 (gcode.c) and Fanuc (F is modal): the mode of feed that is in force already leaves F as it is. LinuxCNC forgets it.
+#[test]
+fn a_repeated_mode_of_feed_keeps_the_feed() {
+    for (id, text) in [
+        ("grbl", "G21 G94\nG1 X1 F300\nG90 G94\nG1 X2\nM30\n"),
+        ("fanuc-mill", "G21 G94\nG1 X1. F300.\nG90 G94\nG1 X2.\nM30\n"),
+        ("fanuc-turn", "G21 G99\nG97 S100 M3\nG1 X1. F.3\nG40 G97 G99\nG1 X2.\nM30\n"),
+        ("fanuc-turn", "G21 G98\nG1 X1. F300.\nG98\nG1 X2.\nM30\n"),
+    ] {
+        let (calls, outcome) = run_in(id, text);
+        assert!(outcome.findings.is_empty(), "{id}: {:?}", outcome.findings);
+        assert_eq!(moves_of(&calls).len(), 2, "{id}: {calls:?}");
+    }
+    for (id, text) in [
+        ("linuxcnc", "G21 G94\nG1 X1 F300\nG94\nG1 X2\nM2\n"),
+        ("grbl", "G21 G94\nG1 X1 F300\nG93\nG94\nG1 X2\nM30\n"),
+        ("fanuc-mill", "G21 G94\nG1 X1. F300.\nG95 S9 M3\nG1 X2.\nM30\n"),
+    ] {
+        let (_, outcome) = run_in(id, text);
+        assert_eq!(outcome.findings[0].fault.code, code::FEED_MISSING, "{id}");
+    }
+}
+
+/// grbl 1.1 (gcode.c): machine coordinates are places under G91 too.
+#[test]
+fn a_grbl_g53_is_absolute() {
+    let (calls, outcome) = run_in("grbl", "G21\nG0 X5 Z3\nG91\nG53 G0 Z-2\nG0 X1 Z1\nG90\nG53 G0 X4\nM30\n");
+    assert!(outcome.findings.is_empty(), "{:?}", outcome.findings);
+    assert_eq!(moves_of(&calls), ["rapid 5 0 3", "rapid 5 0 -2", "rapid 6 0 -1", "rapid 4 0 -1"]);
+}
+
 /// P2 is the second reference point, which G30 goes to anyhow; where the others are only the machine knows.
 #[test]
 fn fanuc_reference_points() {

@@ -13,6 +13,10 @@ pub trait Sources {
     fn increments(&self) -> bool {
         false
     }
+    /// Whether H and D of the text number offsets that hold until the next ones, of which 0 is none (a Fanuc mill).
+    fn offset_numbers(&self) -> bool {
+        false
+    }
 }
 
 /// No text at hand.
@@ -32,13 +36,14 @@ pub struct Texts<'a> {
     files: Vec<(FileId, &'a str, gr_text::LineIndex)>,
     words: bool,
     increments: bool,
+    offset_numbers: bool,
 }
 
 impl<'a> Texts<'a> {
     /// Indexes the lines of some files.
     pub fn new(files: impl IntoIterator<Item = (FileId, &'a str)>) -> Texts<'a> {
         let files = files.into_iter().map(|(id, t)| (id, t, gr_text::LineIndex::new(t.as_bytes())));
-        Texts { files: files.collect(), words: true, increments: false }
+        Texts { files: files.collect(), words: true, increments: false, offset_numbers: false }
     }
     /// Of instances of a STEP-NC file: their lines have places and no words.
     pub fn instances(self) -> Texts<'a> {
@@ -47,6 +52,10 @@ impl<'a> Texts<'a> {
     /// Of a lathe whose U V W H are increments, if so.
     pub fn with_increments(self, increments: bool) -> Texts<'a> {
         Texts { increments, ..self }
+    }
+    /// Of a Fanuc mill, whose H and D hold, if so.
+    pub fn with_offset_numbers(self, offset_numbers: bool) -> Texts<'a> {
+        Texts { offset_numbers, ..self }
     }
     fn span(&self, file: FileId, line: u32) -> Option<(&'a str, Span)> {
         let (_, text, index) = self.files.iter().find(|f| f.0 == file)?;
@@ -69,6 +78,9 @@ impl Sources for Texts<'_> {
     }
     fn increments(&self) -> bool {
         self.increments
+    }
+    fn offset_numbers(&self) -> bool {
+        self.offset_numbers
     }
 }
 

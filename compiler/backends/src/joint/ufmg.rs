@@ -11,7 +11,7 @@ pub fn lower(file: FileId, name: &str, commands: &[Command], machine: &Machine) 
     axes[..6].copy_from_slice(&machine.start.coordinates());
     let mut out = Builder::from_state(Pose::at(axes), State::default());
     out.file(file, name);
-    let mut lower = Lower { out, file, feed: None, faults: Vec::new() };
+    let mut lower = Lower { out, file, feed: None, begun: false, faults: Vec::new() };
     for command in commands {
         lower.command(command);
     }
@@ -25,6 +25,8 @@ struct Lower {
     out: Builder,
     file: FileId,
     feed: Option<f64>,
+    /// A command was there.
+    begun: bool,
     faults: Vec<Diagnostic>,
 }
 
@@ -41,6 +43,8 @@ impl Lower {
         let end = self.end(c);
         match c.motion {
             Motion::Joint => self.out.push_to(Op::Rapid, &end, source),
+            // What the system writes itself begins so: F0 is no speed, the arm stands there ([`super::JointProgram::gcode`]). It comes there first.
+            Motion::Line if c.feed == Some(0.0) && (!self.begun || end == *self.out.pose()) => self.out.push_to(Op::Rapid, &end, source),
             Motion::Line => {
                 if self.has_feed(c, "G01") {
                     self.out.push_to(Op::Linear, &end, source);
@@ -49,6 +53,7 @@ impl Lower {
             Motion::Clockwise => self.arc(c, "G02", &end, -1, source),
             Motion::Counterclockwise => self.arc(c, "G03", &end, 1, source),
         }
+        self.begun = true;
     }
 
     /// F is mm/s; where only the orientation changes it is taken as degrees per second.
@@ -65,7 +70,8 @@ impl Lower {
     fn has_feed(&mut self, c: &Command, word: &str) -> bool {
         let good = self.feed.is_some_and(|f| f > 0.0);
         if !good {
-            self.fault(code::FEED_MISSING, c, &[format!("{word} needs F, the feed in mm/s, and none was programmed before")]);
+            let why = if self.feed.is_some() { "F must be above 0" } else { "none was programmed before" };
+            self.fault(code::FEED_MISSING, c, &[format!("{word} needs F, the feed in mm/s, and {why}")]);
         }
         good
     }

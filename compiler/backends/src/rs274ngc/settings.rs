@@ -3,7 +3,7 @@
 use super::emit::Emitter;
 use super::{ChangeAt, Language};
 use super::write::AXES;
-use crate::sources::{Words, number_of, sets_here};
+use crate::sources::{Words, length_number, number_of, sets_here};
 use gr_ir::{Axes, Op, Override, PathMode, Source, Turn, View};
 use gr_text::code;
 
@@ -338,7 +338,8 @@ impl Emitter<'_> {
         // A tool that has not been measured has a length of 0 too, so for 0 the source decides.
         // A lathe's T names the offset with its last two digits.
         let station = self.sources.increments().then(|| number_of(self.sources, 't', view.source)).flatten().map(|t| t % 100);
-        let asked = if words.is_some_and(|w| w.g(430)) { number_of(self.sources, 'h', view.source) } else { station };
+        let wanted = words.is_some_and(|w| w.asks_length(self.sources));
+        let asked = if wanted { length_number(self.sources, view.source) } else { station };
         let named = match words {
             // The length is the program's own.
             Some(w) if w.g(431) => None,
@@ -348,25 +349,29 @@ impl Emitter<'_> {
         };
         let off = match words {
             Some(_) if station.is_some() => station == Some(0),
-            Some(w) => w.g(490) || zero && !w.g(430) && !w.g(432),
+            // Offset number 0 is none there.
+            Some(_) if wanted && self.sources.offset_numbers() && (asked == Some(0) || zero && named.is_none() && !self.tools.is_empty()) => true,
+            Some(w) => w.g(490) || zero && !wanted && !w.g(432),
             None => zero && (view.state.tool <= 0 || named != Some(view.state.tool)),
         };
         // Nothing is known of the lengths of a machine without a tool table; the program says which it wants.
         let unmeasured = zero && !off && named.is_none();
-        let wanted = words.is_some_and(|w| w.g(430)) || station.is_some();
+        let wanted = wanted || station.is_some();
         let added = words.is_some_and(|w| w.g(432)).then(|| number_of(self.sources, 'h', view.source)).flatten();
         let said = match station {
             Some(n) if unmeasured => Some(format!("G43 H{n}")),
-            _ if unmeasured => self.length_asked(view),
+            _ if unmeasured => self.length_asked(asked, view),
             _ => None,
         };
+        // The number is a variable's, or stands in another program.
+        let unnamed = wanted && self.sources.offset_numbers() && asked.is_none();
         let block = match (named, self.options.language) {
-            (None, Language::Linuxcnc | Language::FanucMill) if wanted && said.is_some() => said.unwrap_or_default(),
-            (None, Language::Linuxcnc) if zero && added.is_some() => format!("G43.2 H{}", added.unwrap_or_default()),
-            (None, Language::Grbl) if unmeasured && wanted => {
+            (None, language) if unmeasured && (unnamed || wanted && language == Language::Grbl) => {
                 self.cannot("a tool length that no tool table names here (--tools)", view.source);
                 return self.move_frame(view.state);
             }
+            (None, Language::Linuxcnc | Language::FanucMill) if wanted && said.is_some() => said.unwrap_or_default(),
+            (None, Language::Linuxcnc) if zero && added.is_some() => format!("G43.2 H{}", added.unwrap_or_default()),
             _ if off || zero && named.is_none() && !words.is_some_and(|w| w.g(431)) => "G49".to_string(),
             (Some(n), Language::Linuxcnc | Language::FanucMill) => format!("G43 H{n}"),
             (_, Language::Linuxcnc) => format!("G43.1 {}", self.changed_all(offset)),
@@ -399,12 +404,12 @@ impl Emitter<'_> {
     }
 
     /// The block that asks for the length of a tool of which the source knows no length.
-    fn length_asked(&self, view: &View<'_, '_>) -> Option<String> {
+    fn length_asked(&self, asked: Option<u32>, view: &View<'_, '_>) -> Option<String> {
         let line = self.sources.line(view.source.file, view.source.line)?;
         let code = line.split(['(', ';']).next()?;
         let tool = u32::try_from(view.state.tool).ok().filter(|t| *t > 0);
         let has_h = code.contains(['h', 'H']);
-        match number_of(self.sources, 'h', view.source).or(tool.filter(|_| has_h || self.options.language == Language::FanucMill)) {
+        match asked.or(tool.filter(|_| has_h || self.options.language == Language::FanucMill)) {
             Some(number) => Some(format!("G43 H{number}")),
             // Without H it is the length of the tool in the spindle.
             None => (!has_h && self.options.language == Language::Linuxcnc).then(|| "G43".to_string()),

@@ -369,8 +369,10 @@ impl Lints<'_> {
                 }
             }
             Call::SetFeedMode(_, mode) => {
-                self.feed_per_revolution = *mode == 1;
-                self.flags.set(Flags::REVOLUTION_TOLD, false);
+                // Where a repeated G95 keeps the feed, it was told of that feed.
+                if std::mem::replace(&mut self.feed_per_revolution, *mode == 1) != (*mode == 1) {
+                    self.flags.set(Flags::REVOLUTION_TOLD, false);
+                }
             }
             Call::SetFeedRate(feed) => {
                 self.feed = *feed;
