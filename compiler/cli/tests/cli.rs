@@ -762,9 +762,13 @@ fn offset_numbers_of_a_fanuc_mill_are_written() {
     }
     insta::assert_snapshot!(told);
     // Which number it is, nobody knows here.
-    std::fs::write(at.join("b.nc"), "O1\nG21 G90\n#1=2\nT1 M6\nG43 Z50. H#1\nM30\n").expect("writable");
-    let o = in_folder(at, &["build", "b.nc", "--dialect", "fanuc-mill", "--target", "rs274ngc"]);
-    assert!(!o.status.success() && text(&o.stderr).contains("--tools"), "{}", whole(&o));
+    for program in ["#1=2\nT1 M6\nG43 Z50. H#1\nM30\n", "T1 M6\nG43 Z50. H1\nM98 P2\nH3\nG0 Z9.\nM30\nO2\nG43 Z40.\nM99\n"] {
+        std::fs::write(at.join("b.nc"), format!("O1\nG21 G90\n{program}")).expect("writable");
+        let o = in_folder(at, &["build", "b.nc", "--dialect", "fanuc-mill", "--target", "rs274ngc"]);
+        assert!(!o.status.success() && text(&o.stderr).contains("--tools"), "{}", whole(&o));
+        let o = in_folder(at, &["build", "b.nc", "--dialect", "fanuc-mill", "--target", "rs274ngc", "-t", "t.tbl"]);
+        assert!(o.status.success(), "{}", whole(&o));
+    }
 }
 
 /// U and W of a lathe are X and Z by increments: no axis U or W is written.
