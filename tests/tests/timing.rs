@@ -49,6 +49,21 @@ const BLENDED: &[(&str, &str)] = &[
     ("pocket", "G64 P0.02\nG1 Z-2 F600\nG1 X30 F2400\nY20\nX0\nY4\nX26\nY16\nX4\nY8\nX22\nY12\nX8\nG0 Z5"),
 ];
 
+/// Splines, which the controller drives as pairs of arcs: within 1 %.
+const SPLINES: &[(&str, &str)] = &[
+    ("g5-g64", "G64 P0.01\nF1800\nG5 I0 J15 P0 Q-15 X20 Y10\nG5 P0 Q-15 X40 Y0\nG5 P3 Q3 X70 Y20"),
+    ("g5-g61", "G61\nF1800\nG5 I0 J15 P0 Q-15 X20 Y10\nG1 X0 Y0"),
+    ("g5-g61.1", "G61.1\nF1800\nG5 I0 J15 P0 Q-15 X20 Y10\nG5.1 X60 Y10 I10 J15"),
+    ("g5-cusp", "G64 P0.02\nF3000\nG5 I40 J30 P40 Q30 X1 Y0\nG5 I0 J-5 P-40 Q0 X30 Y0"),
+    ("g5-flat", "G64 P0.02\nF5000\nG5 I30 J1 P-30 Q0.5 X90 Y3\nG5 I30 J1 P-30 Q0.5 X0 Y0"),
+    ("g5-straight", "G64 P0.02\nF3000\nG5 I10 J0 P-10 Q0 X40 Y0\nG1 Y10"),
+    ("g5-inch", "G20 G64 P0.001\nF90\nG5 I0 J0.6 P0 Q-0.6 X0.8 Y0.4\nG5 P0 Q-0.6 X1.6 Y0\nG1 X0\nG21"),
+    ("g5-turned", "G64 P0.05\nG10 L2 P1 R30\nF4000\nG5 I0 J15 P0 Q-15 X20 Y10\nG5 P0 Q-15 X40 Y0\nG10 L2 P1 R0"),
+    ("g5.1", "G64 P0.01\nF1800\nG5.1 X60 Y10 I10 J15\nG5.1 X80 Y0 I10 J-10"),
+    ("g5.2", "G64 P0.01\nF1800\nG5.2 P1 X0 Y0 L3\nX10 Y20 P1\nX30 Y20 P1\nX40 Y0 P1\nX60 Y10 P1\nG5.3"),
+    ("g5.2-weights", "G64\nF3000\nG5.2 P1 X0 Y0 L4\nX10 Y20 P2\nX30 Y20 P0.5\nX40 Y0 P1\nX60 Y10 P3\nX80 Y40 P1\nX90 Y0 P1\nG5.3\nG1 X0"),
+];
+
 /// Programs that are many points.
 fn trains() -> Vec<(String, String)> {
     let mut out = Vec::new();
@@ -126,7 +141,8 @@ fn times_are_those_of_the_controller() {
     let part = root().join("tests/linuxcnc/quick.p21");
     let Some(machine) = Controller::new("@FOLDER@/times.py", &part, "part.ngc") else { return };
     let own = |list: &[(&str, &str)]| list.iter().map(|(n, t)| ((*n).to_string(), (*t).to_string())).collect::<Vec<_>>();
-    let (plain, mut blended) = (own(PLAIN), own(BLENDED));
+    let (mut plain, mut blended) = (own(PLAIN), own(BLENDED));
+    plain.extend(own(SPLINES));
     blended.extend(trains());
     std::fs::create_dir(machine.path("programs")).expect("writable");
     for (name, text) in plain.iter().chain(&blended) {

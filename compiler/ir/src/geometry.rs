@@ -251,7 +251,7 @@ pub fn flatten(op: &Op<'_>, start: &Pose, end: &Pose, tolerance: f64, mut to: im
     }
 }
 
-fn between(start: &Pose, end: &Pose, share: f64, xyz: [f64; 3]) -> Axes {
+pub(crate) fn between(start: &Pose, end: &Pose, share: f64, xyz: [f64; 3]) -> Axes {
     std::array::from_fn(|i| match xyz.get(i) {
         Some(v) => *v,
         None => start.axes[i] + (end.axes[i] - start.axes[i]) * share,

@@ -10,13 +10,15 @@
 mod corner;
 mod piece;
 mod profile;
+mod spline;
 
-use crate::geometry::{ArcShape, Length, flatten, length, norm, sub};
+use crate::geometry::{ArcShape, Length, length};
 use crate::measure::{Rates, Totals, measure, nano, speed};
 use crate::{ArcPlane, Axes, FeedMode, Op, PathMode, Plane, Program, State, View};
 use corner::{Overlap, join};
-use piece::{End, Maker, NORMAL, Piece, Shape, bend, drains, off_line, unit};
+use piece::{End, Maker, NORMAL, Piece, Shape, bend, drains, off_line};
 use profile::{Leg, times};
+use spline::stretches;
 use std::f64::consts::TAU;
 
 /// What the axes of a machine can do, and how its controller plans.
@@ -112,27 +114,24 @@ fn alone(program: &Program, dynamics: &Dynamics, rates: &Rates) -> Vec<f64> {
     let mut cursor = program.cursor();
     while let Some(view) = cursor.next() {
         let t = measure(&view, rates);
-        let piece = view.op.moves().then(|| shaped(&view, dynamics)).flatten();
-        let known = piece.filter(|p| p.most.is_finite());
-        seconds[view.index] = match known {
-            Some(p) if view.op == Op::Rapid => p.length / p.most,
-            Some(p) => (p.length / p.most).max(t.feed_ns as f64 / 1e9),
-            None => (t.rapid_ns + t.feed_ns) as f64 / 1e9,
-        };
+        let (asked, mut least) = ((t.rapid_ns + t.feed_ns) as f64 / 1e9, 0.0);
+        if view.op.moves() {
+            stretches(&view, |part| {
+                let known = shaped(part, dynamics).filter(|p| p.most.is_finite());
+                least += known.map_or(0.0, |p| p.length / p.most);
+            });
+        }
+        seconds[view.index] = if view.op == Op::Rapid && least > 0.0 { least } else { asked.max(least) };
     }
     seconds
 }
 
-/// A move with the limits of the axes.
+/// A move of the planner with the limits of the axes.
 fn shaped(view: &View<'_, '_>, dynamics: &Dynamics) -> Option<Piece> {
     let maker = Maker { dynamics };
     let (from, to) = (view.state.machine(&view.start.axes), view.state.machine(&view.end.axes));
     match &view.op {
         Op::Arc(arc) => maker.arc(arc, &ArcShape::new(arc, view.start, view.end), &from, &to, view.state),
-        Op::Nurbs { .. } => {
-            let (radius, direction) = tightest(view);
-            maker.curve(way(view), radius, direction)
-        }
         _ => maker.line(&from, &to),
     }
 }
@@ -230,24 +229,31 @@ impl<'a> Planner<'a> {
     }
 
     fn moved(&mut self, view: &View<'_, '_>) {
+        if matches!(view.op, Op::Nurbs { .. }) {
+            self.flush();
+        }
+        let asked = if view.op == Op::Rapid { f64::INFINITY } else { asked(view, way(view)) };
+        stretches(view, |part| self.queue(part, asked));
+    }
+
+    /// Takes over a move of the planner.
+    fn queue(&mut self, view: &View<'_, '_>, asked: f64) {
         let (from, to) = (view.state.machine(&view.start.axes), view.state.machine(&view.end.axes));
-        let way = way(view);
         match &view.op {
-            Op::Linear => return self.chain_on(view, &from, &[to], way),
+            Op::Linear => return self.chain_on(view, &from, &[to], asked),
             Op::Arc(arc) => {
                 let shape = ArcShape::new(arc, view.start, view.end);
                 let flat = shape.radius * (1.0 - libm::cos(shape.sweep.abs().min(TAU) / 2.0)) < self.merge;
                 if flat && arc.plane == ArcPlane::Work(Plane::Xy) {
                     let p = shape.point(0.5);
                     let middle = std::array::from_fn(|i| if i < 3 { p[i] } else { (view.start.axes[i] + view.end.axes[i]) / 2.0 });
-                    return self.chain_on(view, &from, &[view.state.machine(&middle), to], way);
+                    return self.chain_on(view, &from, &[view.state.machine(&middle), to], asked);
                 }
             }
             _ => {}
         }
         let piece = shaped(view, self.dynamics);
         self.flush();
-        let asked = if view.op == Op::Rapid { f64::INFINITY } else { asked(view, way) };
         let first = self.shares.len();
         self.shares.push((view.index, 1.0));
         if let Some(piece) = piece {
@@ -256,8 +262,8 @@ impl<'a> Planner<'a> {
     }
 
     /// Adds lines to the chain, or begins a new one with them.
-    fn chain_on(&mut self, view: &View<'_, '_>, from: &Axes, ends: &[Axes], way: f64) {
-        let (state, speed) = (view.state, asked(view, way));
+    fn chain_on(&mut self, view: &View<'_, '_>, from: &Axes, ends: &[Axes], asked: f64) {
+        let (state, way) = (view.state, way(view));
         for (i, end) in ends.iter().enumerate() {
             let goes_on = |c: &Chain| {
                 self.merge > 0.0 && c.feed == state.feed && state.feed_mode == FeedMode::PerTime && c.takes(end, self.merge)
@@ -268,7 +274,7 @@ impl<'a> Planner<'a> {
             let first = self.shares.len();
             self.shares.push((view.index, way));
             let start = if i == 0 { from } else { &ends[i - 1] };
-            let new = || Chain { from: *start, ends: Vec::new(), feed: state.feed, asked: speed, shares: first };
+            let new = || Chain { from: *start, ends: Vec::new(), feed: state.feed, asked, shares: first };
             self.chain.get_or_insert_with(new).ends.push(*end);
         }
         let rotary = (3..9).any(|i| view.start.axes[i] != view.end.axes[i]);
@@ -400,20 +406,4 @@ fn asked(view: &View<'_, '_>, way: f64) -> f64 {
     let speed = speed(view.state, view, angular);
     let inverse = view.state.feed_mode == FeedMode::Inverse && view.state.sync.is_none();
     if inverse { way * speed } else { speed }
-}
-
-/// The tightest radius of a curve, and its last direction.
-fn tightest(view: &View<'_, '_>) -> (f64, [f64; 3]) {
-    let mut points = vec![view.start.xyz()];
-    flatten(&view.op, view.start, view.end, 0.01, |p| points.push([p[0], p[1], p[2]]));
-    let mut radius = f64::INFINITY;
-    for w in points.windows(3) {
-        let (a, b) = (sub(w[1], w[0]), sub(w[2], w[1]));
-        let turn = piece::between(a, b);
-        if turn > 1e-9 {
-            radius = radius.min(norm(a).min(norm(b)) / turn);
-        }
-    }
-    let direction = points.windows(2).next_back().map_or([0.0; 3], |w| unit(sub(w[1], w[0])));
-    (radius.min(1e6), direction)
 }

@@ -39,6 +39,12 @@ impl Made {
         self.0.push_to(Op::Arc(Arc { plane: ArcPlane::Work(Plane::Xy), center, turns: -1 }), &here, Source::default());
         self
     }
+    /// Control points: x, y, weight.
+    fn spline(mut self, order: u32, points: &[[f64; 3]]) -> Made {
+        let [x, y, _] = points[points.len() - 1];
+        self.0.push_to(Op::Nurbs { order, points: points.as_flattened() }, &at(x, y), Source::default());
+        self
+    }
     fn seconds(self, dynamics: Dynamics) -> f64 {
         let rates = Rates { dynamics: Some(dynamics), ..Rates::default() };
         report(&self.0.finish(), &rates).totals.seconds()
@@ -78,6 +84,45 @@ fn figures_of_the_controller() {
     for (name, ours, theirs) in rows {
         assert!((ours - theirs).abs() < 0.005, "{name}: {ours:.4} s, the controller {theirs} s");
     }
+}
+
+/// Splines are planned as the arcs that the controller makes of them: a tight end slows that end alone.
+#[test]
+fn figures_of_the_controller_for_splines() {
+    let three = |path, merge| {
+        let made = Made::new(path, merge)
+            .spline(4, &[[0.0, 0.0, 1.0], [0.0, 15.0, 1.0], [20.0, -5.0, 1.0], [20.0, 10.0, 1.0]])
+            .spline(4, &[[20.0, 10.0, 1.0], [20.0, 25.0, 1.0], [40.0, -15.0, 1.0], [40.0, 0.0, 1.0]])
+            .spline(4, &[[40.0, 0.0, 1.0], [40.0, 15.0, 1.0], [73.0, 23.0, 1.0], [70.0, 20.0, 1.0]]);
+        made.seconds(machine())
+    };
+    let weights = [[10.0, 20.0, 2.0], [30.0, 20.0, 0.5], [40.0, 0.0, 1.0], [60.0, 10.0, 3.0], [80.0, 40.0, 1.0], [90.0, 0.0, 1.0]];
+    let weighted: Vec<[f64; 3]> = [[0.0, 0.0, 1.0]; 2].into_iter().chain(weights).collect();
+    let rows = [
+        ("three G5, G64 P0.01", three(blend(0.01), 0.01), 2.505),
+        ("three G5, G61", three(EXACT, 0.0), 2.481),
+        ("G5.2 with weights, G61", Made::new(EXACT, 0.0).spline(4, &weighted).seconds(machine()), 2.592),
+    ];
+    for (name, ours, theirs) in rows {
+        assert!((ours - theirs).abs() < 0.005, "{name}: {ours:.4} s, the controller {theirs} s");
+    }
+}
+
+#[test]
+fn a_huge_spline_takes_as_long_as_it_is() {
+    let far = -3.2e8;
+    let time = Made::new(STOP, 0.0).line(0.0, far).spline(4, &[[0.0, far, 1.0], [0.0, 0.5, 2.0], [-0.5, 0.0, 1.0], [0.5, 0.0, 1.0]]).seconds(machine());
+    assert!((time / (2.0 * 3.2e8 / 50.0) - 1.0).abs() < 1e-3, "{time}");
+}
+
+/// Without accelerations a spline takes its length / feed, or what the axes need.
+#[test]
+fn splines_at_the_speed_of_the_axes() {
+    let mut d = Dynamics { acceleration: [f64::INFINITY; 9], ..machine() };
+    let straight = |d| Made::new(EXACT, 0.0).spline(3, &[[0.0, 0.0, 1.0], [20.0, 0.0, 1.0], [40.0, 0.0, 1.0]]).seconds(d);
+    assert!((straight(d) - 0.8).abs() < 1e-6, "{}", straight(d));
+    d.velocity[0] = 10.0;
+    assert!((straight(d) - 4.0).abs() < 1e-6, "{}", straight(d));
 }
 
 #[test]
@@ -128,7 +173,7 @@ fn without_limits_nothing_changes() {
 /// A move of one of several sorts.
 fn step() -> impl Strategy<Value = (u8, f64, f64)> {
     let number = prop_oneof![4 => -50.0..50.0f64, 1 => Just(0.0), 1 => -1e-6..1e-6f64, 1 => -1e9..1e9f64];
-    (0u8..6, number.clone(), number)
+    (0u8..7, number.clone(), number)
 }
 
 fn path() -> impl Strategy<Value = PathMode> {
@@ -148,10 +193,16 @@ proptest! {
                 0 => m.rapid(x, y),
                 1 => { m.0.push(Op::Dwell(0.5), Source::default()); m }
                 2 => m.circle(x.abs().max(1e-3)),
+                6 => {
+                    // Longer ones take their time to be measured.
+                    let [x, y] = [x, y].map(|v| v.clamp(-60.0, 60.0));
+                    let by = |x: f64, y: f64, weight: f64| [from[0] + x, from[1] + y, weight];
+                    m.spline(4, &[by(0.0, 0.0, 1.0), by(y, x, 2.0), by(-x, y, 1.0), by(x, y, 1.0)])
+                }
                 _ => m.line(x, y),
             };
             // Corners may be cut by half of each move, and merged lines by what they leave out.
-            least += match kind { 1 => 0.5, 0 | 2 => 0.0, _ if path == STOP => way / 50.0, _ => 0.0 };
+            least += match kind { 1 => 0.5, 0 | 2 | 6 => 0.0, _ if path == STOP => way / 50.0, _ => 0.0 };
         }
         let program = m.0.finish();
         let rates = Rates { dynamics: Some(machine()), ..Rates::default() };

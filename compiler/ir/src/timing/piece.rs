@@ -184,14 +184,6 @@ impl Maker<'_> {
         self.piece(kind, shape.length(), most.min(self.dynamics.tip), acceleration)
     }
 
-    /// A curve of which only its length and its tightest radius are known.
-    pub fn curve(&self, length: f64, radius: f64, direction: V3) -> Option<Piece> {
-        let least = |limit: &Axes| limit[0].min(limit[1]);
-        let acceleration = least(&self.dynamics.acceleration);
-        let most = least(&self.dynamics.velocity).min(libm::sqrt(acceleration * NORMAL * radius));
-        self.piece(Shape::Other(direction), length, most.min(self.dynamics.tip), acceleration)
-    }
-
     fn piece(&self, shape: Shape, length: f64, most: f64, acceleration: f64) -> Option<Piece> {
         let good = length > 1e-12 && length.is_finite() && most > 0.0 && acceleration > 0.0;
         let piece = Piece {
