@@ -86,6 +86,12 @@ fn trains() -> Vec<(String, String)> {
         }
         out.push((format!("wave-{name}"), wave));
     }
+    let mut feeds = "G64 P0.02\n".to_string();
+    for i in 1..=120u32 {
+        let (y, feed) = (f64::from(i * i * 7 % 11) * 0.01, [300, 3000, 800, 1500][(i * i * 5 % 13 % 4) as usize]);
+        let _ = writeln!(feeds, "G1 X{:.1} Y{y:.2} F{feed}", f64::from(i) * 0.5);
+    }
+    out.push(("feeds".into(), feeds));
     // A walk with turns of all angles and steps of all lengths, by a small linear generator.
     let (mut seed, mut at, mut walk) = (274u64, [0.0f64; 2], "G64 P0.03\nF2400\n".to_string());
     let mut next = || {

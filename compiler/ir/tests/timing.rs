@@ -86,6 +86,19 @@ fn figures_of_the_controller() {
     }
 }
 
+/// Where the feed falls, short moves are begun faster than they ask for: the machine brakes at once, not at their ends.
+#[test]
+fn figures_of_the_controller_for_feeds_that_change() {
+    let mut made = Made::new(blend(0.01), 0.01);
+    for i in 1..=80 {
+        let linear = if i % 8 < 4 { 50.0 } else { 5.0 };
+        made.0.push(Op::Feed { linear, angular: 1.0 }, Source::default());
+        made = made.line(f64::from(i) * 0.5, if i % 2 == 1 { 0.1 } else { 0.0 });
+    }
+    let ours = made.seconds(machine());
+    assert!((ours - 5.195).abs() < 0.005, "{ours:.4} s, the controller 5.195 s");
+}
+
 /// Splines are planned as the arcs that the controller makes of them: a tight end slows that end alone.
 #[test]
 fn figures_of_the_controller_for_splines() {

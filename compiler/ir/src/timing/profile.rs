@@ -91,6 +91,12 @@ fn pass(leg: &Leg, start: f64, end: f64, dynamics: &Dynamics) -> Pass {
     if even && 2.0 * s / (start + end) < dynamics.ramp {
         return Pass { seconds: 2.0 * s / (start + end), top: start.max(end), end };
     }
+    // What comes in faster than is asked for here brakes at once.
+    let down = (start * start - leg.target * leg.target) / (2.0 * a);
+    if down > 0.0 && down < s && end <= leg.target {
+        let rest = pass(&Leg { length: s - down, ..*leg }, leg.target, end, dynamics);
+        return Pass { seconds: (start - leg.target) / a + rest.seconds, ..rest };
+    }
     let top = libm::sqrt((start * start + end * end) / 2.0 + a * s).min(leg.target.max(start).max(end));
     let (up, down) = ((top - start) / a, (top - end) / a);
     let level = s - (2.0 * top * top - start * start - end * end) / (2.0 * a);
