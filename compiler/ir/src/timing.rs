@@ -178,6 +178,8 @@ struct Planner<'a> {
     /// Operations, and weights of their shares.
     shares: Vec<(usize, f64)>,
     last: Option<Piece>,
+    /// The piece before the last, its leg and its speed, where the last one begins while it brakes.
+    braking: Option<(Piece, usize, f64)>,
     chain: Option<Chain>,
     path: PathMode,
     /// Motion follows a spindle's angle.
@@ -194,6 +196,7 @@ impl<'a> Planner<'a> {
             legs: Vec::new(),
             shares: Vec::new(),
             last: None,
+            braking: None,
             chain: None,
             path: PathMode::ExactPath,
             bound: false,
@@ -361,10 +364,15 @@ impl<'a> Planner<'a> {
             most = piece.most.min(piece.length / (SAMPLES * cycle));
         }
         let target = piece.asked.min(most);
-        let overlap = match next {
-            Some(b) if piece.end == End::Overlap => Overlap::of(piece, b, [target, b.asked.min(b.most)], [1.0, 0.5]).speed,
-            _ => 0.0,
-        };
+        // The end of a queue may still be cut in half; what has a next one has its length.
+        if let Some((before, leg, speed)) = self.braking.take().filter(|_| next.is_some()) {
+            self.legs[leg].overlap = Overlap::of(&before, piece, [speed, target], [1.0, 1.0]).speed;
+        }
+        let mut overlap = 0.0;
+        if let Some(b) = next.filter(|_| piece.end == End::Overlap) {
+            overlap = Overlap::of(piece, b, [target, b.asked.min(b.most)], [1.0, 0.5]).speed;
+            self.braking = Some((*piece, self.legs.len(), target));
+        }
         self.legs.push(Leg {
             length: piece.length,
             target,

@@ -99,6 +99,21 @@ fn figures_of_the_controller_for_feeds_that_change() {
     assert!((ours - 5.195).abs() < 0.005, "{ours:.4} s, the controller 5.195 s");
 }
 
+/// An arc and the line behind it overlap; the line counts with its whole length, since another move follows it.
+#[test]
+fn figures_of_the_controller_for_short_lines_between_arcs() {
+    let place = |x: f64, y: f64, z: f64| Pose::at([x, y, z, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+    let mut made = Made::new(blend(0.01), 0.01).line(0.0, -3.0);
+    for (x, z, end) in [(0.8, 0.0, -0.05), (1.6, -0.05, 0.0)] {
+        let arc = Op::Arc(Arc { plane: ArcPlane::Work(Plane::Xy), center: [x, 0.0, z], turns: 1 });
+        made.0.push_to(Op::Linear, &place(x, -3.0, z), Source::default());
+        made.0.push_to(arc, &place(x, 3.0, z), Source::default());
+        made.0.push_to(arc, &place(x, -3.0, end), Source::default());
+    }
+    let ours = made.line(2.4, -3.0).seconds(machine());
+    assert!((ours - 2.083).abs() < 0.005, "{ours:.4} s, the controller 2.083 s");
+}
+
 /// Splines are planned as the arcs that the controller makes of them: a tight end slows that end alone.
 #[test]
 fn figures_of_the_controller_for_splines() {
