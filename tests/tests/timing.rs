@@ -45,6 +45,7 @@ const BLENDED: &[(&str, &str)] = &[
     ("line-arc-out", "G64 P0.2\nG1 X20 F3000\nG3 X20 Y20 I-4 J10\nG1 X0"),
     ("arc-arc", "G64 P0.1\nG2 X12 Y0 I6 J0 F3000\nG2 X24 Y0 I6 J0\nG2 X36 Y0 I6 J0"),
     ("trochoid", "G64 P0.01\nG1 Y-3 F3000\nX0.8\nG3 X0.8 Y3 I0 J3\nG3 X0.8 Y-3 I0 J-3 Z-0.05\nG1 X1.6\nG3 X1.6 Y3 I0 J3\nG3 X1.6 Y-3 I0 J-3\nG1 X2.4"),
+    ("helices", "G64 P0.02\nG1 Y10 F2000\nG3 X-10 Y20 I-10 J0 Z-4\nG2 X-20 Y10 I0 J-10 Z-8\nG1 X-30"),
     ("rapids-g64", "G64 P0.1\nG0 X40\nG0 Y30\nG0 X0 Y0 Z-10"),
     ("rapids-free", "G64\nG0 X40\nG0 Y30\nG0 Z-10"),
     ("pocket", "G64 P0.02\nG1 Z-2 F600\nG1 X30 F2400\nY20\nX0\nY4\nX26\nY16\nX4\nY8\nX22\nY12\nX8\nG0 Z5"),

@@ -114,6 +114,23 @@ fn figures_of_the_controller_for_short_lines_between_arcs() {
     assert!((ours - 2.083).abs() < 0.005, "{ours:.4} s, the controller 2.083 s");
 }
 
+/// Where a helix overlaps its neighbour, what it rises does not count as a corner.
+#[test]
+fn figures_of_the_controller_for_helices() {
+    let mut made = Made::new(blend(0.02), 0.02);
+    made.0.push(Op::Feed { linear: 2000.0 / 60.0, angular: 1.0 }, Source::default());
+    let mut made = made.line(0.0, 10.0);
+    let mut to = |op, x: f64, y: f64, z: f64| {
+        made.0.push_to(op, &Pose::at([x, y, z, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]), Source::default());
+    };
+    let quarter = |turns| Op::Arc(Arc { plane: ArcPlane::Work(Plane::Xy), center: [-10.0, 10.0, 0.0], turns });
+    to(quarter(1), -10.0, 20.0, -4.0);
+    to(quarter(-1), -20.0, 10.0, -8.0);
+    to(Op::Linear, -30.0, 10.0, -8.0);
+    let ours = made.seconds(machine());
+    assert!((ours - 3.165).abs() < 0.005, "{ours:.4} s, the controller 3.165 s");
+}
+
 /// Splines are planned as the arcs that the controller makes of them: a tight end slows that end alone.
 #[test]
 fn figures_of_the_controller_for_splines() {

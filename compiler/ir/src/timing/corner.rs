@@ -2,7 +2,7 @@
 //! rounds the corner with an arc within the tolerance, or lets the second begin while the first is braking.
 
 use super::Dynamics;
-use super::piece::{End, NORMAL, Piece, Shape, V3, between, in_plane, trim, unit};
+use super::piece::{End, NORMAL, Piece, Shape, V3, between, in_plane, tangent, trim, unit};
 use crate::geometry::{ArcShape, cross, dot, norm, sub};
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -108,7 +108,7 @@ impl Overlap {
         let longest = (a.length / reach[0]).min(b.length / reach[1]);
         let time = longest.min((reach[0] / acceleration[0]).max(reach[1] / acceleration[1]));
         let mut speed: [f64; 2] = std::array::from_fn(|i| reach[i].min(time * acceleration[i]));
-        let (d1, d2) = (a.tangents()[1], begin(b));
+        let (d1, d2) = (level(a, 1), begin(b));
         let corner = libm::acos((-dot(d1, d2)).clamp(-1.0, 1.0)) / 2.0;
         let (sin, cos) = libm::sincos(corner);
         // The path then misses the corner by a quarter of v²·cos/a.
@@ -120,9 +120,17 @@ impl Overlap {
     }
 }
 
+/// Direction at the start or at the end of a piece; what a helix rises is left out.
+fn level(p: &Piece, at: usize) -> V3 {
+    match &p.shape {
+        Shape::Round(arc) => tangent(&ArcShape { rise: 0.0, end_radius: arc.radius, ..*arc }, at as f64),
+        _ => p.tangents()[at],
+    }
+}
+
 /// Where the acceleration points at the start of a piece: on an arc also inwards.
 fn begin(b: &Piece) -> V3 {
-    let t = b.tangents()[0];
+    let t = level(b, 0);
     let Shape::Round(arc) = &b.shape else { return t };
     let inwards = unit(sub(arc.center, arc.point(0.0)));
     let across = 0.25 * b.asked * b.asked / arc.radius.max(1e-12);
