@@ -1,6 +1,9 @@
 //! Last pass: the chosen configurations become targets, the speed of joints is checked along the real path, and the
 //! figures of the summary are gathered.
 
+use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
+
 use gr_ir::Source;
 use gr_machine::math::{Frame, M3, quaternion_of};
 use gr_machine::Machine;
@@ -29,6 +32,18 @@ pub(crate) struct Emit<'a> {
     external: Vec<f64>,
     /// The probe's input.
     probe: String,
+    /// By file and line: a block may be many pieces, one run often, and the worst of them is told.
+    too_fast: BTreeMap<(u32, u32), TooFast>,
+}
+
+/// A joint that is faster than it can be.
+struct TooFast {
+    source: Option<Source>,
+    joint: usize,
+    /// Its speed over its limit.
+    part: f64,
+    /// Speed of the tool point that fits, mm/s.
+    fits: f64,
 }
 
 /// Sag of a joint move that is worth a word, mm.
@@ -75,6 +90,7 @@ impl<'a> Emit<'a> {
             summary: Summary::default(),
             external: external.collect(),
             probe: String::new(),
+            too_fast: BTreeMap::new(),
         }
     }
 
@@ -147,6 +163,7 @@ impl<'a> Emit<'a> {
                 }
             }
         }
+        self.tell_too_fast(findings);
         Ends { moved: here.is_some(), last, tool, frame }
     }
 
@@ -193,7 +210,7 @@ impl<'a> Emit<'a> {
             return;
         };
         h.at = handed_on(g, h.at, &h.by, m, node.spin);
-        let ((joints, branch), via) = self.follow(g, m, node, h, findings);
+        let ((joints, branch), via) = self.follow(g, m, node, h);
         let to = self.keep(self.target(m.position, &turn, &joints, branch));
         let action = match m.way {
             Way::Arc(i) => {
@@ -213,7 +230,7 @@ impl<'a> Emit<'a> {
     }
 
     /// Joint values along a move: the end, the middle, and whether any joint is too fast.
-    fn follow(&mut self, g: &Gathered, m: &Move, node: &Node, h: &Here, findings: &mut Findings<'_>) -> ((Joints, u8), (Joints, u8)) {
+    fn follow(&mut self, g: &Gathered, m: &Move, node: &Node, h: &Here) -> ((Joints, u8), (Joints, u8)) {
         let path = Path::new(g, self.solver, &h.at, m);
         let mount = Mount::new(g, m, node.spin);
         let looks = path.looks();
@@ -235,7 +252,7 @@ impl<'a> Emit<'a> {
             if worst.0 > NEAR_LIMIT * seconds {
                 worst = self.fastest(&follow, looks, begin, true, |_, _, _| {});
             }
-            self.fast(m, (worst.0 / seconds, worst.1), findings);
+            self.fast(m, (worst.0 / seconds, worst.1));
         }
         if m.rapid {
             self.summary.rapids += 1;
@@ -277,16 +294,28 @@ impl<'a> Emit<'a> {
         worst
     }
 
-    fn fast(&mut self, m: &Move, (part, i): (f64, usize), findings: &mut Findings<'_>) {
+    fn fast(&mut self, m: &Move, (part, joint): (f64, usize)) {
         if self.summary.joint_speed.is_none_or(|(p, ..)| part > p) && part > 0.0 {
-            self.summary.joint_speed = Some((part, i, m.source));
+            self.summary.joint_speed = Some((part, joint, m.source));
         }
         if part > 1.0 + 1e-9 {
-            let joint = &self.machine.joints[i];
+            let found = TooFast { source: m.source, joint, part, fits: m.speed / part };
+            let line = m.source.map_or((0, 0), |s| (s.file.0, s.line));
+            match self.too_fast.entry(line) {
+                Entry::Occupied(mut known) if found.fits < known.get().fits => *known.get_mut() = found,
+                Entry::Occupied(_) => {}
+                Entry::Vacant(new) => _ = new.insert(found),
+            }
+        }
+    }
+
+    /// Joints that are too fast, each block with the feed at which all of it fits.
+    fn tell_too_fast(&mut self, findings: &mut Findings<'_>) {
+        for TooFast { source, joint, part, fits } in std::mem::take(&mut self.too_fast).into_values() {
+            let (limit, joint) = (self.speeds[joint], &self.machine.joints[joint]);
             let per_second = |v: f64| format!("{}/s", joint.show(v));
-            let fits = libm::floor(m.speed / part * FITS * 60.0 * 10.0) / 10.0;
-            let limit = self.speeds[i];
-            findings.say(code::ROBOT_JOINT_SPEED, m.source, &[joint.name.clone(), per_second(limit * part), per_second(limit), format!("{fits} mm/min")]);
+            let fits = libm::floor(fits * FITS * 60.0 * 10.0) / 10.0;
+            findings.say(code::ROBOT_JOINT_SPEED, source, &[joint.name.clone(), per_second(limit * part), per_second(limit), format!("{fits} mm/min")]);
         }
     }
 

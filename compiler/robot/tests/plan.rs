@@ -276,6 +276,42 @@ fn the_feed_that_is_told_fits() {
     assert!(peak <= limit && peak > 0.997 * limit, "{} of {}", peak.to_degrees(), limit.to_degrees());
 }
 
+/// Blocks that become many pieces, and blocks that are run again: after one reading of the messages the program can be done, and
+/// with a twentieth more it can't.
+#[test]
+fn the_feed_that_is_told_fits_all_pieces() {
+    let file = "format = 1\nid = \"shop/slow\"\nextends = \"abb/irb2400\"\norientation = \"abc-euler-xyz\"\n[frames.part]\nposition = [1000, -200, 900]\n\
+        [spindle]\nposition = [0, 0, 110]\nrotation = [0, 80, 0]\n[[tool]]\nnumber = 1\nname = \"m\"\nposition = [0, 0, 85]\n[home]\njoints = [0, -20, 20, 0, 60, 0]\n";
+    let mut machine = gr_machine::parse(FileId(0), file).expect("a good machine file");
+    machine.joints.iter_mut().for_each(|j| j.speed = Some(12f64.to_radians()));
+    let cuts = [
+        ("G1 X160 Y60 Z-10 A12 B8", 4253.0),
+        ("G3 X100 Y150 Z-6 I40 J0", 0.0),
+        ("G5 I20 J30 P-10 Q-30 X160 Y120", 0.0),
+        ("O100 REPEAT [2]\nG1 X160 Y60\nG1 X40 Y240\nO100 ENDREPEAT\nG1 X200", 0.0),
+    ];
+    for (cut, expected) in cuts {
+        let lines: Vec<&str> = cut.lines().collect();
+        let program = |feeds: &[f64]| {
+            let with = |(line, f): (&&str, &f64)| if line.starts_with('O') { (*line).to_string() } else { format!("{line} F{f:.1}") };
+            let body: Vec<String> = lines.iter().zip(feeds).map(with).collect();
+            format!("G21 G90 G54\nT1 M6\nG0 X100 Y150 Z50\nG1 Z0 F300\n{}\nG0 Z100\nM2\n", body.join("\n"))
+        };
+        let mut feeds = vec![60_000.0; lines.len()];
+        let text = program(&feeds);
+        for d in planned(&text, &machine).expect_err("too fast") {
+            assert_eq!(d.code, gr_text::code::ROBOT_JOINT_SPEED, "{cut}: {}", d.message);
+            let line = text[..d.primary().1.start as usize].matches('\n').count() - 4;
+            let help = d.help.clone().expect("the feed that fits");
+            feeds[line] = help.split_whitespace().find_map(|w| w.parse().ok()).unwrap_or_else(|| panic!("{help}"));
+        }
+        assert!(expected == 0.0 || (feeds[0] / expected - 1.0).abs() < 0.005, "{cut}: {feeds:?}");
+        planned(&program(&feeds), &machine).unwrap_or_else(|e| panic!("{cut}: {feeds:?}\n{}", messages(&e, &program(&feeds))));
+        let more: Vec<f64> = feeds.iter().map(|f| f * 1.05).collect();
+        assert!(planned(&program(&more), &machine).is_err(), "{cut}: {more:?}");
+    }
+}
+
 /// A tool beside the axis of the platform goes round with it: no place of it is worked out.
 #[test]
 fn a_tool_beside_the_platform() {
