@@ -437,7 +437,8 @@ pub fn joint_gcode(motion: &Motion, goal: &Goal<'_>, texts: &dyn Sources, name: 
         Err(e) => return Ok(Err(vec![too_many(&e, texts)])),
     };
     let table = TableOptions { decimals: o.decimals.unwrap_or(6), comma: o.decimal_comma };
-    let (text, sources, found) = gcode(&planned.program, &path, table.decimals, texts);
+    let (text, sources, mut found) = gcode(&planned.program, &path, table.decimals, texts);
+    found.extend(left_standing(&planned.program.machine, "joint-gcode", texts));
     let mut artifacts = vec![
         Artifact { lines: crate::emit::main_lines(&motion.program, sources), ..Artifact::new("", text.into_bytes()) },
         Artifact::new("-cartesian.csv", cartesian_csv(&path, table).into_bytes()),
@@ -470,7 +471,7 @@ pub fn setpoints(motion: &Motion, goal: &Goal<'_>, texts: &dyn Sources, name: &s
         Err(e) => return Ok(Err(vec![e.finding(&planned.program.machine, texts)])),
     };
     let mut artifacts = vec![Artifact::new("", made.csv().into_bytes()), Artifact::new(".bin", made.bytes())];
-    if !made.events.is_empty() {
+    if !made.events.is_empty() || !planned.program.machine.cell.external.is_empty() {
         artifacts.push(Artifact::new("-events.csv", made.events_csv(&planned.program).into_bytes()));
     }
     let seconds = made.rows.len().saturating_sub(1) as f64 * interval;
@@ -484,9 +485,17 @@ pub fn setpoints(motion: &Motion, goal: &Goal<'_>, texts: &dyn Sources, name: &s
         artifacts.push(c.table);
     }
     let mut notes = planned.warnings;
+    notes.extend(left_standing(&planned.program.machine, "set-point", texts));
     notes.extend(corners_kept(&planned.program, texts));
     notes.extend(made.findings(&planned.program, texts));
     Ok(Ok(Made { artifacts, summary, notes }))
+}
+
+/// Where rails and positioners have to stand, which programs of the machine's own joints don't move.
+fn left_standing(machine: &Machine, programs: &str, texts: &dyn Sources) -> Vec<Diagnostic> {
+    let (file, span) = texts.place(gr_ir::Source::default());
+    let one = |e: &gr_machine::External| Diagnostic::new(gr_text::code::VENDOR_EXTERNAL_STANDS, file, span, &[e.joint.name.clone(), e.joint.show(e.position), programs.into()]);
+    machine.cell.external.iter().map(one).collect()
 }
 
 /// Says, where the program begins to allow rounded corners, that there are none.
@@ -504,14 +513,17 @@ fn corners_kept(program: &gr_robot::RobotProgram, texts: &dyn Sources) -> Option
 pub fn verify(unit: &crate::pipeline::Unit, machine: &Machine, args: &crate::options::VerifyArgs) -> Result<Result<gr_robot::verify::Report, String>, Checked> {
     use crate::emit::Reference;
     let name = crate::emit::stem(&unit.path);
-    if args.options.reference == Some(Reference::Ufsc2016) {
-        let motion = if unit.exchange { crate::exchange::ufsc2016(unit)?.0 } else { crate::pipeline::motion(unit, None)?.0 };
-        return Ok(published(&motion, machine));
-    }
-    let (mut motion, _) = crate::pipeline::motion(unit, None)?;
+    let published_way = args.options.reference == Some(Reference::Ufsc2016);
+    let mut motion = if published_way && unit.exchange { crate::exchange::ufsc2016(unit)?.0 } else { crate::pipeline::motion(unit, None)?.0 };
     let goal = Goal { target: "verify", options: &args.options, machine: Some(machine), from_line: None, file: None };
     if let Err(found) = take_job(&mut motion, &goal) {
         return Err(Checked { sources: motion.sources, found, ..Checked::nothing() });
+    }
+    if published_way {
+        return match published(&motion, machine) {
+            Ok(made) => Ok(made),
+            Err(found) => Err(Checked { sources: motion.sources, found, ..Checked::nothing() }),
+        };
     }
     let texts = crate::emit::texts(&motion);
     match own_plan(&motion, &goal, &texts, &name, 1.0) {
@@ -524,33 +536,36 @@ pub fn verify(unit: &crate::pipeline::Unit, machine: &Machine, args: &crate::opt
     }
 }
 
-/// The run of UFSC 2016: its solver, point after point.
-fn published(motion: &Motion, machine: &Machine) -> Result<gr_robot::verify::Report, String> {
-    use gr_robot::reference::{Damped, follow, frames};
+/// The run of UFSC 2016: its solver, point after point; the part clamped as the job has it.
+fn published(motion: &Motion, machine: &Machine) -> Result<Result<gr_robot::verify::Report, String>, Vec<Diagnostic>> {
+    use gr_robot::reference::{Damped, Found, aims, follow};
     use gr_robot::verify::{Point, Report};
     let machine = gr_machine::as_published(machine);
-    let mut points = Vec::new();
-    let mut sources = Vec::new();
-    let mut cursor = motion.program.cursor();
-    while let Some(view) = cursor.next() {
-        if view.op.moves() {
-            let axis = view.end.tool_axis.unwrap_or([0.0, 0.0, 1.0]);
-            points.push((view.end.xyz(), axis.map(|v| -v)));
-            sources.push(view.source);
-        }
+    let aims = aims(&machine, &motion.program, &motion.setups);
+    let idle = motion.setups.iter().enumerate().filter(|(i, _)| !aims.begun.contains(i)).map(|(_, s)| s);
+    let texts = crate::emit::texts(motion);
+    let never = |s: &gr_robot::Setup| {
+        let (file, span) = texts.place(s.place);
+        Diagnostic::new(gr_text::code::JOB_BAD_VALUE, file, span, &[s.never_begins()])
+    };
+    let found: Vec<Diagnostic> = idle.map(never).collect();
+    if !found.is_empty() {
+        return Err(found);
     }
-    let place = [(1..=points.len(), machine.cell.part_in_base())];
-    let aims = frames(&machine, &place, &points);
     let start = (machine.joints.len() == 6).then(|| [0.0, 0.0, 0.0, 180.0, -45.0, 0.0].map(f64::to_radians).to_vec());
-    let found = follow(&machine, &aims, &Damped { start, ..Damped::default() }).map_err(|lost| format!("point {}: {}", lost.point + 1, lost.why))?;
-    let point = |((aim, f), source): ((&gr_machine::math::Frame, gr_robot::reference::Found), gr_ir::Source)| Point {
+    let frames: Vec<gr_machine::math::Frame> = aims.points.iter().map(|(frame, _)| *frame).collect();
+    let solved = match follow(&machine, &frames, &Damped { start, ..Damped::default() }) {
+        Ok(solved) => solved,
+        Err(lost) => return Ok(Err(format!("point {}: {}", lost.point + 1, lost.why))),
+    };
+    let point = |((aim, source), f): (&(gr_machine::math::Frame, gr_ir::Source), Found)| Point {
         target: aim.position,
         reached: [0, 1, 2].map(|i| aim.position[i] - f.error[i]),
         joints: f.joints,
         seconds: None,
-        source: Some(source),
+        source: Some(*source),
     };
-    Ok(Report::new(&machine, aims.iter().zip(found).zip(sources).map(point).collect()))
+    Ok(Ok(Report::new(&machine, aims.points.iter().zip(solved).map(point).collect())))
 }
 
 /// The files of a report, in a folder.

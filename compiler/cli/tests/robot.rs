@@ -764,6 +764,69 @@ fn ufsc2016_from_the_command_line() {
     }
 }
 
+/// Part 2 on the Adept One in the three clampings of table 5.1, by a job: the row of table 5.3, and the printed points. A bad job is told.
+#[test]
+fn ufsc2016_in_three_clampings() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_string();
+    let cell = "format = 1\nid = \"shop/one\"\ntitle = \"One\"\nextends = \"adept/one\"\n[frames.table]\nposition = [300, 300, 745]\n[frames.part]\nposition = [0, 10, 0]\n";
+    std::fs::write(path("cell.toml"), cell).unwrap();
+    let job = three_clampings([-95.0, 0.0, 0.0]).replace("position = [0, 0,", "position = [0, 10,");
+    std::fs::write(path("job.toml"), &job).unwrap();
+    let made = |job: &str| {
+        run(&["verify", THREE_SIDES, "--step-overlap", "percent", "--step-units", "step-modeler", "--machine", &path("cell.toml"), "--reference", "ufsc2016", "--job", &path(job), "-o", &path("out")])
+    };
+    for (name, content, code, word) in [
+        ("missing.toml", None, "E0820", "missing.toml"),
+        ("nonsense.toml", Some("nonsense".to_string()), "E0550", "nonsense.toml"),
+        ("steps.toml", Some(job.replace("#615", "#616")), "E0551", "#616"),
+    ] {
+        content.iter().for_each(|c| std::fs::write(path(name), c).unwrap());
+        let bad = made(name);
+        let told = text(&bad.stdout) + &text(&bad.stderr);
+        assert!(!bad.status.success() && told.contains(code) && told.contains(word), "{name}: {told}");
+    }
+    let made = made("job.toml");
+    let told = text(&made.stdout) + &text(&made.stderr);
+    for row in ["3106 points", "X        0.002      0.096     -0.097", "Y        0.003      0.097     -0.096", "Z       -0.001      0.082     -0.079"] {
+        assert!(told.contains(row), "{row}: {told}");
+    }
+    let printed = std::fs::read_to_string(root().join("tests/golden/ufsc2016/appC_ex2_adept_one.csv")).unwrap();
+    let ours = std::fs::read_to_string(folder.path().join("out/example2_3caras-errors.csv")).unwrap();
+    let ours: Vec<Vec<f64>> = ours.lines().skip(1).map(|l| l.split(',').map(|v| v.parse().unwrap()).collect()).collect();
+    let rows: Vec<Vec<f64>> = printed.lines().skip(1).map(|l| l.split(',').map(|v| v.parse().unwrap()).collect()).collect();
+    let good = rows.iter().filter(|row| (0..3).all(|i| (ours[row[0] as usize - 1][8 + i] - row[7 + i]).abs() <= 1e-6)).count();
+    assert!(rows.len() == 39 && good >= 35, "{good} of {}", rows.len());
+}
+
+/// Rails and positioners stand still: targets of joint values say where, in what they write and beside it.
+#[test]
+fn joint_targets_say_where_external_axes_stand() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_string();
+    let cell = |rail: f64| {
+        format!(
+            "format = 1\nid = \"shop/rail\"\ntitle = \"Rail\"\nextends = \"abb/irb2400\"\n[frames.part]\nposition = [{}, -100, 650]\n[home]\njoints = [0, -20, 20, 0, 60, 0]\n\
+             [[external]]\nname = \"E1\"\ntype = \"prismatic\"\ncarries = \"machine\"\naxis = [1, 0, 0]\nmin = 0\nmax = 2000\nposition = {rail}\n\
+             [[external]]\nname = \"E2\"\ntype = \"revolute\"\ncarries = \"part\"\naxis = [0, 0, 1]\nmin = -360\nmax = 360\nposition = 0\n",
+            900.0 + rail
+        )
+    };
+    std::fs::write(path("cell.toml"), cell(450.0)).unwrap();
+    std::fs::write(path("part.ngc"), "G21 G90 G54\nG0 X0 Y0 Z20\nG1 Z0 F600\nM2\n").unwrap();
+    for (target, holds) in [("joint-gcode", "part.out"), ("setpoints", "part-events.csv")] {
+        let made = run(&["build", &path("part.ngc"), "--machine", &path("cell.toml"), "--target", target, "-o", &path("part.out"), "--message-format", "short"]);
+        let told = text(&made.stderr);
+        assert!(made.status.success(), "{told}");
+        assert_eq!(told.matches("E0641").count(), 2, "{target}: {told}");
+        assert!(told.contains("`E1` must stand at 450 mm") && told.contains("`E2` must stand at 0°"), "{target}: {told}");
+        let written = std::fs::read_to_string(path(holds)).unwrap();
+        for place in ["E1 carries the robot: it must stand at 450 mm before the start", "E2 carries the part: it must stand at 0 degrees before the start"] {
+            assert_eq!(written.matches(place).count(), 1, "{target}: {written}");
+        }
+    }
+}
+
 /// The planar arm stands where its file says: what rests on coordinates that nothing has named is told, and a cut that begins
 /// elsewhere is led up to.
 #[test]

@@ -92,6 +92,12 @@ pub struct External {
 }
 
 impl External {
+    /// For the head of a program that doesn't move it, in letters that every controller has.
+    pub fn stands(&self) -> String {
+        let (name, carried) = (&self.joint.name, if self.carries_machine { "robot" } else { "part" });
+        let place = self.joint.show(self.position).replace('°', " degrees");
+        format!("{name} carries the {carried}: it must stand at {place} before the start, the program does not move it")
+    }
     /// What it does to what it carries.
     fn motion(&self) -> Frame {
         if self.joint.kind == JointKind::Revolute {

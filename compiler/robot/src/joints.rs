@@ -378,6 +378,8 @@ pub fn gcode(program: &RobotProgram, path: &JointPath, decimals: usize, sources:
     let letters = ['X', 'Y', 'Z', 'A', 'B', 'C', 'U', 'V', 'W'];
     let words: Vec<char> = machine.joints.iter().zip(letters).map(|(j, l)| j.word.unwrap_or(l)).collect();
     let head = format!("({}: joint positions of {}; degrees and mm, inverse time)\nG21 G90 G40 G49 G80\nG61\nG93\n", plain(&program.name), plain(&machine.id));
+    let stands = machine.cell.external.iter().fold(String::new(), |text, e| text + &format!("({})\n", plain(&e.stands())));
+    let head = head + &stands;
     let mill = machine.kind == gr_machine::Kind::Mill;
     let head = if mill { head + &begins(program, &words, decimals) } else { head };
     let from = vec![None; head.lines().count()];

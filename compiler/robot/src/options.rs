@@ -42,6 +42,13 @@ pub struct Setup {
     pub place: Source,
 }
 
+impl Setup {
+    /// What is wrong where no move is made in it.
+    pub fn never_begins(&self) -> String {
+        format!("setup `{}` never begins: the program makes no move there", self.name)
+    }
+}
+
 /// What a job file can call a workingstep.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Workingstep {

@@ -6,8 +6,14 @@
 //! Three things differ from its printed equations, because its printed results need them: equation 18 is applied as
 //! (JᵀJ + D²)⁻¹Jᵀe, the tests look at the greatest component instead of the norm, and D² holds the squares of λ.
 
+use std::collections::BTreeSet;
+
+use gr_ir::{Program, Source};
 use gr_machine::math::{Frame, M3, norm, product, rot_x, rot_y, rot_z, rotate, rotation_vector, solve, transpose};
 use gr_machine::{Chain, KinematicsError, Machine, differential};
+
+use crate::settle::{main_line, setup_at};
+use crate::{Setup, Workingstep};
 
 /// Constants of the solver.
 #[derive(Clone, PartialEq, Debug)]
@@ -164,9 +170,39 @@ fn step(machine: &Machine, q: &[f64], e: &[f64; 6], limits: &[(f64, f64)], setti
 pub fn frames(machine: &Machine, placements: &[(std::ops::RangeInclusive<usize>, Frame)], points: &[([f64; 3], [f64; 3])]) -> Vec<Frame> {
     let six = machine.joints.len() >= 6;
     let place = |n: usize| placements.iter().find(|(r, _)| r.contains(&n)).map_or(Frame::IDENTITY, |(_, f)| *f);
-    let frame = |(i, (position, direction)): (usize, &([f64; 3], [f64; 3]))| {
-        let placed = place(i + 1);
-        Frame { turn: tool_turn(rotate(&placed.turn, *direction), six), position: placed.apply(*position) }
-    };
-    points.iter().enumerate().map(frame).collect()
+    points.iter().enumerate().map(|(i, point)| aim(&place(i + 1), point, six)).collect()
+}
+
+/// A point of a placed part in the base: position in the part, and direction of the tool there.
+fn aim(placed: &Frame, (position, direction): &([f64; 3], [f64; 3]), six_axes: bool) -> Frame {
+    Frame { turn: tool_turn(rotate(&placed.turn, *direction), six_axes), position: placed.apply(*position) }
+}
+
+/// Where a program's moves lead to.
+#[derive(Clone, PartialEq, Debug, Default)]
+pub struct Aims {
+    /// The tool in the base, mm, and where each comes from.
+    pub points: Vec<(Frame, Source)>,
+    /// Setups of the job that have a point, by their numbers.
+    pub begun: BTreeSet<usize>,
+}
+
+/// The ends of a program's moves, the part placed as the machine has it, or as the setups of a job do.
+pub fn aims(machine: &Machine, program: &Program, setups: &[Setup]) -> Aims {
+    let (own, six) = (machine.cell.part_in_base(), machine.joints.len() >= 6);
+    let mut out = Aims::default();
+    let mut workingstep = None;
+    let mut cursor = program.cursor();
+    while let Some(view) = cursor.next() {
+        workingstep = Workingstep::begun_by(&view.op).or(workingstep);
+        if !view.op.moves() {
+            continue;
+        }
+        let setup = setup_at(setups, workingstep.as_ref(), || main_line(program, view.source));
+        out.begun.extend(setup);
+        let placed = setup.and_then(|i| setups[i].part).unwrap_or(own);
+        let axis = view.end.tool_axis.unwrap_or([0.0, 0.0, 1.0]);
+        out.points.push((aim(&placed, &(view.end.xyz(), axis.map(|v| -v)), six), view.source));
+    }
+    out
 }

@@ -742,10 +742,13 @@ impl Setpoints {
     }
 
     /// What is no motion, as a table: number of the set-point, time, line, what, and the signal or routine of the
-    /// machine file for it.
+    /// machine file for it. Before it, where external axes have to stand.
     pub fn events_csv(&self, program: &RobotProgram) -> String {
         let cell = |text: String| format!("\"{}\"", text.replace('"', "'").replace(['\n', '\r'], " "));
         let mut out = String::from("setpoint,t,line,what,signal\n");
+        for e in &program.machine.cell.external {
+            let _ = writeln!(out, "0,{:.6},,{},\"\"", 0.0, cell(e.stands()));
+        }
         for event in &self.events {
             let Some(step) = program.steps.get(event.step) else { continue };
             let line = step.source.map_or(String::new(), |s| (s.line + 1).to_string());

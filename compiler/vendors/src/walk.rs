@@ -282,12 +282,8 @@ impl<'p> Cx<'p> {
     /// Where external axes have to stand that the language has no word for.
     fn stand_still(&mut self, body: &mut dyn Body) {
         for e in self.machine.cell.external.iter().filter(|_| !self.traits.external) {
-            let (name, place) = (&e.joint.name, e.joint.show(e.position));
-            self.say(code::VENDOR_EXTERNAL_STANDS, &[name.clone(), place.clone(), self.traits.title.into()]);
-            let carried = if e.carries_machine { "robot" } else { "part" };
-            // Few controllers have the letter.
-            let place = place.replace('°', " degrees");
-            body.op(self, Op::Comment(&format!("{name} carries the {carried}: it must stand at {place} before the start, the program does not move it")));
+            self.say(code::VENDOR_EXTERNAL_STANDS, &[e.joint.name.clone(), e.joint.show(e.position), self.traits.title.into()]);
+            body.op(self, Op::Comment(&e.stands()));
         }
     }
 
@@ -618,6 +614,15 @@ impl<'p> Cx<'p> {
             self.say(code::VENDOR_SIGNAL_NAME, &[name.into(), word.into(), self.traits.title.into(), why.into()]);
         }
         name
+    }
+
+    /// The name of a routine on the controller, which can't be one of the language's own words.
+    pub fn routine<'n>(&mut self, name: &'n str, reserved: &[&str]) -> &'n str {
+        if reserved.contains(&name.to_ascii_uppercase().as_str()) {
+            let why = "it is a word of the language, no name of a routine";
+            self.say(code::VENDOR_SIGNAL_NAME, &[name.into(), "routine".into(), self.traits.title.into(), why.into()]);
+        }
+        self.known(name, "routine")
     }
 
     /// An analog value as a share of the range, 0 to 1.

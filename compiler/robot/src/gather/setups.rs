@@ -125,8 +125,7 @@ impl Gather<'_> {
                 continue;
             }
             if !self.begun.contains(&i) && !self.findings.bad() {
-                let what = format!("setup `{}` never begins: the program makes no move there", s.name);
-                self.findings.say(code::JOB_BAD_VALUE, Some(s.place), &[what]);
+                self.findings.say(code::JOB_BAD_VALUE, Some(s.place), &[s.never_begins()]);
             }
         }
         self.frames_overruled();
