@@ -151,7 +151,7 @@ static KINEMATICS: &[Key] = &[
     key("links", Numbers(0), "`planar-3r`: upper arm, forearm, tool; `scara`: two links, mm."),
     key("height", ANY, "`scara`: height of the tool at stroke 0, mm."),
     key("lengths", Numbers(0), "`opw`: a1 a2 b c1 c2 c3 c4; `ur`: d1 a2 a3 d4 d5 d6, mm."),
-    key("offsets", Numbers(6), "`opw`: joint value at which the model angle is 0, degrees."),
+    key("offsets", Numbers(6), "`opw`: model angle = sign · joint value − offset, degrees: it is 0 where the joint stands at sign · offset."),
     key("signs", Numbers(6), "`opw`: direction of each joint, 1 or -1."),
     key("rotary", Tables(ROTARY), "`five-axis`: two rotary axes, the one nearer to the bed first."),
     key("pivot", NOT_BELOW, "`five-axis`: from the crossing of the head's axes to the spindle nose, mm."),
