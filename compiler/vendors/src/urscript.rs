@@ -63,6 +63,8 @@ struct Writer {
     done: Vec<String>,
     /// The last move ends in a blend: the next must stand in the same script.
     blended: bool,
+    /// The last move stops for want of room: the script ends there.
+    full: bool,
     /// Tool and payload in force.
     tool: Vec<String>,
     /// Where the last move ends.
@@ -92,6 +94,7 @@ impl Writer {
             most,
             done: Vec::new(),
             blended: false,
+            full: false,
             tool: Vec::new(),
             last: String::new(),
         }
@@ -120,11 +123,11 @@ impl Writer {
 
     /// Closes a script that has no room for so many more lines. Where the tool must be is looked at before the next goes on.
     fn part(&mut self, lines: u64) {
-        if self.blended || self.last.is_empty() || self.room(lines) {
+        if self.blended || self.last.is_empty() || (!self.full && self.room(lines)) {
             return;
         }
         self.done.push(std::mem::take(&mut self.text));
-        (self.lines, self.points, self.marks) = (0, 0, 0);
+        (self.lines, self.points, self.marks, self.full) = (0, 0, 0, false);
         let guard = format!("if point_dist(get_actual_tcp_pose(),{})>0.001:", self.last);
         let stop = ["  popup(\"this part goes on where the one before ended\",\"wrong place\",False,True,blocking=True)", "  halt", "end"];
         for text in self.tool.clone().iter().map(String::as_str).chain([guard.as_str()]).chain(stop) {
@@ -203,7 +206,9 @@ impl Body for Writer {
             Op::Linear { to, speed, zone } => {
                 self.moved(cx, 1, to);
                 // Remarks may come before the move that the blend goes over into.
-                let radius = if self.room(2 * ROOM) { blend(cx, zone) } else { "0".into() };
+                let (radius, room) = (blend(cx, zone), self.room(2 * ROOM));
+                self.full = !room && radius != "0";
+                let radius = if room { radius } else { "0".into() };
                 self.blended = radius != "0";
                 let text = format!("movel({},a=1.2,v={},t=0,r={radius})", self.last, single(speed / 1000.0));
                 self.line(cx, &text);

@@ -176,6 +176,7 @@ fn urscript_in_parts() {
         assert!(text.lines().count() <= 60, "{name}: {}", text.lines().count());
         let last = text.lines().rfind(|l| l.contains("move")).unwrap();
         assert!(last.contains("r=0)") || last.contains("movej"), "{last}");
+        assert_eq!(text.lines().filter(|l| l.contains("movel(") && l.contains("r=0)")).count(), 1, "{name} stops at its end alone");
         if i > 0 {
             let before = files[i - 1].1.lines().rfind(|l| l.contains("movel(")).unwrap();
             let guard = text.lines().find(|l| l.contains("point_dist(")).unwrap();
