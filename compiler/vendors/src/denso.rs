@@ -23,13 +23,30 @@ static TRAITS: Traits = Traits {
     unverified: "speeds in mm/s by MPS, and joint values in straight moves",
 };
 
+/// Commands, functions and words of the language; a program of the name `MAIN` is the controller's own.
+const RESERVED: &[&str] = &[
+    "ABS", "ACCEL", "ACOS", "AND", "APPROACH", "ARCHMOVE", "AREA", "AREAPOS", "AREASIZE", "ARRIVE", "ASC", "ASIN", "ATN", "ATN2", "AVEC", "CALL",
+    "CASE", "CHANGETOOL", "CHANGEWORK", "CLEARLOG", "CREATESEM", "CURACC", "CURDEC", "CUREXJ", "CURFIG", "CURJACC", "CURJDEC", "CURJNT", "CURJSPD",
+    "CURPOS", "CURSPD", "CURTOOL", "CURTRN", "CURWORK", "DECEL", "DEF", "DEFDBL", "DEFEND", "DEFINT", "DEFIO", "DEFJNT", "DEFPOS", "DEFSNG",
+    "DEFSTR", "DEFTRN", "DEFVEC", "DEGRAD", "DELAY", "DELETESEM", "DEPART", "DESTJNT", "DESTPOS", "DESTTRN", "DIM", "DIST", "DO", "DRAW", "DRIVE",
+    "DRIVEA", "ELSE", "ELSEIF", "END", "ENDIF", "ERL", "ERR", "EXIT", "EXP", "FALSE", "FIG", "FIGAPRL", "FIGAPRP", "FLUSH", "FOR", "GETENV",
+    "GIVEARM", "GIVESEM", "GIVEVIS", "GOHOME", "GOSUB", "GOTO", "HALT", "HOLD", "IF", "IFEND", "IN", "INIT", "INPUT", "INT", "INTERRUPT", "IO",
+    "IOBLOCK", "JACCEL", "JDECEL", "JSPEED", "KILL", "KILLALL", "LEN", "LET", "LETA", "LETENV", "LETF", "LETJ", "LETO", "LETP", "LETR", "LETRX",
+    "LETRY", "LETRZ", "LETT", "LETX", "LETY", "LETZ", "LINEINPUT", "LOG", "LOG10", "LOOP", "LPRINT", "MAGNITUDE", "MAIN", "MAX", "MIN", "MOD",
+    "MOTOR", "MOVE", "MPS", "NEXT", "NOT", "OFF", "ON", "OR", "OUT", "OVEC", "P2J", "P2T", "PI", "POSCLR", "POSRX", "POSRY", "POSRZ", "POSX",
+    "POSY", "POSZ", "POW", "PRINT", "PRINTBUZZER", "PRINTDBG", "PRINTLBL", "PRINTMSG", "PROGRAM", "PVEC", "RADDEG", "REM", "REPEAT", "RESET",
+    "RESETAREA", "RESUME", "RETURN", "RND", "ROTATE", "ROTATEH", "RUN", "RVEC", "SELECT", "SET", "SETAREA", "SGN", "SIN", "SPEED", "SQR",
+    "STARTLOG", "STATUS", "STEP", "STOP", "STOPEND", "STOPLOG", "STRPOS", "SUSPEND", "SUSPENDALL", "T2J", "T2P", "TAKEARM", "TAKESEM", "TAKEVIS",
+    "TAN", "THEN", "TIMER", "TINV", "TO", "TOOL", "TOOLPOS", "TRUE", "UNTIL", "VAL", "WAIT", "WEND", "WHILE", "WORK", "WORKPOS", "WRITE", "XOR",
+];
+
 impl Language for Denso {
     fn id(&self) -> &'static str {
         "denso-pac"
     }
 
     fn emit(&self, program: &RobotProgram, sources: &dyn Sources, options: &Options) -> Output {
-        let mut names = Names::new(Rule { longest: 32, reserved: &["PROGRAM", "END", "MOVE", "MAIN"], upper: false });
+        let mut names = Names::new(Rule { longest: 32, reserved: RESERVED, upper: false });
         let name = names.give(&program.name.to_lowercase(), "p");
         let writer = Writer { out: Lines::new("  ", "'"), speed: String::new() };
         let file = format!("{name}.pac");
@@ -55,6 +72,7 @@ impl Writer {
 
 impl Plain for Writer {
     const PAUSE: &'static str = "STOP";
+    const RESERVED: &'static [&'static str] = RESERVED;
 
     fn out(&mut self) -> &mut Lines {
         &mut self.out

@@ -14,6 +14,8 @@ use gr_robot::{RobotProgram, Target};
 pub(crate) trait Plain {
     /// Waits for the operator.
     const PAUSE: &'static str;
+    /// Words of the language, in capitals, that no routine can be called by.
+    const RESERVED: &'static [&'static str] = &[];
 
     /// Where lines go.
     fn out(&mut self) -> &mut Lines;
@@ -70,7 +72,7 @@ impl<W: Plain> Body for W {
             }
             Op::Set { name, value, word } => set(self, cx, name, value, word),
             Op::Call { name, value } => {
-                let name = cx.known(name, "routine").to_string();
+                let name = cx.routine(name, W::RESERVED).to_string();
                 self.out().line(cx, &W::call(&name, value.map(|v| num(v, 6))));
             }
             Op::Wait { name, on, timeout } => wait(self, cx, name, on, timeout),

@@ -24,13 +24,32 @@ static TRAITS: Traits = Traits {
     unverified: "points written within moves, without flags of the arm",
 };
 
+/// Statements, functions and words of the language.
+const RESERVED: &[&str] = &[
+    "ABORTMOTION", "ABS", "ACCEL", "ACCELR", "ACCELS", "ACOS", "AGL", "AGLTOPLS", "AND", "AOPEN", "ARC", "ARC3", "ARCH", "ARM", "ARMCLR", "ARMDEF",
+    "ARMSET", "ASC", "ASIN", "ATAN", "ATAN2", "ATCLR", "ATRQ", "BASE", "BCLR", "BGO", "BMOVE", "BOOLEAN", "BOPEN", "BOX", "BOXCLR", "BOXDEF", "BRAKE",
+    "BSET", "BTST", "BYTE", "CALL", "CASE", "CHDIR", "CLEARPOINTS", "CLOSE", "CLOSECOM", "CLOSENET", "CLS", "CONT", "COPY", "COS", "CP", "CTRESET",
+    "CURPOS", "CURVE", "CVMOVE", "CX", "CY", "CZ", "CU", "CV", "CW", "DATE", "DEGTORAD", "DEL", "DIM", "DIST", "DO", "DOUBLE", "ECP", "ECPCLR",
+    "ECPSET", "ELBOW", "ELSE", "ELSEIF", "ENDIF", "EOF", "ERR", "ERROR", "EXIT", "EXP", "FALSE", "FEND", "FINE", "FIX", "FOR", "FUNCTION", "GLOBAL",
+    "GO", "GOSUB", "GOTO", "HALT", "HAND", "HERE", "HOFS", "HOME", "HOMECLR", "HOMESET", "HORDR", "IF", "IN", "INBCD", "INERTIA", "INPOS", "INPUT",
+    "INT", "INTEGER", "INW", "JA", "JRANGE", "JS", "JT", "JUMP", "JUMP3", "JUMP3CP", "KILL", "LEN", "LIMZ", "LINE", "LOADPOINTS", "LOCAL", "LOCALCLR",
+    "LOCALDEF", "LOF", "LONG", "LOOP", "MCAL", "MCORDR", "MEMIN", "MEMOFF", "MEMON", "MEMOUT", "MEMSW", "MOD", "MOTOR", "MOVE", "MYTASK", "NEXT",
+    "NOT", "OFF", "OLRATE", "ON", "ONERR", "OPENCOM", "OPENNET", "OPORT", "OR", "OUT", "OUTW", "PAGL", "PALLET", "PASS", "PAUSE", "PDEF", "PDEL",
+    "PG_SCAN", "PLANE", "PLS", "POWER", "PPLS", "PRESERVE", "PRINT", "PTCLR", "PTRQ", "PULSE", "QUIT", "RADTODEG", "RANDOMIZE", "RANGE", "READ",
+    "REAL", "REDIM", "RESET", "RESTART", "RESUME", "RETURN", "RND", "ROBOT", "ROPEN", "SAVEPOINTS", "SELECT", "SEND", "SENSE", "SETCOM", "SETNET",
+    "SETSW", "SFREE", "SGN", "SHORT", "SHUTDOWN", "SIGNAL", "SIN", "SLOCK", "SPEED", "SPEEDR", "SPEEDS", "SQR", "STAT", "STEP", "STRING", "SW",
+    "SYNCLOCK", "SYNCUNLOCK", "TAN", "TARGETOK", "TCLIM", "TCSPEED", "TGO", "THEN", "TILL", "TIME", "TLCLR", "TLDEF", "TLSET", "TMOUT", "TMOVE",
+    "TMR", "TMRESET", "TO", "TOFF", "TON", "TOOL", "TRAP", "TRUE", "TW", "UBOUND", "UNTIL", "UOPEN", "VAL", "WAIT", "WAITNET", "WAITPOS", "WAITSIG",
+    "WEIGHT", "WEND", "WHERE", "WHILE", "WINDOW", "WITH", "WOPEN", "WRIST", "WRITE", "XOR", "XQT", "XY", "XYLIM",
+];
+
 impl Language for Spel {
     fn id(&self) -> &'static str {
         "spel"
     }
 
     fn emit(&self, program: &RobotProgram, sources: &dyn Sources, options: &Options) -> Output {
-        let mut names = Names::new(Rule { longest: 32, reserved: &["FUNCTION", "FEND", "GO", "MOVE", "ARC", "ARC3"], upper: false });
+        let mut names = Names::new(Rule { longest: 32, reserved: RESERVED, upper: false });
         let name = names.give(&program.name, "p");
         let writer = Writer { out: Lines::new("  ", "'"), angles: [0.0; 3], set: Default::default() };
         let file = format!("{name}.prg");
@@ -67,6 +86,7 @@ impl Writer {
 
 impl Plain for Writer {
     const PAUSE: &'static str = "Pause";
+    const RESERVED: &'static [&'static str] = RESERVED;
 
     fn out(&mut self) -> &mut Lines {
         &mut self.out

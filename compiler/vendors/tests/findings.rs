@@ -219,6 +219,25 @@ fn names_that_rapid_has_itself() {
     assert!(told[0].contains("Load_2") && told[1].contains("MoveL_2") && told[2].contains("offs_2"), "{told:?}");
 }
 
+/// Statements of SPEL+ and PAC are no names of programs, nor of routines.
+#[test]
+fn names_that_are_statements() {
+    for (target, words) in [("spel", ["tool", "local", "Speed", "Arc3"]), ("denso-pac", ["speed", "set", "ChangeTool", "move"])] {
+        for word in words {
+            let (id, home, _) = robot_of(target);
+            let mut b = Builder::new(machine(id), home);
+            b.program.name = word.into();
+            let out = run(target, &b, true);
+            let other = format!("{}_2", if target == "spel" { word.to_string() } else { word.to_lowercase() });
+            assert!(out.findings.iter().any(|f| f.code.def().code == "E0628" && f.message.contains(&other)), "{target} {word}: {}", told(&out));
+            assert!(String::from_utf8_lossy(&out.files[0].bytes).contains(&other));
+            let called = |name: &str| one(target, signal_of("M6", None, Signal { routine: Some(name.into()), ..Signal::default() }));
+            assert!(told(&called(word)).contains("E0621") && told(&called(word)).contains("it is a word of the language"), "{target} {word}: {}", told(&called(word)));
+            assert!(!told(&called("SPSPEED")).contains("E0621"), "{target}");
+        }
+    }
+}
+
 /// Errors have room of their own beside any number of warnings.
 #[test]
 fn warnings_hide_no_error() {
