@@ -17,6 +17,9 @@ use gr_text::{Diagnostic, FileId, code};
 /// Line number of operations that no source line asked for.
 pub const INSERTED: u32 = u32::MAX;
 
+/// An axis that makes a smaller part of the height of a tilted tool has too far to go for it.
+const STEEP: f64 = 0.1;
+
 /// Heights that differ by less, mm, are the same.
 const SAME_HEIGHT: f64 = 1e-6;
 
@@ -35,6 +38,8 @@ pub struct Options<'a> {
     pub room: Option<Room>,
     /// Direction from the tool point to the spindle in the work frame, where a machine is known; else it is Z.
     pub tool: Option<&'a ToolDirection<'a>>,
+    /// Where rotary axes turn alone, the slides stay that stand at a place of the machine, and the tool point doesn't: a mill's.
+    pub slides: bool,
 }
 
 type V3 = [f64; 3];
@@ -60,7 +65,7 @@ pub struct Restart {
     pub program: Program,
     /// Warnings.
     pub notes: Vec<Diagnostic>,
-    /// Where the tool is brought, axis by axis in the work frame in force, mm and rad. None: it stays there.
+    /// Where the program has brought the tool, axis by axis in the work frame in force, mm and rad, as far as that is a place for it to go to. None: it stays there.
     pub goal: [Option<f64>; 9],
     /// Where the program itself first sends each axis in the work frame; none: nowhere by a word of its own.
     pub named: [Option<f64>; 9],
@@ -113,34 +118,72 @@ pub fn from_line(
     (pose.tool_axis, pose.spin) = next.map_or((None, None), |s| (s.end.tool_axis, s.end.spin));
     let lathe = approach::is_lathe(program);
     let tilt = options.tool.filter(|_| !lathe).and_then(|tool| tool(&pose, &state)).filter(|up| up[2] < 1.0 - UPRIGHT);
+    let up = tilt.unwrap_or([0.0, 0.0, 1.0]);
+    // Axes that its height is made of; the others go beside.
+    let along = |i: &usize| up.get(*i).is_some_and(|v| v.abs() > UPRIGHT);
     let used = axes_used(program);
-    let places = places(program, found.index, (lathe, options.stored), &used, sources);
+    let places = Said { program, sources, used: &used, lathe, stored: options.stored, tool: options.tool.filter(|_| options.slides) }.before(found.index);
     let Ahead { mut needed, named } = ahead(program, found.index, &places, sources);
-    let cuts = needed[..3].contains(&true);
+    let sinks = (0..3).any(|i| along(&i) && needed[i]);
     // Along a tilted tool there is no way to one of them alone.
-    (0..3).for_each(|i| needed[i] |= tilt.is_some() && cuts && places[i] == Place::Named);
-    let tilted = |i: usize| cuts && tilt.is_some_and(|up| up.get(i).is_some_and(|v| v.abs() > UPRIGHT));
-    // At the height of a cut that is known, a place beside it that isn't.
-    let down_there = !lathe && needed[2] && places[2] == Place::Named;
+    (0..3).filter(along).for_each(|i| needed[i] |= sinks && places[i] == Place::Named);
+    let sure = |i: &usize| match places[*i] {
+        Place::Named => needed[*i] || !options.unsure[*i],
+        Place::Led => !needed[*i] && !options.unsure[*i],
+        _ => false,
+    };
+    let blind: Vec<usize> = (0..3).filter(along).filter(|i| !sure(i)).collect();
+    // The one that is not known takes the tool to the safe height, if it does so within reach. Between a retract and an index behind it,
+    // and where the program comes to the part, it stays with the machine.
+    let led = (0..3).any(|i| along(&i) && places[i] == Place::Led);
+    let lifts = matches!(*blind, [i] if up[i].abs() > STEEP && !(led && places[i] == Place::Machine));
+    // At the height of a cut that is known, a place beside it that isn't: the tool goes down once the program has said that too.
+    let aside = |i: &usize| matches!(places[*i], Place::Machine | Place::Probed) && !lathe && *i < 3 && !along(i) && used[*i] && sinks && blind.is_empty();
+    let late: Vec<usize> = (0..3).filter(aside).collect();
+    let goes_down_late = tilt.is_none() && rapid_says(program, found.index, &late, sources);
     let lost = |i: &usize| match places[*i] {
-        Place::Machine | Place::Probed => used[*i] && (needed[*i] || *i < 2 && down_there),
-        Place::Never => tilted(*i),
-        Place::Named => false,
+        Place::Machine | Place::Probed => used[*i] && (needed[*i] || aside(i) && !goes_down_late),
+        Place::Never => tilt.is_some() && along(i) && needed[*i],
+        Place::Led => needed[*i],
+        Place::Named => along(i) && needed[*i] && !blind.is_empty() && !lifts,
     };
     let lost: Vec<String> = (0..9).filter(lost).map(|i| char::from(AXIS_LETTERS[i].to_ascii_uppercase()).to_string()).collect();
     if !lost.is_empty() {
         return Err(vec![Diagnostic::new(code::FROM_LINE_PLACE_OF_MACHINE, place.0, place.1, &[lost.join(" ")])]);
     }
+    // The tool does not go down where nobody knows what is below it.
+    let doubtful = |i: usize| match places[i] {
+        Place::Named | Place::Led => options.unsure[i],
+        Place::Machine | Place::Probed => !lathe,
+        Place::Never => false,
+    };
+    let beside = (0..3).any(|i| !along(&i) && doubtful(i) && !needed[i] && used[i]);
+    let stays_up = beside && !sinks;
+    // Before an index to come, the slides stay where the machine stands: what the program has named in the part is not there.
+    let turns = options.slides && (stays_up || !blind.is_empty()) && turns_first(program, found.index, &blind, sources);
+    let known: [bool; 9] = std::array::from_fn(|i| match i {
+        0..3 if (turns || tilt.is_some() && !blind.is_empty() && !lifts) && !needed[i] => false,
+        i if along(&i) => sure(&i) && !stays_up && late.is_empty() && (blind.is_empty() || lifts),
+        // Its rotary axes turn where the machine stands, and the program goes on from there.
+        _ => sure(&i) || places[i] == Place::Named && beside && sinks && i < 3,
+    });
+    // On a lathe no height is safe, and a cut has none that nobody named: the program begins as it begins itself. Beside a tilted tool it
+    // does so too, where nothing of the place is known.
+    let lifted: [bool; 3] = std::array::from_fn(|i| {
+        let one = blind == [i] && lifts && (tilt.is_none() || (0..3).any(|k| sure(&k)));
+        let high = along(&i) && blind.is_empty() && stays_up;
+        !lathe && !turns && used[i] && (!needed[i] && (one || high) || along(&i) && !late.is_empty())
+    });
     let length = length_to_come(program, found.index, &state);
     let heights = Heights { program, state: &state, begins: &pose, tilt, sources };
-    let own = heights.of(&pose, &state);
+    let own = if tilt.is_none() || blind.is_empty() { heights.of(&pose, &state) } else { f64::NEG_INFINITY };
     let safe = match (options.room, options.safe_z) {
         (Some(room), _) => room.safe,
         // What is asked for is the height of the tool; where its length is not in force yet, the spindle goes higher.
         (None, Some(z)) => z + length.unwrap_or(0.0),
         (None, None) => {
             let top = heights.top().unwrap_or(own);
-            if tilt.is_none() || cuts {
+            if tilt.is_none() || (0..3).any(|i| known[i] && along(&i) || lifted[i]) {
                 notes.push(Diagnostic::new(code::FROM_LINE_NO_SAFE_HEIGHT, place.0, place.1, &[heights.show(top)]));
             }
             top
@@ -162,25 +205,12 @@ pub fn from_line(
         let (file, span) = sources.place(*source);
         notes.push(Diagnostic::new(code::FROM_LINE_OFFSET_KEPT, file, span, &[]));
     }
-    // The tool does not go down where nobody knows what is below it.
-    let doubtful = |i: usize| match places[i] {
-        Place::Named => options.unsure[i],
-        Place::Machine | Place::Probed => !lathe,
-        Place::Never => false,
-    };
-    let beside = (0..2).any(|i| doubtful(i) && !needed[i] && used[i]);
-    let down = beside && needed[2];
-    let known = std::array::from_fn(|i| match i {
-        // Its rotary axes turn where the machine stands, and the program goes on from there.
-        0..3 if tilt.is_some() && !needed[i] => false,
-        2 if beside && !down => false,
-        _ => places[i] == Place::Named && (needed[i] || !options.unsure[i] || down && i < 2),
-    });
-    // On a lathe no height is safe, and a cut has none that nobody named: the program begins as it begins itself.
-    let wait = !known[2] && !lathe && !needed[2] && used[2] && tilt.is_none();
-    let from = From { index: found.index, line, known, wait, lathe, tilt };
+    let height: f64 = (0..3).map(|i| up[i] * pose.axes[i]).sum();
+    let rise = room.safe - height;
+    let lift = std::array::from_fn(|i| lifted[i].then(|| if blind.is_empty() { rise * up[i] } else { rise / up[i] }));
+    let from = From { index: found.index, line, known, lift, late, up, lathe, tilt };
     let restart = build(program, &from, &state, &pose, &room, sources);
-    let goal = std::array::from_fn(|i| known[i].then_some(pose.axes[i]));
+    let goal = std::array::from_fn(|i| (known[i] || sure(&i)).then_some(pose.axes[i]));
     let (shifted, kept) = (shifted(program, found.index, sources), set_from_here(program, found.index, sources));
     let offsets = offsets(&restart);
     Ok(Restart { program: restart, notes, goal, named, shifted, kept, offsets, room })
@@ -397,8 +427,12 @@ struct From {
     line: u32,
     /// Axes that a block before has brought to a place in the work frame.
     known: [bool; 9],
-    /// The tool stays at the safe height until a block says how high.
-    wait: bool,
+    /// The tool stays at the safe height, by so much along each axis that makes it, until a block names that, mm.
+    lift: [Option<f64>; 3],
+    /// Axes that a block has to name before the tool goes down from there, where none names the height before it cuts.
+    late: Vec<usize>,
+    /// Direction from the tool point to the spindle.
+    up: V3,
     lathe: bool,
     /// Direction of a tilted tool.
     tilt: Option<V3>,
@@ -413,37 +447,87 @@ enum Place {
     Machine,
     /// A probe stopped there.
     Probed,
+    /// It was named, and an index has led the tool away from there since. With the next rapid it comes back.
+    Led,
 }
 
 /// What a program has said about the places of its axes before an operation. Of axes that it never named, and of those
 /// that G28, G30 and G53 brought to a place of the machine, the numbers are only what a simulation takes them for, but where
 /// such places are `stored` in a file; where a probe stopped and how high the tool is after a tool change, only the machine knows.
-fn places(program: &Program, index: usize, (lathe, stored): (bool, bool), used: &[bool; 9], sources: &dyn Sources) -> [Place; 9] {
-    let mut places = [Place::Never; 9];
-    for s in program.steps().take(index) {
-        if !s.op.moves() {
-            if matches!(s.op, Op::ToolChange(_)) && !lathe && places[2] != Place::Never {
-                places[2] = Place::Machine;
+struct Said<'a> {
+    program: &'a Program,
+    sources: &'a dyn Sources,
+    used: &'a [bool; 9],
+    lathe: bool,
+    /// As in [`Options`].
+    stored: bool,
+    /// Of a machine whose slides stay where rotary axes turn alone.
+    tool: Option<&'a ToolDirection<'a>>,
+}
+
+impl Said<'_> {
+    fn before(&self, index: usize) -> [Place; 9] {
+        let mut places = [Place::Never; 9];
+        // Axes X Y Z of which the machine has the place, stored or not.
+        let mut apart = [true; 3];
+        let mut cursor = self.program.cursor();
+        while let Some(s) = cursor.next().filter(|s| s.index < index) {
+            if !s.op.moves() {
+                if matches!(s.op, Op::ToolChange(_)) && !self.lathe && places[2] != Place::Never {
+                    places[2] = Place::Machine;
+                    apart[2] = true;
+                }
+                continue;
             }
-            continue;
-        }
-        let words = Words::at(sources, s.source.file, s.source.line);
-        let hidden = words.is_some_and(|w| !w.names_axes()) && is_hidden(program, s.index);
-        let fixed = hidden || words.is_some_and(|w| [280, 300, 530].into_iter().any(|g| w.g(g)));
-        let home = fixed && !hidden && words.is_some_and(|w| !w.g(530) && !w.names_axes());
-        for (i, letter) in AXIS_LETTERS.iter().enumerate() {
-            // The simulation goes on from where it takes a probe to stop.
-            let moves = s.start.axes[i] != s.end.axes[i] && places[i] != Place::Probed;
-            if home && (used[i] || !stored) || moves || words.is_some_and(|w| w.has(*letter)) {
-                places[i] = match s.op {
-                    Op::Probe(_) => Place::Probed,
-                    _ if hidden || fixed && !stored => Place::Machine,
-                    _ => Place::Named,
-                };
+            let words = Words::at(self.sources, s.source.file, s.source.line);
+            let hidden = words.is_some_and(|w| !w.names_axes()) && is_hidden(self.program, s.index);
+            let fixed = hidden || words.is_some_and(|w| [280, 300, 530].into_iter().any(|g| w.g(g)));
+            let home = fixed && !hidden && words.is_some_and(|w| !w.g(530) && !w.names_axes());
+            for (i, letter) in AXIS_LETTERS.iter().enumerate() {
+                // The simulation goes on from where it takes a probe to stop.
+                let moves = s.start.axes[i] != s.end.axes[i] && places[i] != Place::Probed;
+                if home && (self.used[i] || !self.stored) || moves || words.is_some_and(|w| w.has(*letter)) {
+                    places[i] = match s.op {
+                        Op::Probe(_) => Place::Probed,
+                        _ if hidden || fixed && !self.stored => Place::Machine,
+                        _ => Place::Named,
+                    };
+                    if let Some(apart) = apart.get_mut(i) {
+                        *apart = fixed;
+                    }
+                }
+            }
+            if apart.contains(&true) && self.leads_away(&s, fixed) {
+                (0..3).filter(|i| !apart[*i]).for_each(|i| places[i] = Place::Led);
             }
         }
+        places
     }
-    places
+
+    /// Whether a move turns rotary axes alone, to or from where the tool is tilted: the place of slides that stay is no place of the part
+    /// any more.
+    fn leads_away(&self, s: &gr_ir::View<'_, '_>, fixed: bool) -> bool {
+        let still = |axes: std::ops::Range<usize>| axes.into_iter().all(|i| s.start.axes[i] == s.end.axes[i]);
+        let named = || Words::at(self.sources, s.source.file, s.source.line).is_some_and(|w| !fixed && AXIS_LETTERS[..3].iter().any(|l| w.has(*l)));
+        let tilted = |tool: &ToolDirection<'_>| [s.start, s.end].into_iter().any(|p| tool(p, s.state).is_some_and(|up| up[2] < 1.0 - UPRIGHT));
+        !still(3..6) && still(0..3) && !named() && self.tool.is_some_and(tilted)
+    }
+}
+
+/// Whether rapids name all of these axes, from an operation on, before a cut.
+fn rapid_says(program: &Program, index: usize, axes: &[usize], sources: &dyn Sources) -> bool {
+    let mut left = axes.to_vec();
+    for s in program.steps().skip(index).filter(|s| s.op.moves()).take_while(|s| s.op == Op::Rapid) {
+        left.retain(|i| !says(*i, &s.start, &s.end, s.source, sources));
+    }
+    left.is_empty()
+}
+
+/// Whether rotary axes turn from an operation on before a block names these axes.
+fn turns_first(program: &Program, index: usize, axes: &[usize], sources: &dyn Sources) -> bool {
+    let moves = program.steps().skip(index).filter(|s| s.op.moves());
+    let named = |s: &gr_ir::Step<'_>| (0..3).any(|i| (axes.is_empty() || axes.contains(&i)) && says(i, &s.start, &s.end, s.source, sources));
+    moves.take_while(|s| !named(s)).any(|s| s.start.axes[3..6] != s.end.axes[3..6])
 }
 
 /// What a program does with its axes from an operation on.
@@ -493,12 +577,11 @@ fn says(axis: usize, start: &Pose, end: &Pose, source: Source, sources: &dyn Sou
 }
 
 fn build(program: &Program, from: &From, state: &State, pose: &Pose, room: &Room, sources: &dyn Sources) -> Program {
-    let safe = room.safe;
     let index = from.index;
     // A place that no program names, so that every axis of the approach moves and has its word.
     let used = axes_used(program);
     // A rotary axis that the program has named but never moves may stand elsewhere too.
-    let approached: [bool; 9] = std::array::from_fn(|i| i == 2 && from.wait || from.known[i] && (i < 6 || used[i]));
+    let approached: [bool; 9] = std::array::from_fn(|i| from.known[i] && (i < 6 || used[i]) || from.lift.get(i).is_some_and(Option::is_some));
     let far: Axes = std::array::from_fn(|i| if approached[i] { pose.axes[i] + 777.25 } else { pose.axes[i] });
     let named = names_system(program, index, from.line, sources);
     let mut begins = State::default();
@@ -533,31 +616,44 @@ fn build(program: &Program, from: &From, state: &State, pose: &Pose, room: &Room
     let path = if says_path(program, index, from.line, sources) { Some(source) } else { Some(path).filter(|_| state.path != PathMode::default()) };
     restore.modes(state, path);
     restore.outputs(program, index);
-    let mut waiting = from.wait;
+    let mut waiting = from.lift;
     let mut goal = *pose;
-    if waiting {
-        goal.axes[2] = safe;
-    }
+    waiting.iter().zip(&mut goal.axes).for_each(|(by, v)| *v += by.unwrap_or(0.0));
     let surface = program.steps().any(|s| matches!(s.op, Op::SpindleMode { surface: Some(_), .. }));
     let turned = orientations(program, index);
     let start = |restore: &mut Restore| restore.spindles(state, surface, &turned);
     if from.lathe && !from.known[2] {
         start(&mut restore);
     } else {
-        approach::Approach { program, index, state, goal, approached, tilt: from.tilt, room }.make(&mut restore, start);
+        approach::Approach { program, index, state, goal, approached, stays_up: from.lift != [None; 3], tilt: from.tilt, room }.make(&mut restore, start);
     }
-    let mut out = restore.out;
+    let mut late = from.late.clone();
     let mut rest = program.cursor_at(index);
     while let Some(view) = rest.next() {
-        waiting &= !(view.op.moves() && says(2, view.start, view.end, view.source, sources));
         let mut end = *view.end;
-        if waiting {
-            // Up there, until a block says how high.
-            end.axes[2] += safe - pose.axes[2];
+        if view.op.moves() {
+            (0..3).filter(|i| says(*i, view.start, view.end, view.source, sources)).for_each(|i| waiting[i] = None);
+            let mut left = (0..3).filter(|i| waiting[*i].is_some());
+            if let (Some(i), None) = (left.next(), left.next()) {
+                // Beside a tilted tool the others make height too.
+                let rises: f64 = (0..3).filter(|k| *k != i).map(|k| from.up[k] * (view.end.axes[k] - view.start.axes[k])).sum();
+                waiting[i] = waiting[i].map(|by| by - rises / from.up[i]);
+            }
         }
-        out.push_to(view.op, &end, view.source);
+        // Up there, until a block says how high.
+        (0..3).for_each(|i| end.axes[i] += waiting[i].unwrap_or(0.0));
+        restore.out.push_to(view.op, &end, view.source);
+        if !late.is_empty() && view.op.moves() {
+            late.retain(|i| !says(*i, view.start, view.end, view.source, sources));
+            if late.is_empty() && waiting != [None; 3] {
+                waiting = [None; 3];
+                let approached = std::array::from_fn(|i| i == 2);
+                let down = approach::Approach { program, index: view.index, state: view.state, goal: *view.end, approached, stays_up: false, tilt: None, room };
+                down.make(&mut restore, |_| ());
+            }
+        }
     }
-    out.finish()
+    restore.out.finish()
 }
 
 /// Work offsets that were last set from where the tool stood (G10 L20): what the machine has by then, and the line that set it.

@@ -374,4 +374,25 @@ fn what_a_restart_tells() {
     let text = "G21 G90 F100\nG0 X0 Y0 Z5\nG53 G0 Z-3\nG1 X10\nX20\nM2\n";
     assert_eq!(codes(text, 5), ["E0619"]);
     assert!(codes(text, 2).is_empty());
+    // A rapid names X and Y before the cut, the cut does, or only one of them is named.
+    let beside = |end: &str| format!("G21 G90 G54 F100\nG0 Z5\nG0 X0 Y0\nG0 Z0.5\nG1 X20\nG53 G0 X0 Y0\nM0\n{end}\nM2\n");
+    assert!(codes(&beside("G0 X30 Y30\nG1 X50"), 8).is_empty());
+    assert_eq!(codes(&beside("G1 X30 Y30\nX50"), 8), ["E0619"]);
+    assert_eq!(codes(&beside("G0 X30\nG1 Y50"), 8), ["E0619"]);
+}
+
+/// Where the height is known and X and Y are at places of the machine, the tool goes down once a rapid has named them.
+#[test]
+fn goes_down_where_x_and_y_are_named() {
+    let text = "G21 G90 G54 F100\nG0 Z5\nG0 X0 Y0\nG0 Z0.5\nG1 X20\nG53 G0 X0 Y0\nM0\nG0 X30\nG0 Y40\nG1 X50\nM2\n";
+    let program = reader::read(text, &setup()).expect("it runs");
+    let texts = Texts::new([(FileId(0), text)]);
+    let o = from_line::Options { safe_z: Some(9.0), ..from_line::Options::default() };
+    let restart = from_line::from_line(&program, FileId(0), 8, &o, &texts).expect("a start").program;
+    let way: Vec<(bool, [f64; 3])> = restart.steps().filter(|s| s.op.moves()).map(|s| (s.op.feeds(), s.end.xyz())).collect();
+    let places: Vec<[f64; 2]> = way.iter().map(|(_, [x, _, z])| [*x, *z]).collect();
+    let of = |i: usize| way[i];
+    assert_eq!(way.len(), 6, "{places:?}");
+    assert!(of(0).1[2] == 9.0 && of(1).1[0] == 30.0 && of(1).1[2] == 9.0, "{way:?}");
+    assert_eq!([of(2), of(3), of(4), of(5)], [(false, [30.0, 40.0, 9.0]), (false, [30.0, 40.0, 2.5]), (true, [30.0, 40.0, 0.5]), (true, [50.0, 40.0, 0.5])]);
 }

@@ -18,6 +18,8 @@ pub(super) struct Approach<'a> {
     pub goal: Pose,
     /// Axes that go there; of the others nobody knows where they are.
     pub approached: [bool; 9],
+    /// It goes no further down than the safe height.
+    pub stays_up: bool,
     /// Direction from the tool point to the spindle, where that isn't Z.
     pub tilt: Option<V3>,
     /// How high and how far out.
@@ -83,7 +85,7 @@ impl Approach<'_> {
         let safe = self.room.safe;
         let over = |to: f64| move |i: usize| self.goal.axes[i] + up[i] * (to - height);
         ways.go(3..9, |i| self.goal.axes[i]);
-        if (0..3).any(|i| !self.approached[i] && up[i].abs() > UPRIGHT) {
+        if self.stays_up || (0..3).any(|i| !self.approached[i] && up[i].abs() > UPRIGHT) {
             // The program says that height itself before it cuts; up there it goes on.
             ways.start = ways.places.len();
             return ways.go(0..3, |i| self.goal.axes[i]);

@@ -22,19 +22,28 @@ pub(super) struct Heights<'a> {
 impl Heights<'_> {
     /// Of a place.
     pub fn of(&self, pose: &Pose, state: &State) -> f64 {
-        let machine = state.machine(&pose.axes);
+        let mut machine = state.machine(&pose.axes);
         match self.tilt {
             None => machine[2] - self.state.machine(&[0.0; 9])[2],
             Some(up) => {
+                // Another length is one along the tool.
+                let longer: V3 = std::array::from_fn(|i| state.tool_offset[i] - self.state.tool_offset[i]);
+                (0..3).for_each(|i| machine[i] -= longer[i]);
                 let at = self.state.work_frame(&machine);
-                (0..3).map(|i| at[i] * up[i]).sum()
+                longer[2] + (0..3).map(|i| at[i] * up[i]).sum::<f64>()
             }
         }
     }
 
-    /// Of the highest point of the program; none where it has no moves.
+    /// Of the highest point of the program; none where it has no moves. Where the tool stands otherwise all the time but in cuts, no
+    /// rapid tells what is high enough: the points of all moves count.
     pub fn top(&self) -> Option<f64> {
-        self.fold(f64::max, |view| view.op.moves().then(|| self.of(view.end, view.state)))
+        let any = |view: &View<'_, '_>| view.op.moves().then(|| self.of(view.end, view.state));
+        let rapid = |view: &View<'_, '_>| (view.op == Op::Rapid && self.stands_so(view)).then_some(0.0);
+        if self.tilt.is_none() || self.fold(f64::max, rapid).is_none() {
+            return self.fold(f64::max, any);
+        }
+        self.fold(f64::max, |view| any(view).filter(|_| self.stands_so(view)))
     }
 
     /// How low its rapids go sideways.
@@ -50,7 +59,7 @@ impl Heights<'_> {
                     (0..3).any(|i| (by[i] - along * up[i]).abs() > 1e-6)
                 }
             };
-            (view.op == Op::Rapid && sideways).then(|| self.of(view.start, view.state).min(self.of(view.end, view.state)))
+            (view.op == Op::Rapid && sideways && self.stands_so(view)).then(|| self.of(view.start, view.state).min(self.of(view.end, view.state)))
         })
     }
 
@@ -73,14 +82,16 @@ impl Heights<'_> {
         found
     }
 
-    /// Beside a tilted tool only moves of the part count in which it stands so.
+    /// Beside a tilted tool only moves of the part count.
     fn counts(&self, view: &View<'_, '_>) -> bool {
-        if self.tilt.is_none() {
-            return true;
-        }
-        let turned = [view.start, view.end].iter().any(|p| p.axes[3..6] != self.begins.axes[3..6] || p.tool_axis != self.begins.tool_axis);
         let words = || Words::at(self.sources, view.source.file, view.source.line);
         let machine = || words().is_some_and(|w| [280, 300, 530].into_iter().any(|g| w.g(g)) || !w.names_axes() && is_hidden(self.program, view.index));
-        !turned && !machine()
+        self.tilt.is_none() || !machine()
+    }
+
+    /// Whether the tool stands as it does where the program begins, all along a move.
+    fn stands_so(&self, view: &View<'_, '_>) -> bool {
+        let turned = [view.start, view.end].iter().any(|p| p.axes[3..6] != self.begins.axes[3..6] || p.tool_axis != self.begins.tool_axis);
+        self.tilt.is_none() || !turned
     }
 }

@@ -171,8 +171,9 @@ impl<'a> Stands<'a> {
         if !comes_from_afar {
             self.rests_on_strayed(view, &from, &end, &to)?;
         }
-        if view.source.line == INSERTED && view.op == Op::Rapid && to[..3] == [true; 3] && !turns {
-            self.way.extend(self.level_with(&from, &end, state));
+        if view.source.line == INSERTED && view.op == Op::Rapid && !turns {
+            let level = self.level_with(&from, &end, state);
+            self.way.extend(level.filter(|at| (0..3).all(|i| to[i] || (at[i] - from[i]).abs() < LED)));
         }
         match goal {
             Goal::Work => {
@@ -212,6 +213,9 @@ impl<'a> Stands<'a> {
                 (0..3).filter(|i| to[*i]).for_each(|i| self.strayed[i] = None);
             }
         }
+        if comes && view.source.line != INSERTED {
+            self.no_lower(&mut end, view, &to, by, state);
+        }
         if matches!(goal, Goal::Work) {
             (0..3).filter(|i| to[*i] && end[*i] == b1[*i]).for_each(|i| self.strayed[i] = None);
             (0..3).filter(|i| to[*i] && !increments).for_each(|i| self.beside[i] = 0.0);
@@ -219,6 +223,18 @@ impl<'a> Stands<'a> {
         let op = if lags || end != *b1 { bent(view, &from, &end)? } else { view.op };
         self.last = Last::Moved(end, *state, self.place);
         Ok((op, Pose { axes: end, ..*view.end }))
+    }
+
+    /// Coming to a part that is tilted, the tool goes no lower than where the control believes it in what is not named: the slides of a
+    /// retract are that high above a part that stands straight.
+    fn no_lower(&self, end: &mut Axes, view: &View<'_, '_>, to: &[bool; 9], by: [By; 3], state: &State) {
+        let led = |i: &usize| !to[*i] && (by[*i] == By::Machine || self.strayed[*i].is_some());
+        let Some(up) = self.up(end, state).filter(|up| up[2] < 1.0 - 1e-9) else { return };
+        let mut other = *end;
+        (0..3).filter(led).for_each(|i| other[i] = view.end.axes[i] + self.beside[i]);
+        if (0..3).map(|i| up[i] * (other[i] - end[i])).sum::<f64>() > LED {
+            *end = other;
+        }
     }
 
     /// What the control believes where the axes that a move names have come to places of the machine.
