@@ -210,7 +210,7 @@ pub fn from_line(
     let lift = std::array::from_fn(|i| lifted[i].then(|| if blind.is_empty() { rise * up[i] } else { rise / up[i] }));
     let from = From { index: found.index, line, known, lift, late, up, lathe, tilt };
     let restart = build(program, &from, &state, &pose, &room, sources);
-    let goal = std::array::from_fn(|i| (known[i] || sure(&i)).then_some(pose.axes[i]));
+    let goal = std::array::from_fn(|i| (known[i] || tilt.is_some() && sure(&i)).then_some(pose.axes[i]));
     let (shifted, kept) = (shifted(program, found.index, sources), set_from_here(program, found.index, sources));
     let offsets = offsets(&restart);
     Ok(Restart { program: restart, notes, goal, named, shifted, kept, offsets, room })
@@ -640,8 +640,11 @@ fn build(program: &Program, from: &From, state: &State, pose: &Pose, room: &Room
                 waiting[i] = waiting[i].map(|by| by - rises / from.up[i]);
             }
         }
-        // Up there, until a block says how high.
-        (0..3).for_each(|i| end.axes[i] += waiting[i].unwrap_or(0.0));
+        // Up there, until a block says how high. What is there but for rounding is there.
+        for (i, by) in (0..3).filter_map(|i| Some((i, waiting[i]?))) {
+            let (here, there) = (restore.out.pose().axes[i], end.axes[i] + by);
+            end.axes[i] = if (there - here).abs() < SAME_HEIGHT { here } else { there };
+        }
         restore.out.push_to(view.op, &end, view.source);
         if !late.is_empty() && view.op.moves() {
             late.retain(|i| !says(*i, view.start, view.end, view.source, sources));

@@ -65,7 +65,7 @@ impl Approach<'_> {
         }
         let mut end = *restore.out.pose();
         (0..9).filter(|i| self.approached[*i]).for_each(|i| end.axes[i] = self.goal.axes[i]);
-        if end != *restore.out.pose() {
+        if end != *restore.out.pose() && !self.stays_up {
             self.go_in(restore, &end);
         }
     }
