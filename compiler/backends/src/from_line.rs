@@ -140,7 +140,7 @@ pub fn from_line(
     // At the height of a cut that is known, a place beside it that isn't: the tool goes down once the program has said that too.
     let aside = |i: &usize| matches!(places[*i], Place::Machine | Place::Probed) && !lathe && *i < 3 && !along(i) && used[*i] && sinks && blind.is_empty();
     let late: Vec<usize> = (0..3).filter(aside).collect();
-    let goes_down_late = tilt.is_none() && rapid_says(program, found.index, &late, sources);
+    let goes_down_late = rapid_says(program, found.index, &late, sources);
     let lost = |i: &usize| match places[*i] {
         Place::Machine | Place::Probed => used[*i] && (needed[*i] || aside(i) && !goes_down_late),
         Place::Never => tilt.is_some() && along(i) && needed[*i],
@@ -174,7 +174,7 @@ pub fn from_line(
         let high = along(&i) && blind.is_empty() && stays_up;
         !lathe && !turns && used[i] && (!needed[i] && (one || high) || along(&i) && !late.is_empty())
     });
-    let length = length_to_come(program, found.index, &state);
+    let length = length_to_come(program, found.index, &state, sources);
     let heights = Heights { program, state: &state, begins: &pose, tilt, sources };
     let own = if tilt.is_none() || blind.is_empty() { heights.of(&pose, &state) } else { f64::NEG_INFINITY };
     let safe = match (options.room, options.safe_z) {
@@ -405,16 +405,28 @@ fn inside_cycle(program: &Program, index: usize) -> bool {
 
 /// By how much the length that a later block asks for (G43), before the tool is changed again, is longer than what is in
 /// force; none where no tool is in the spindle or its length is in force. 0: it is asked for, and nobody knows it.
-fn length_to_come(program: &Program, index: usize, state: &State) -> Option<f64> {
+fn length_to_come(program: &Program, index: usize, state: &State, sources: &dyn Sources) -> Option<f64> {
     if state.tool <= 0 || state.tool_offset != [0.0; 9] {
         return None;
     }
-    let mut cursor = program.cursor_at(index);
+    // Of a tool that was never measured the length is 0, in force or not.
+    let asked = |s: &gr_ir::Step<'_>| !asks(s, &[490], sources);
+    let mut in_force = false;
+    for s in own(program, index) {
+        match s.op {
+            Op::ToolChange(_) | Op::ToolNumber(_) => in_force = false,
+            Op::ToolOffset(_) => in_force = asked(&s),
+            _ => {}
+        }
+    }
+    if in_force {
+        return None;
+    }
     let mut said = None;
-    while let Some(view) = cursor.next() {
-        match view.op {
+    for s in program.steps().skip(index) {
+        match s.op {
             Op::ToolChange(_) | Op::ToolNumber(_) | Op::End => break,
-            Op::ToolOffset(offset) => said = Some(said.unwrap_or(0.0f64).max(offset[2])),
+            Op::ToolOffset(offset) if asked(&s) => said = Some(said.unwrap_or(0.0f64).max(offset[2])),
             _ => {}
         }
     }
@@ -650,8 +662,8 @@ fn build(program: &Program, from: &From, state: &State, pose: &Pose, room: &Room
             late.retain(|i| !says(*i, view.start, view.end, view.source, sources));
             if late.is_empty() && waiting != [None; 3] {
                 waiting = [None; 3];
-                let approached = std::array::from_fn(|i| i == 2);
-                let down = approach::Approach { program, index: view.index, state: view.state, goal: *view.end, approached, stays_up: false, tilt: None, room };
+                let approached = std::array::from_fn(|i| from.up.get(i).is_some_and(|v| v.abs() > UPRIGHT));
+                let down = approach::Approach { program, index: view.index, state: view.state, goal: *view.end, approached, stays_up: false, tilt: from.tilt, room };
                 down.make(&mut restore, |_| ());
             }
         }

@@ -769,6 +769,19 @@ fn offset_numbers_of_a_fanuc_mill_are_written() {
         let o = in_folder(at, &["build", "b.nc", "--dialect", "fanuc-mill", "--target", "rs274ngc", "-t", "t.tbl"]);
         assert!(o.status.success(), "{}", whole(&o));
     }
+    // R of L10 is a length, R of L12 a radius.
+    std::fs::write(at.join("c.nc"), "O1\nG21 G90\nG10 L10 P1 R151.234\nG10 L12 P2 R3.\nT1 M6\nG43 Z5. H1\nM30\n").expect("writable");
+    let o = in_folder(at, &["build", "c.nc", "--dialect", "fanuc-mill", "--target", "rs274ngc", "--to", "linuxcnc"]);
+    let written = String::from_utf8_lossy(&o.stdout).into_owned();
+    let entries: Vec<&str> = written.lines().filter(|l| l.starts_with("G10")).collect();
+    assert!(o.status.success() && entries.contains(&"G10 L1 P1 Z151.234") && entries.contains(&"G10 L1 P2 R3"), "{}", whole(&o));
+    assert!(entries.iter().all(|l| !l.starts_with("G10 L1 P1 R")), "{written}");
+    // A restart under G43 of a tool that nobody has measured, with G49 still to come: the length is in force.
+    std::fs::write(at.join("d.nc"), "O1\nG21 G90 G54\nT3 M6\nS900 M3\nG0 X1. Y1.\nG43 Z50. H3\nG1 Z-1. F100.\nX10.\nG0 Z50.\nG49\nM30\n").expect("writable");
+    for (line, bare) in [("8", false), ("5", true)] {
+        let o = in_folder(at, &["build", "d.nc", "--dialect", "fanuc-mill", "--target", "rs274ngc", "--from-line", line, "--safe-z", "50"]);
+        assert!(o.status.success() && text(&o.stderr).contains("E0616") == bare, "{line}: {}", whole(&o));
+    }
 }
 
 /// U and W of a lathe are X and Z by increments: no axis U or W is written.

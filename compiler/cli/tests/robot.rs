@@ -730,6 +730,21 @@ fn a_restart_comes_along_a_tilted_tool() {
             assert!(!cuts || way.last().unwrap().ends_with(place), "{body} {line}: {way:?}");
         }
     }
+    // At 90° Z lies across: the tool comes down once the block has named it.
+    std::fs::write(path("a.ngc"), format!("{head}G0 A-90 C0\nG0 X10 Y9\nG43 H1 Z-20\nG1 Z-25 F300\nX30\nG0 Y50\nM5\nG53 G0 Z0\nM2\n")).unwrap();
+    let whole = made(&[]).0;
+    let (rows, found) = made(&["--from-line", "8", "--safe-z", "90"]);
+    assert!(!found.contains("error") && rows.len() > 4 && whole.ends_with(&rows[rows.len() - 4..]), "{found}{rows:?}");
+    // The length of the tool before is still in force there: what counts is the tip.
+    let tools = "T1 M6\nS6000 M3\nG0 G43 H2 Z100\nG53 G0 Z0\nG0 A-45 C0\nG0 X10 Y-50\nG43 H1 Z40\nG0 Z2\nG1 Z-2 F300\nX30\nG0 Z40\nM5\nM2\n";
+    std::fs::write(path("a.ngc"), format!("G21 G90 G17 G54\n{tools}")).unwrap();
+    std::fs::write(path("t.tbl"), "T1 P1 Z60 D10\nT2 P2 Z90 D10\n").unwrap();
+    let table = path("t.tbl");
+    let tops = |line: &str| {
+        let found = made(&["--from-line", line, "-t", &table]).1;
+        found.split("program, ").nth(1).and_then(|t| t.split(" mm along").next()).and_then(|t| t.parse::<f64>().ok()).unwrap_or_else(|| panic!("{line}: {found}"))
+    };
+    assert_eq!(tops("8"), tops("10"));
     // What an index has led away is where the program believes it only once it has come back.
     std::fs::write(path("a.ngc"), format!("{head}G0 X5 Y6 Z70\nG1 Z-2 F300\nG53 G0 Z0\nG0 A-60 C0\nG0 X20 Y-50\nZ50\nG1 Z1\nG0 Z50\nG53 G0 Z0\nM2\n")).unwrap();
     let whole = made(&[]).0;

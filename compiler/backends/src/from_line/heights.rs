@@ -26,11 +26,16 @@ impl Heights<'_> {
         match self.tilt {
             None => machine[2] - self.state.machine(&[0.0; 9])[2],
             Some(up) => {
-                // Another length is one along the tool.
-                let longer: V3 = std::array::from_fn(|i| state.tool_offset[i] - self.state.tool_offset[i]);
-                (0..3).for_each(|i| machine[i] -= longer[i]);
+                // With a length in force it is the place of the tool's tip, else of the spindle's nose, a length along the tool above it.
+                let lengths = [state.tool_offset, self.state.tool_offset];
+                (0..3).for_each(|i| machine[i] += lengths[1][i] - lengths[0][i]);
                 let at = self.state.work_frame(&machine);
-                longer[2] + (0..3).map(|i| at[i] * up[i]).sum::<f64>()
+                let nose = match lengths.map(|l| l == [0.0; 9]) {
+                    [true, false] => -lengths[1][2],
+                    [false, true] => lengths[0][2],
+                    _ => 0.0,
+                };
+                nose + (0..3).map(|i| at[i] * up[i]).sum::<f64>()
             }
         }
     }

@@ -470,7 +470,9 @@ impl Emitter<'_> {
         let places = self.w.places.max(9);
         let old = self.tools.iter().find(|(n, _)| *n == tool).map_or([0.0; 9], |t| t.1);
         let text = self.words(view.source).filter(|w| w.g(100));
-        let said = |letter: char| text.is_none_or(|w| w.has(letter.to_ascii_lowercase() as u8));
+        // R of a Fanuc mill's L10 is the length.
+        let length = self.sources.offset_numbers() && number_of(self.sources, 'l', view.source) == Some(10);
+        let said = |letter: char| text.is_none_or(|w| if length { letter == 'Z' } else { w.has(letter.to_ascii_lowercase() as u8) });
         // What the block does not name stays as the control has it.
         let axes = (0..9).filter(|i| if text.is_some() { said(AXES[*i]) } else { offset[*i] != old[*i] });
         let mut words: Vec<String> = axes.map(|i| format!("{}{}", AXES[i], self.w.axis_fine(i, offset[i], places).0)).collect();
