@@ -3,22 +3,21 @@
 
 mod approach;
 mod heights;
+mod known;
 
 pub(crate) use approach::is_lathe;
 
 use std::collections::BTreeMap;
 
-use crate::sources::{SYSTEMS, Words, is_hidden, sets_here};
+use crate::sources::{SYSTEMS, Words, sets_here};
 use gr_ir::Sources;
 use heights::{Heights, UPRIGHT};
+use known::{Known, Said, says};
 use gr_ir::{Axes, Builder, FrameId, Marker, Note, Op, Override, PathMode, Pose, Program, Source, State, Turn, Units};
 use gr_text::{Diagnostic, FileId, code};
 
 /// Line number of operations that no source line asked for.
 pub const INSERTED: u32 = u32::MAX;
-
-/// An axis that makes a smaller part of the height of a tilted tool has too far to go for it.
-const STEEP: f64 = 0.1;
 
 /// Heights that differ by less, mm, are the same.
 const SAME_HEIGHT: f64 = 1e-6;
@@ -44,6 +43,9 @@ pub struct Options<'a> {
 
 type V3 = [f64; 3];
 
+/// Direction of a tool that stands upright.
+const UP: V3 = [0.0, 0.0, 1.0];
+
 /// Direction from the tool point to the spindle in the work frame; none where the machine can't tell it.
 pub type ToolDirection<'a> = dyn Fn(&Pose, &State) -> Option<V3> + 'a;
 
@@ -65,7 +67,8 @@ pub struct Restart {
     pub program: Program,
     /// Warnings.
     pub notes: Vec<Diagnostic>,
-    /// Where the program has brought the tool, axis by axis in the work frame in force, mm and rad, as far as that is a place for it to go to. None: it stays there.
+    /// Where the program has brought the tool, axis by axis in the work frame in force, mm and rad, as far as that is a place for it to go
+    /// to. None: it stays where it is.
     pub goal: [Option<f64>; 9],
     /// Where the program itself first sends each axis in the work frame; none: nowhere by a word of its own.
     pub named: [Option<f64>; 9],
@@ -118,72 +121,23 @@ pub fn from_line(
     (pose.tool_axis, pose.spin) = next.map_or((None, None), |s| (s.end.tool_axis, s.end.spin));
     let lathe = approach::is_lathe(program);
     let tilt = options.tool.filter(|_| !lathe).and_then(|tool| tool(&pose, &state)).filter(|up| up[2] < 1.0 - UPRIGHT);
-    let up = tilt.unwrap_or([0.0, 0.0, 1.0]);
-    // Axes that its height is made of; the others go beside.
-    let along = |i: &usize| up.get(*i).is_some_and(|v| v.abs() > UPRIGHT);
-    let used = axes_used(program);
-    let places = Said { program, sources, used: &used, lathe, stored: options.stored, tool: options.tool.filter(|_| options.slides) }.before(found.index);
-    let Ahead { mut needed, named } = ahead(program, found.index, &places, sources);
-    let sinks = (0..3).any(|i| along(&i) && needed[i]);
-    // Along a tilted tool there is no way to one of them alone.
-    (0..3).filter(along).for_each(|i| needed[i] |= sinks && places[i] == Place::Named);
-    let sure = |i: &usize| match places[*i] {
-        Place::Named => needed[*i] || !options.unsure[*i],
-        Place::Led => !needed[*i] && !options.unsure[*i],
-        _ => false,
-    };
-    let blind: Vec<usize> = (0..3).filter(along).filter(|i| !sure(i)).collect();
-    // The one that is not known takes the tool to the safe height, if it does so within reach. Between a retract and an index behind it,
-    // and where the program comes to the part, it stays with the machine.
-    let led = (0..3).any(|i| along(&i) && places[i] == Place::Led);
-    let lifts = matches!(*blind, [i] if up[i].abs() > STEEP && !(led && places[i] == Place::Machine));
-    // At the height of a cut that is known, a place beside it that isn't: the tool goes down once the program has said that too.
-    let aside = |i: &usize| matches!(places[*i], Place::Machine | Place::Probed) && !lathe && *i < 3 && !along(i) && used[*i] && sinks && blind.is_empty();
-    let late: Vec<usize> = (0..3).filter(aside).collect();
-    let goes_down_late = rapid_says(program, found.index, &late, sources);
-    let lost = |i: &usize| match places[*i] {
-        Place::Machine | Place::Probed => used[*i] && (needed[*i] || aside(i) && !goes_down_late),
-        Place::Never => tilt.is_some() && along(i) && needed[*i],
-        Place::Led => needed[*i],
-        Place::Named => along(i) && needed[*i] && !blind.is_empty() && !lifts,
-    };
-    let lost: Vec<String> = (0..9).filter(lost).map(|i| char::from(AXIS_LETTERS[i].to_ascii_uppercase()).to_string()).collect();
-    if !lost.is_empty() {
-        return Err(vec![Diagnostic::new(code::FROM_LINE_PLACE_OF_MACHINE, place.0, place.1, &[lost.join(" ")])]);
+    let up = tilt.unwrap_or(UP);
+    let tool = options.tool.filter(|_| options.slides);
+    let said = Said { program, sources, used: &axes_used(program), lathe, stored: options.stored, tool };
+    let known = Known::of(&said, found.index, tilt, &options.unsure);
+    if !known.lost.is_empty() {
+        return Err(vec![Diagnostic::new(code::FROM_LINE_PLACE_OF_MACHINE, place.0, place.1, &[known.lost.join(" ")])]);
     }
-    // The tool does not go down where nobody knows what is below it.
-    let doubtful = |i: usize| match places[i] {
-        Place::Named | Place::Led => options.unsure[i],
-        Place::Machine | Place::Probed => !lathe,
-        Place::Never => false,
-    };
-    let beside = (0..3).any(|i| !along(&i) && doubtful(i) && !needed[i] && used[i]);
-    let stays_up = beside && !sinks;
-    // Before an index to come, the slides stay where the machine stands: what the program has named in the part is not there.
-    let turns = options.slides && (stays_up || !blind.is_empty()) && turns_first(program, found.index, &blind, sources);
-    let known: [bool; 9] = std::array::from_fn(|i| match i {
-        0..3 if (turns || tilt.is_some() && !blind.is_empty() && !lifts) && !needed[i] => false,
-        i if along(&i) => sure(&i) && !stays_up && late.is_empty() && (blind.is_empty() || lifts),
-        // Its rotary axes turn where the machine stands, and the program goes on from there.
-        _ => sure(&i) || places[i] == Place::Named && beside && sinks && i < 3,
-    });
-    // On a lathe no height is safe, and a cut has none that nobody named: the program begins as it begins itself. Beside a tilted tool it
-    // does so too, where nothing of the place is known.
-    let lifted: [bool; 3] = std::array::from_fn(|i| {
-        let one = blind == [i] && lifts && (tilt.is_none() || (0..3).any(|k| sure(&k)));
-        let high = along(&i) && blind.is_empty() && stays_up;
-        !lathe && !turns && used[i] && (!needed[i] && (one || high) || along(&i) && !late.is_empty())
-    });
     let length = length_to_come(program, found.index, &state, sources);
     let heights = Heights { program, state: &state, begins: &pose, tilt, sources };
-    let own = if tilt.is_none() || blind.is_empty() { heights.of(&pose, &state) } else { f64::NEG_INFINITY };
+    let own = if tilt.is_none() || known.height { heights.of(&pose, &state) } else { f64::NEG_INFINITY };
     let safe = match (options.room, options.safe_z) {
         (Some(room), _) => room.safe,
         // What is asked for is the height of the tool; where its length is not in force yet, the spindle goes higher.
         (None, Some(z)) => z + length.unwrap_or(0.0),
         (None, None) => {
             let top = heights.top().unwrap_or(own);
-            if tilt.is_none() || (0..3).any(|i| known[i] && along(&i) || lifted[i]) {
+            if tilt.is_none() || (0..3).any(|i| known.goes[i] && up[i].abs() > UPRIGHT || known.lifted[i]) {
                 notes.push(Diagnostic::new(code::FROM_LINE_NO_SAFE_HEIGHT, place.0, place.1, &[heights.show(top)]));
             }
             top
@@ -207,13 +161,13 @@ pub fn from_line(
     }
     let height: f64 = (0..3).map(|i| up[i] * pose.axes[i]).sum();
     let rise = room.safe - height;
-    let lift = std::array::from_fn(|i| lifted[i].then(|| if blind.is_empty() { rise * up[i] } else { rise / up[i] }));
-    let from = From { index: found.index, line, known, lift, late, up, lathe, tilt };
+    let lift = std::array::from_fn(|i| known.lifted[i].then(|| if known.height { rise * up[i] } else { rise / up[i] }));
+    let from = From { index: found.index, line, known: known.goes, lift, late: known.late, up, lathe, tilt };
     let restart = build(program, &from, &state, &pose, &room, sources);
-    let goal = std::array::from_fn(|i| (known[i] || tilt.is_some() && sure(&i)).then_some(pose.axes[i]));
+    let goal = std::array::from_fn(|i| (known.goes[i] || tilt.is_some() && known.sure[i]).then_some(pose.axes[i]));
     let (shifted, kept) = (shifted(program, found.index, sources), set_from_here(program, found.index, sources));
     let offsets = offsets(&restart);
-    Ok(Restart { program: restart, notes, goal, named, shifted, kept, offsets, room })
+    Ok(Restart { program: restart, notes, goal, named: known.named, shifted, kept, offsets, room })
 }
 
 /// Where [`Restart::offsets`] has the tool's offset.
@@ -450,143 +404,7 @@ struct From {
     tilt: Option<V3>,
 }
 
-/// What a program has said about the place of an axis.
-#[derive(Clone, Copy, PartialEq, Debug)]
-enum Place {
-    Never,
-    Named,
-    /// The machine went to a place of its own.
-    Machine,
-    /// A probe stopped there.
-    Probed,
-    /// It was named, and an index has led the tool away from there since. With the next rapid it comes back.
-    Led,
-}
-
-/// What a program has said about the places of its axes before an operation. Of axes that it never named, and of those
-/// that G28, G30 and G53 brought to a place of the machine, the numbers are only what a simulation takes them for, but where
-/// such places are `stored` in a file; where a probe stopped and how high the tool is after a tool change, only the machine knows.
-struct Said<'a> {
-    program: &'a Program,
-    sources: &'a dyn Sources,
-    used: &'a [bool; 9],
-    lathe: bool,
-    /// As in [`Options`].
-    stored: bool,
-    /// Of a machine whose slides stay where rotary axes turn alone.
-    tool: Option<&'a ToolDirection<'a>>,
-}
-
-impl Said<'_> {
-    fn before(&self, index: usize) -> [Place; 9] {
-        let mut places = [Place::Never; 9];
-        // Axes X Y Z of which the machine has the place, stored or not.
-        let mut apart = [true; 3];
-        let mut cursor = self.program.cursor();
-        while let Some(s) = cursor.next().filter(|s| s.index < index) {
-            if !s.op.moves() {
-                if matches!(s.op, Op::ToolChange(_)) && !self.lathe && places[2] != Place::Never {
-                    places[2] = Place::Machine;
-                    apart[2] = true;
-                }
-                continue;
-            }
-            let words = Words::at(self.sources, s.source.file, s.source.line);
-            let hidden = words.is_some_and(|w| !w.names_axes()) && is_hidden(self.program, s.index);
-            let fixed = hidden || words.is_some_and(|w| [280, 300, 530].into_iter().any(|g| w.g(g)));
-            let home = fixed && !hidden && words.is_some_and(|w| !w.g(530) && !w.names_axes());
-            for (i, letter) in AXIS_LETTERS.iter().enumerate() {
-                // The simulation goes on from where it takes a probe to stop.
-                let moves = s.start.axes[i] != s.end.axes[i] && places[i] != Place::Probed;
-                if home && (self.used[i] || !self.stored) || moves || words.is_some_and(|w| w.has(*letter)) {
-                    places[i] = match s.op {
-                        Op::Probe(_) => Place::Probed,
-                        _ if hidden || fixed && !self.stored => Place::Machine,
-                        _ => Place::Named,
-                    };
-                    if let Some(apart) = apart.get_mut(i) {
-                        *apart = fixed;
-                    }
-                }
-            }
-            if apart.contains(&true) && self.leads_away(&s, fixed) {
-                (0..3).filter(|i| !apart[*i]).for_each(|i| places[i] = Place::Led);
-            }
-        }
-        places
-    }
-
-    /// Whether a move turns rotary axes alone, to or from where the tool is tilted: the place of slides that stay is no place of the part
-    /// any more.
-    fn leads_away(&self, s: &gr_ir::View<'_, '_>, fixed: bool) -> bool {
-        let still = |axes: std::ops::Range<usize>| axes.into_iter().all(|i| s.start.axes[i] == s.end.axes[i]);
-        let named = || Words::at(self.sources, s.source.file, s.source.line).is_some_and(|w| !fixed && AXIS_LETTERS[..3].iter().any(|l| w.has(*l)));
-        let tilted = |tool: &ToolDirection<'_>| [s.start, s.end].into_iter().any(|p| tool(p, s.state).is_some_and(|up| up[2] < 1.0 - UPRIGHT));
-        !still(3..6) && still(0..3) && !named() && self.tool.is_some_and(tilted)
-    }
-}
-
-/// Whether rapids name all of these axes, from an operation on, before a cut.
-fn rapid_says(program: &Program, index: usize, axes: &[usize], sources: &dyn Sources) -> bool {
-    let mut left = axes.to_vec();
-    for s in program.steps().skip(index).filter(|s| s.op.moves()).take_while(|s| s.op == Op::Rapid) {
-        left.retain(|i| !says(*i, &s.start, &s.end, s.source, sources));
-    }
-    left.is_empty()
-}
-
-/// Whether rotary axes turn from an operation on before a block names these axes.
-fn turns_first(program: &Program, index: usize, axes: &[usize], sources: &dyn Sources) -> bool {
-    let moves = program.steps().skip(index).filter(|s| s.op.moves());
-    let named = |s: &gr_ir::Step<'_>| (0..3).any(|i| (axes.is_empty() || axes.contains(&i)) && says(i, &s.start, &s.end, s.source, sources));
-    moves.take_while(|s| !named(s)).any(|s| s.start.axes[3..6] != s.end.axes[3..6])
-}
-
-/// What a program does with its axes from an operation on.
-struct Ahead {
-    /// It cuts before it names them: their place counts.
-    needed: [bool; 9],
-    /// Where it first sends them by a word.
-    named: [Option<f64>; 9],
-}
-
-fn ahead(program: &Program, index: usize, places: &[Place; 9], sources: &dyn Sources) -> Ahead {
-    let mut ahead = Ahead { needed: [false; 9], named: [None; 9] };
-    let mut said = [false; 9];
-    for s in program.steps().skip(index) {
-        if !s.op.moves() {
-            // What names the place where a probe stopped needs it.
-            let names = matches!(s.op, Op::LocalOffset(_) | Op::WorkOffset(..) | Op::StoredOffset { .. }) && (asks(&s, &[920], sources) || sets_here(sources, s.source));
-            let words = names.then(|| Words::at(sources, s.source.file, s.source.line)).flatten();
-            (0..9).filter(|i| places[*i] == Place::Probed && !said[*i]).for_each(|i| ahead.needed[i] |= words.is_some_and(|w| w.has(AXIS_LETTERS[i])));
-            continue;
-        }
-        let words = Words::at(sources, s.source.file, s.source.line);
-        for i in 0..9 {
-            let drifts = places[i] == Place::Probed && !words.is_some_and(|w| w.has(AXIS_LETTERS[i]));
-            if said[i] || drifts || !says(i, &s.start, &s.end, s.source, sources) {
-                continue;
-            }
-            said[i] = true;
-            let word = words.is_some_and(|w| w.has(AXIS_LETTERS[i]) && ![280, 300, 530].into_iter().any(|g| w.g(g)));
-            ahead.named[i] = word.then_some(s.end.axes[i]);
-        }
-        (0..9).for_each(|i| ahead.needed[i] |= s.op.feeds() && !said[i]);
-        if (0..9).all(|i| said[i] || ahead.needed[i]) {
-            break;
-        }
-    }
-    ahead
-}
-
 const AXIS_LETTERS: [u8; 9] = *b"xyzabcuvw";
-
-/// Whether a move names an axis.
-fn says(axis: usize, start: &Pose, end: &Pose, source: Source, sources: &dyn Sources) -> bool {
-    let home = |w: &Words| !w.names_axes() && [280, 300].into_iter().any(|g| w.g(g));
-    let words = || Words::at(sources, source.file, source.line);
-    start.axes[axis] != end.axes[axis] || words().is_some_and(|w| w.has(AXIS_LETTERS[axis]) || home(&w))
-}
 
 fn build(program: &Program, from: &From, state: &State, pose: &Pose, room: &Room, sources: &dyn Sources) -> Program {
     let index = from.index;
