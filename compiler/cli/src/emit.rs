@@ -52,7 +52,7 @@ pub struct TargetOptions {
     /// rs274ngc: leave out comments
     #[arg(long)]
     pub no_comments: bool,
-    /// rs274ngc: write holes as canned cycles (G73, G81 to G86, G89) where they do exactly the same
+    /// rs274ngc: write holes as canned cycles (G73, G74, G81 to G86, G89) where they do exactly the same
     #[arg(long)]
     pub cycles: bool,
     /// rs274ngc: who keeps the tool beside a wall that a plan finishes: the path, or the control (G41, G42 with D)
@@ -232,8 +232,21 @@ pub fn build(unit: &Unit, goal: &Goal<'_>) -> Result<Result<(Built, Checked), St
 
 /// Options of targets that were given, by name.
 pub fn given(o: &TargetOptions) -> Vec<&'static str> {
+    all(o).into_iter().filter(|(_, given)| *given).map(|(name, _)| name).collect()
+}
+
+/// An option of a command that writes G-code is listed in its help if that target heeds it, or the command itself does.
+pub fn hidden_unless(option: clap::Arg, own: &[&str]) -> clap::Arg {
+    let heeded = gr_spec::TargetDef::find("rs274ngc").map_or(&[][..], |t| t.options);
+    let name = option.get_long().map(|long| format!("--{long}")).unwrap_or_default();
+    let idle = all(&TargetOptions::default()).iter().any(|(n, _)| *n == name) && !heeded.contains(&name.as_str()) && !own.contains(&name.as_str());
+    if idle { option.hide(true) } else { option }
+}
+
+/// Every option of targets, and whether it was given.
+fn all(o: &TargetOptions) -> [(&'static str, bool); 25] {
     let r = &o.robot;
-    let all = [
+    [
         ("--to", o.to.is_some()),
         ("--units", o.units.is_some()),
         ("--decimals", o.decimals.is_some()),
@@ -259,8 +272,7 @@ pub fn given(o: &TargetOptions) -> Vec<&'static str> {
         ("--job", r.job.is_some()),
         ("--compensate", r.compensate),
         ("--smoothing", r.smoothing.is_some()),
-    ];
-    all.into_iter().filter(|(_, given)| *given).map(|(name, _)| name).collect()
+    ]
 }
 
 /// An option that was given and does nothing for the target. Reference modes are looked at in [`mismatch`].

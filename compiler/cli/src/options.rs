@@ -241,6 +241,7 @@ pub struct BuildArgs {
 }
 
 #[derive(Args, Debug)]
+#[command(mut_args(|a| crate::emit::hidden_unless(a, &[])))]
 pub struct FilterArgs {
     /// STEP-NC file (or program)
     pub file: PathBuf,
@@ -387,6 +388,7 @@ pub struct DiffArgs {
 }
 
 #[derive(Args, Debug)]
+#[command(mut_args(|a| crate::emit::hidden_unless(a, &crate::commands::diff::ROBOT_OPTIONS)))]
 pub struct VerifyArgs {
     /// Program
     pub file: PathBuf,
@@ -455,7 +457,7 @@ pub enum MachineAction {
         /// URDF file
         file: PathBuf,
         /// Id of the new machine: maker/model
-        #[arg(long, default_value = "my/robot", value_name = "ID")]
+        #[arg(long, default_value = "my/robot", value_name = "ID", value_parser = machine_id)]
         id: String,
         /// Link that the arm ends at [default: `tool0` or `flange`, else the longest chain of moving joints]
         #[arg(long, value_name = "LINK")]
@@ -659,6 +661,11 @@ pub enum PlaceAim {
     Margin,
     /// Smallest error
     Error,
+}
+
+/// The id of a machine of one's own.
+fn machine_id(text: &str) -> Result<String, &'static str> {
+    if gr_machine::good_id(text) { Ok(text.to_string()) } else { Err(gr_machine::ID_FORM) }
 }
 
 /// A number of at most `MOST`.

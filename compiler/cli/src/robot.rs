@@ -171,6 +171,9 @@ pub fn build(motion: &Motion, goal: &Goal<'_>, texts: &dyn Sources, name: &str) 
         return Err(format!("the target {} can't be made by this version", goal.target));
     };
     let machine = robot(goal)?;
+    if let Some(n) = goal.options.decimals.filter(|n| !gr_vendors::DECIMALS.contains(n)) {
+        return Err(format!("--decimals {n}: robot programs are written with {} to {}", gr_vendors::DECIMALS.start(), gr_vendors::DECIMALS.end()));
+    }
     // The files take their name from where they go.
     let name = goal.file.filter(|f| f.extension().is_some()).map_or_else(|| name.to_string(), crate::emit::stem);
     let mut options = options(motion, goal, &name)?;

@@ -470,7 +470,8 @@ impl Reader<'_> {
         let (Some((file, text)), Some(name)) = (self.ini.clone(), setup.ini.get("EMCIO", "TOOL_TABLE")) else { return };
         let place = text.find(name).map_or(Span::default(), |at| Span::new(at as u32, (at + name.len()) as u32));
         let args = [name.to_string(), "TOOL_TABLE".into(), "there is no such file".into()];
-        self.show(&[Diagnostic::new(code::INI_VALUE, file, place, &args)]);
+        let help = Some("correct the name, which counts from the folder of the INI file, or put the tool table there".to_string());
+        self.show(&[Diagnostic { help, ..Diagnostic::new(code::INI_VALUE, file, place, &args) }]);
     }
     /// A folder that is named and that is not there.
     fn no_folder(&mut self, path: &Path) {

@@ -102,6 +102,8 @@ fn tables_and_settings() {
     for line in ["[TRAJ]\nSPINDLES = 9", "[AXIS_X]\nMAX_LIMIT = 400 # mm", "[EMCIO]\nTOOL_CHANGE_AT_G30 = YES", "[EMCIO]\nTOOL_TABLE = none.tbl"] {
         told("E0852", &[part.clone(), file("a.ini", &format!("{line}\n"))], "check -i a.ini a.ngc");
     }
+    let (found, status) = codes(&[part.clone(), file("a.ini", "#INCLUDE none.inc\n[TRAJ]\nLINEAR_UNITS = mm\n")], "check -i a.ini a.ngc");
+    assert_eq!((found, status), (vec!["E0830".into()], Some(0)), "LinuxCNC starts without it");
     for (code, told) in [("G20 G999", 1), ("G20 G64 P0.01", 0), ("G64 P0.1 M52 P1", 1)] {
         let files = [part.clone(), file("a.ini", &format!("[RS274NGC]\nRS274NGC_STARTUP_CODE = {code}\n"))];
         let (found, _) = codes(&files, "check -i a.ini a.ngc");
@@ -326,8 +328,10 @@ fn a_translation_holds_on_every_machine_or_says_so() {
         for command in ["build a.ngc -o o.ngc", "verify a.ngc"] {
             let (found, status) = codes(&program(text), command);
             assert!(found.iter().any(|c| c == "E0607"), "{command}: {found:?}\n{text}");
-            assert_eq!(status, Some(i32::from(command.starts_with("verify"))), "{text}");
+            assert_eq!(status, Some(0), "{text}");
         }
+        let project = [program(text)[0].clone(), ("gcc-robot.toml", "[lints]\nstrict = true\n".into())];
+        assert_eq!(codes(&project, "verify a.ngc").1, Some(1), "{text}");
     }
     for text in [
         // A height set by hand, a touch-off, an offset that is selected, a lathe, and a length that only the control has.

@@ -214,6 +214,8 @@ fn check_knows_where_a_mill_stands() {
         job(place);
         let found = told("check", "generic/mill3", "", right, &["--job", &path("job.toml")]);
         assert!(found.0 == Some(code) && found.1.contains(more) && !found.1.contains("E0285"), "{place}: {}", found.1);
+        let (proved, said) = told("verify", "generic/mill3", "", right, &["--job", &path("job.toml")]);
+        assert!(proved == Some(code) && said.contains(if code == 0 { "the same motion" } else { more }), "{place}: {said}");
     }
     // Predicted times have the axis that really moves.
     let slow = |place: &str| told("build", "unb/router", &format!("{place}[[joint]]\nname = \"Y\"\nspeed = 2\nrapid = 2\n"), "G0 Z20\nG0 X100\nG0 Z0\nG1 X101 F100", &["--target", "sheet"]).1;

@@ -101,6 +101,9 @@ impl<S: Sink> Interp<'_, S> {
             -1 if matches!(motion, 20 | 30) && b.has(b'p') => Some(("P with an arc", b'p')),
             _ if b.g(Group::ToolLength) == 431 && (b.has(b'x') || b.has(b'y')) => Some(("G43.1 with an axis other than Z", b'g')),
             _ if b.get(b't').is_some_and(|t| t > 255.0) => Some(("T above 255", b't')),
+            _ if b.g(Group::ToolLength) == 431 && !b.has(b'z') => {
+                return Err(Fault::new(code::WORD_MISSING, rs274::SILENT).arg("G43.1").arg("Z").at(b'g'));
+            }
             // Its greatest number of a line.
             _ if self.line_number().is_some_and(|n| n > 10_000_000.0) => Some(("N above 10000000", b'n')),
             _ => None,

@@ -163,6 +163,9 @@ impl<S: Sink> Interp<'_, S> {
             let fault = Fault::new(code::IO_WORDS, rs274::RT_M67_E).arg(m);
             return Err(fault.named(format!("M{m} needs an E word, the number of the output")).at(b'm'));
         };
+        if !self.block.has(b'q') {
+            self.warn(Fault::own(code::WORD_LEFT_OUT).arg(format!("M{m}")).arg("Q").arg(format!("sets output {e} to −1")).at(b'm'));
+        }
         let q = self.block.or_minus_one(b'q');
         self.emit(if m == 67 { Call::SetMotionOutputValue(e, q) } else { Call::SetAuxOutputValue(e, q) });
         Ok(())
@@ -241,10 +244,13 @@ impl<S: Sink> Interp<'_, S> {
             return Err(Self::no_spindle(n, rs274::RT_SPINDLE_M19));
         }
         let b = &self.block;
-        if b.has(b'r') || b.has(b'p') {
+        // Fanuc's goes to the angle that the machine has for it.
+        if b.has(b'r') || b.has(b'p') || self.is_fanuc() {
             let angle = b.get(b'r').map_or(self.config.orient_offset, |r| r + self.config.orient_offset);
             let mode = to_int(b.or_zero(b'p'));
             self.emit_queued(Call::OrientSpindle(n, angle, mode));
+        } else {
+            self.warn(Fault::own(code::WORD_LEFT_OUT).arg("M19").arg("R").arg("turns the spindle nowhere").at(b'm'));
         }
         if let Some(q) = self.block.get(b'q') {
             if q <= 0.0 {

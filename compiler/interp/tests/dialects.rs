@@ -245,6 +245,25 @@ fn fanuc_data_input() {
     }
 }
 
+/// M19 of a Fanuc goes to the angle that the machine has for it; it needs no R.
+#[test]
+fn fanuc_m19_orients_the_spindle() {
+    for id in ["fanuc-mill", "fanuc-turn"] {
+        let (calls, outcome) = run_in(id, "M19\nM30\n");
+        let orients = calls.iter().filter(|c| *c == "ORIENT_SPINDLE(0, 0.0000, 0)").count();
+        assert_eq!((outcome.findings, orients), (Vec::new(), 1), "{id}: {calls:?}");
+    }
+}
+
+/// grbl's only axis of a tool length has to be named.
+#[test]
+fn grbl_g43_1_needs_z() {
+    for (line, found) in [("G43.1", vec![code::WORD_MISSING]), ("G43.1 Z-5", vec![])] {
+        let (_, outcome) = run_in("grbl", &format!("G21 G90\n{line}\nM30\n"));
+        assert_eq!(outcome.findings.iter().map(|f| f.fault.code).collect::<Vec<_>>(), found, "{line}");
+    }
+}
+
 /// What LinuxCNC has and the control has not is refused, not carried out with LinuxCNC's meaning.
 #[test]
 fn dialects_are_closed_lists() {

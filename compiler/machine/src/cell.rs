@@ -274,7 +274,7 @@ impl Cell {
             out += &format!("home: {}\n", joints.iter().zip(home).map(|(j, v)| j.show(*v)).collect::<Vec<_>>().join(", "));
         }
         for (word, s) in &self.io {
-            out += &format!("{word}: {}\n", s.describe());
+            out += &format!("{word}: {}\n", s.describe(word));
         }
         for (what, source) in [
             ("accuracy", self.accuracy.as_ref().map(|a| &a.source)),
@@ -309,13 +309,20 @@ impl Signal {
         self.value != Some(0.0)
     }
 
-    fn describe(&self) -> String {
+    fn describe(&self, word: &str) -> String {
         let mut parts = Vec::new();
+        // These words have a number of their own for the output.
+        let value = match word {
+            "S" => Some("the speed".to_string()),
+            "M6" => Some("the tool's number".to_string()),
+            _ if word.starts_with("M67") || word.starts_with("M68") => Some("the programmed value".to_string()),
+            _ => self.value.map(short),
+        };
         if let Some(r) = &self.routine {
             parts.push(format!("calls {r}"));
         }
         if let Some(s) = &self.signal {
-            parts.push(self.value.map_or(format!("sets {s}"), |v| format!("sets {s} to {}", short(v))));
+            parts.push(value.map_or(format!("sets {s}"), |v| format!("sets {s} to {v}")));
         }
         if let Some(w) = &self.wait {
             parts.push(format!("waits for {w}"));

@@ -139,7 +139,7 @@ pub(crate) static ROOT: &[Key] = &[
     key("speed", Table(SPEED), "Speeds where the program says nothing."),
     key("zone", Table(ZONE), "Corner zones, mm."),
     key("controller", Table(CONTROLLER), "Limits of the controller's files."),
-    key("io", Map(SIGNAL), "What M3 M4 M5 S M6 M7 M8 M9 M62 … M68 do, and the input of the probe (G38)."),
+    key("io", Map(SIGNAL), "What S, M3 to M9, M19, M50 to M53, M60, M62 to M68 (of one output or input: `M62P3`, `M66P0`) and M100 to M199 do, and the input of the probe (G38)."),
     key("accuracy", Table(ACCURACY), "How exactly joints and geometry are made."),
     key("stiffness", Table(STIFFNESS), "What yields under force."),
     key("as_built", Table(AS_BUILT), "Deviations of the geometry that have been measured or identified."),
@@ -193,7 +193,7 @@ static JOINT: &[Key] = &[
     key("word", Text, "Its word in joint-space G-code: one upper-case letter."),
     key("min", ANY, "Lower limit, mm or degrees."),
     key("max", ANY, "Upper limit, mm or degrees."),
-    key("speed", ABOVE, "Greatest speed, mm/s or degrees/s."),
+    key("speed", ABOVE, "Greatest speed, mm/s or degrees/s; else 200 mm/s or 90 degrees/s are reckoned with."),
     key("rapid", ABOVE, "Speed of a rapid move; else `speed`."),
     key("acceleration", ABOVE, "Greatest acceleration, mm/s² or degrees/s²."),
     key("dh", Numbers(4), "`dh`, `mdh`: a, d (mm), alpha, theta (degrees); the joint value adds to theta or d."),
@@ -270,8 +270,8 @@ static TOOL: &[Key] = &[
 ];
 
 static SPEED: &[Key] = &[
-    key("rapid", ABOVE, "Tool point speed of a rapid, mm/s."),
-    key("joint", PER_CENT, "Joint speed of a rapid, per cent of the greatest."),
+    key("rapid", ABOVE, "Tool point speed of a rapid, mm/s; else 250."),
+    key("joint", PER_CENT, "Joint speed of a rapid, per cent of the greatest; else 100."),
 ];
 
 static ZONE: &[Key] = &[

@@ -69,7 +69,7 @@ pub use planar::Planar3r;
 pub use prp::{SphericalAxis, TwoLegs, TwoLegsShape};
 pub use quality::{Accuracy, AsBuilt, Member, Spring, Stiffness};
 pub use scara::Scara;
-pub use schema::{MOST_JOINTS, parse, parse_reference};
+pub use schema::{ID_FORM, MOST_JOINTS, good_id, parse, parse_reference};
 pub use serial::{DhRow, Link, Serial};
 pub use tricept::{Tricept, TriceptShape};
 pub use ur::ParallelWrist;

@@ -203,7 +203,7 @@ impl Check {
         }
         let id = raw.get("id");
         if let Some(id) = id.filter(|id| !id.text().is_some_and(good_id)) {
-            self.value(&id.span, "an id is `maker/model` in lower-case letters, digits and `-`");
+            self.value(&id.span, ID_FORM);
         }
         let list = raw.get("joint").map_or(&[][..], Node::list);
         let joints: Vec<Joint> = list.iter().map(|j| self.joint(j)).collect();
@@ -875,7 +875,11 @@ fn cartesian(joints: &[Joint]) -> bool {
         && joints.iter().enumerate().all(|(i, j)| ((3..6).contains(&i)) == (j.kind == JointKind::Revolute))
 }
 
-fn good_id(id: &str) -> bool {
+/// What an id looks like.
+pub const ID_FORM: &str = "an id is `maker/model` in lower-case letters, digits and `-`";
+
+/// Whether this can be the id of a machine: `maker/model` in lower-case letters, digits and `-`.
+pub fn good_id(id: &str) -> bool {
     let good = |part: &str| {
         !part.is_empty() && part.bytes().all(|b| b.is_ascii_lowercase() || b.is_ascii_digit() || b == b'-')
     };

@@ -60,10 +60,13 @@ impl OutputFile {
     }
 }
 
+/// Decimals that positions may have.
+pub const DECIMALS: std::ops::RangeInclusive<usize> = 3..=6;
+
 /// What the user chose.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Options {
-    /// Decimals of positions, 3 to 6; none = what the language is used to.
+    /// Decimals of positions, one of [`DECIMALS`]; none = what the language is used to.
     pub decimals: Option<usize>,
     /// Accept forms whose meaning on the controller is not confirmed.
     pub allow_unverified: bool,

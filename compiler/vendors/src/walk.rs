@@ -683,7 +683,7 @@ impl<'p> Cx<'p> {
 
     /// Decimals of positions, mm.
     pub fn decimals(&self) -> usize {
-        self.options.decimals.unwrap_or(3).clamp(3, 6)
+        self.options.decimals.unwrap_or(*crate::DECIMALS.start()).clamp(*crate::DECIMALS.start(), *crate::DECIMALS.end())
     }
 }
 

@@ -161,9 +161,18 @@ pub fn verify(global: &Global, args: &VerifyArgs) -> Exit {
         eprintln!("-o goes with --machine and a robot: without one there is no table of points to write");
         return Exit::Usage;
     }
-    let goal = Goal { target: "rs274ngc", options: &args.options, machine: None, from_line: None, file: None };
+    // A job says where the part is: that matters to the machine, not to what is written.
+    let mut options = args.options.clone();
+    if station.machine.is_some() {
+        options.robot.job = None;
+    }
+    let goal = Goal { target: "rs274ngc", options: &options, machine: None, from_line: None, file: None };
     let made = load(&args.file, station).and_then(|unit| {
-        let a = motion(&unit, station.machine.as_ref())?.0;
+        let mut a = motion(&unit, station.machine.as_ref())?.0;
+        let placed = Goal { options: &args.options, machine: station.machine.as_ref(), ..goal };
+        if let Err(found) = crate::robot::take_job(&mut a, &placed) {
+            return Err(super::check::Checked { sources: a.sources, found, ..super::check::Checked::nothing() });
+        }
         // An arm that is not planned is asked about every point all the same.
         let found = station.machine.as_ref().map_or_else(Vec::new, |m| crate::robot::opinion(&a, m));
         if found.iter().any(|d| d.severity == gr_text::Severity::Error) {
@@ -211,16 +220,19 @@ pub fn verify(global: &Global, args: &VerifyArgs) -> Exit {
     }
     let state = built.found.into_iter().filter(|d| d.code == gr_text::code::EMIT_ELSEWHERE);
     let mut told = Exit::Ok;
-    for finding in state {
+    for mut finding in state {
+        station.lints.harden(&mut finding);
         renderer.show(&built.sources, &finding);
-        told = Exit::Findings;
+        if finding.severity == gr_text::Severity::Error {
+            told = Exit::Findings;
+        }
     }
     renderer.finish(false);
     tell(global, &result, &a.sources, &b.sources).max(told)
 }
 
 /// What matters to the joint values.
-const ROBOT_OPTIONS: [&str; 6] = ["--approach", "--reconfigure", "--arc-tolerance", "--job", "--compensate", "--reference"];
+pub const ROBOT_OPTIONS: [&str; 6] = ["--approach", "--reconfigure", "--arc-tolerance", "--job", "--compensate", "--reference"];
 
 /// Joint values of a robot against the points they are for.
 fn on_robot(global: &Global, args: &VerifyArgs, station: &Station, machine: &gr_machine::Machine, renderer: &mut Renderer) -> Exit {

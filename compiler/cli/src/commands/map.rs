@@ -463,7 +463,7 @@ fn estimate_on(cores: usize, places: usize, some: impl FnOnce(usize)) {
     let seconds = start.elapsed().as_secs_f64() / SOME as f64 * places as f64 / cores as f64;
     if seconds >= 2.0 {
         // Whoever closed standard error does not want to know.
-        let _ = writeln!(std::io::stderr(), "{places} places, not in closed form: about {seconds:.0} s");
+        let _ = writeln!(std::io::stderr(), "{places} places, not in closed form: the search takes about {seconds:.0} s");
     }
 }
 
