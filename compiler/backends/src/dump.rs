@@ -168,7 +168,13 @@ fn machine<'j>(line: &'j mut Json, op: &Op<'_>) -> &'j mut Json {
             .num("front", *front)
             .num("back", *back)
             .int("orientation", n(*orientation)),
-        Op::ToolOffset(axes) => line.op("tool_offset").nums("offset", axes),
+        Op::ToolOffset { offset, number } => {
+            line.op("tool_offset").nums("offset", offset);
+            if let Some(number) = number {
+                line.int("number", i64::from(*number));
+            }
+            line
+        }
         Op::WorkOffset(number, axes) => {
             line.op("work_offset").int("number", n(i32::from(*number))).nums("offset", axes)
         }

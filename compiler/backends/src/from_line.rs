@@ -369,7 +369,7 @@ fn length_to_come(program: &Program, index: usize, state: &State, sources: &dyn 
     for s in own(program, index) {
         match s.op {
             Op::ToolChange(_) | Op::ToolNumber(_) => in_force = false,
-            Op::ToolOffset(_) => in_force = asked(&s),
+            Op::ToolOffset { .. } => in_force = asked(&s),
             _ => {}
         }
     }
@@ -380,7 +380,7 @@ fn length_to_come(program: &Program, index: usize, state: &State, sources: &dyn 
     for s in program.steps().skip(index) {
         match s.op {
             Op::ToolChange(_) | Op::ToolNumber(_) | Op::End => break,
-            Op::ToolOffset(offset) if asked(&s) => said = Some(said.unwrap_or(0.0f64).max(offset[2])),
+            Op::ToolOffset { offset, .. } if asked(&s) => said = Some(said.unwrap_or(0.0f64).max(offset[2])),
             _ => {}
         }
     }
@@ -428,7 +428,7 @@ fn build(program: &Program, from: &From, state: &State, pose: &Pose, room: &Room
     out.names_of(program);
     let source = Source { line: INSERTED, ..Source::default() };
     // The line that asked for the offset knows more than the offset: of a tool that was never measured it is 0.
-    let offset = own(program, index).filter(|s| matches!(s.op, Op::ToolOffset(_))).last().map(|s| s.source);
+    let offset = own(program, index).filter_map(|s| if let Op::ToolOffset { number, .. } = s.op { Some((number, s.source)) } else { None }).last();
     let mut restore = Restore { out, source };
     restore.push(Op::Note(Note::Comment, &format!("restart at line {}", from.line)));
     restore.stored(program, index, sources);
@@ -605,14 +605,14 @@ impl Restore {
         }
     }
 
-    /// `offset`: the line that asked for the tool's length; none: the program has not spoken of it.
-    fn tool(&mut self, s: &State, offset: Option<Source>) {
+    /// `offset`: the number that asked for the tool's length, and its line; none: the program has not spoken of it.
+    fn tool(&mut self, s: &State, offset: Option<(Option<u32>, Source)>) {
         if s.tool > 0 {
             self.push(Op::ToolPrepare(s.tool));
             self.push(Op::ToolChange(0));
         }
-        if let Some(line) = offset {
-            self.out.push(Op::ToolOffset(s.tool_offset), line);
+        if let Some((number, line)) = offset {
+            self.out.push(Op::ToolOffset { offset: s.tool_offset, number }, line);
         }
         if s.prepared > 0 && s.prepared != s.tool {
             self.push(Op::ToolPrepare(s.prepared));

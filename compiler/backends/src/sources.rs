@@ -81,11 +81,6 @@ impl Words {
         }
     }
 
-    /// Whether a line asks for the length of a tool: by G43, or under it by H alone, where H holds. (Under G49 such a line asks for nothing.)
-    pub fn asks_length(self, sources: &dyn Sources) -> bool {
-        self.g(430) || sources.offset_numbers() && self.has(b'h') && !self.g(490)
-    }
-
     /// Whether a line moves by increments: it says so, or the last line before it that says G90 or G91 does.
     pub fn goes_by_increments(sources: &dyn Sources, file: FileId, line: u32) -> bool {
         if Words::at(sources, file, line).is_some_and(|w| w.incremental) {
@@ -131,26 +126,6 @@ pub fn number_of(sources: &dyn Sources, letter: char, source: Source) -> Option<
     let digits: String = rest.chars().take_while(char::is_ascii_digit).collect();
     let after = rest[digits.len()..].chars().next();
     if after == Some('.') { None } else { digits.parse().ok() }
-}
-
-/// The number behind H of a line that asks for the length of a tool. Where H holds and the line has none, it is that of the last line with one, if nothing
-/// between them says that lines may run in another order (calls, loops, jumps).
-pub fn length_number(sources: &dyn Sources, source: Source) -> Option<u32> {
-    if !sources.offset_numbers() {
-        return number_of(sources, 'h', source);
-    }
-    for line in (source.line.saturating_sub(MOST_LINES)..=source.line).rev() {
-        let at = Source { line, ..source };
-        let words = Words::at(sources, source.file, line)?;
-        // O1000, GOTO, DO, END, G65, G66, M98, M99.
-        if words.has(b'o') || words.has(b'e') || words.g(650) || words.g(660) || matches!(number_of(sources, 'm', at), Some(98 | 99)) {
-            return None;
-        }
-        if words.has(b'h') {
-            return number_of(sources, 'h', at);
-        }
-    }
-    None
 }
 
 /// Whether a line sets a work offset from where the tool stands (G10 L20).

@@ -167,8 +167,8 @@ pub enum Call {
     ReloadTooldata,
     /// G10 L1 …: pocket, tool, offsets, diameter, front angle, back angle, orientation.
     SetToolTableEntry(i32, i32, Axes, f64, f64, f64, i32),
-    /// G43 and its like.
-    UseToolLengthOffset(Axes),
+    /// G43 and its like, and the number that asks for it (H), which is not printed.
+    UseToolLengthOffset(Axes, Option<u32>),
     /// M7.
     MistOn,
     /// M9.

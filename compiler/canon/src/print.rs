@@ -259,7 +259,7 @@ fn body(call: &Call, version: Version, out: &mut Vec<u8>) {
             push_int(out, i64::from(*i));
             pose(out, b", ", p);
         }
-        Call::UseToolLengthOffset(p) => tool_offset(out, p),
+        Call::UseToolLengthOffset(p, _) => tool_offset(out, p),
         Call::SetToolTableEntry(pocket, tool, offset, _, front, back, orientation) => {
             tool_entry(out, [*pocket, *tool, *orientation], offset, [*front, *back]);
         }
@@ -459,7 +459,7 @@ mod tests {
             Call::StartSpeedFeedSynch(0, 1.5, false),
             Call::SetSpindleMode(0, 0.0, None),
             Call::WaitSpindleOrientComplete(0, 2.0),
-            Call::UseToolLengthOffset(p),
+            Call::UseToolLengthOffset(p, None),
             Call::SetToolTableEntry(1, 2, p, 3.0, 10.0, 20.0, 4),
             Call::StartChange,
             Call::ChangeTool(3),

@@ -412,8 +412,13 @@ pub fn is_for_machine(goal: &Goal<'_>) -> bool {
 
 /// Whether joint-gcode goes through the planner: every robot but the planar arm, which has its own way, and mills.
 pub fn plans_joints(goal: &Goal<'_>) -> bool {
+    planned(goal.options, goal.machine)
+}
+
+/// The same before there is a goal.
+pub fn planned(options: &crate::emit::TargetOptions, machine: Option<&Machine>) -> bool {
     let planned = |m: &Machine| gr_robot::along::is_planned(m) || m.kind == Kind::Mill;
-    matches!(goal.options.reference, None | Some(crate::emit::Reference::Usp2009)) && goal.machine.is_some_and(planned)
+    matches!(options.reference, None | Some(crate::emit::Reference::Usp2009)) && machine.is_some_and(planned)
 }
 
 /// Joint positions as LinuxCNC words with inverse time, and both tables.

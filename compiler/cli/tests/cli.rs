@@ -327,6 +327,11 @@ fn reference_ufmg2008() {
     assert_eq!(first(&space, 3), "t;X;Y;Z;A;B;C|0;100;0;0;0;0;-90|0,025;50;50;0;0;0;-60");
     assert_eq!(first(&joints, 3), "t;J1;J2;J3|0;90;-90;-90|0,025;136,92;-93,84;-103,07");
     assert_eq!((space.lines().count(), joints.lines().count()), (program.lines().count() + 1, program.lines().count() + 1));
+    // In a folder the joints have the name that the interface gives them.
+    let o = in_folder(at, &["build", "a.g", "--target", "joint-gcode", "--reference", "ufmg2008", "-o", "out/"]);
+    let mut names: Vec<String> = std::fs::read_dir(at.join("out")).unwrap().map(|f| f.unwrap().file_name().to_string_lossy().into_owned()).collect();
+    names.sort();
+    assert_eq!((code(&o), names.join("|").as_str()), (0, "a - juntas-cartesian.csv|a - juntas-joint.csv|a - juntas.g"), "{}", whole(&o));
     // What it writes it reads: the first line, with F0, is where it begins.
     let o = in_folder(at, &["check", "b.g"]);
     assert_eq!(code(&o), 0, "{}", whole(&o));
@@ -767,13 +772,18 @@ fn offset_numbers_of_a_fanuc_mill_are_written() {
         told += &format!("{to}\n{}\n\n", written[0]);
     }
     insta::assert_snapshot!(told);
-    // Which number it is, nobody knows here.
-    for program in ["#1=2\nT1 M6\nG43 Z50. H#1\nM30\n", "T1 M6\nG43 Z50. H1\nM98 P2\nH3\nG0 Z9.\nM30\nO2\nG43 Z40.\nM99\n"] {
+    // The number is a variable's, a macro's argument, or stands in another program.
+    let (variable, called) = ("#1=2\nT1 M6\nG43 Z50. H#1\nM30\n", "T1 M6\nG43 Z50. H1\nM98 P2\nH3\nG0 Z9.\nM30\nO2\nG43 Z40.\nM99\n");
+    let argument = "T1 M6\nG65 P2 H4\nM30\nO2\nG43 Z40. H#11\nM99\n";
+    let numbers = [(variable, &["H2"][..]), (called, &["H1", "H1", "H3"]), (argument, &["H4"])];
+    for (program, numbers) in numbers {
         std::fs::write(at.join("b.nc"), format!("O1\nG21 G90\n{program}")).expect("writable");
-        let o = in_folder(at, &["build", "b.nc", "--dialect", "fanuc-mill", "--target", "rs274ngc"]);
-        assert!(!o.status.success() && text(&o.stderr).contains("--tools"), "{}", whole(&o));
-        let o = in_folder(at, &["build", "b.nc", "--dialect", "fanuc-mill", "--target", "rs274ngc", "-t", "t.tbl"]);
-        assert!(o.status.success(), "{}", whole(&o));
+        for to in ["fanuc-mill", "linuxcnc"] {
+            let o = in_folder(at, &["build", "b.nc", "--dialect", "fanuc-mill", "--target", "rs274ngc", "--to", to]);
+            let written = text(&o.stdout);
+            let asked: Vec<&str> = written.lines().filter(|l| l.contains("G43")).filter_map(|l| l.split(' ').find(|w| w.starts_with('H'))).collect();
+            assert!(o.status.success() && asked == numbers, "{}", whole(&o));
+        }
     }
     // R of L10 is a length, R of L12 a radius.
     std::fs::write(at.join("c.nc"), "O1\nG21 G90\nG10 L10 P1 R151.234\nG10 L12 P2 R3.\nT1 M6\nG43 Z5. H1\nM30\n").expect("writable");
@@ -782,6 +792,13 @@ fn offset_numbers_of_a_fanuc_mill_are_written() {
     let entries: Vec<&str> = written.lines().filter(|l| l.starts_with("G10")).collect();
     assert!(o.status.success() && entries.contains(&"G10 L1 P1 Z151.234") && entries.contains(&"G10 L1 P2 R3"), "{}", whole(&o));
     assert!(entries.iter().all(|l| !l.starts_with("G10 L1 P1 R")), "{written}");
+    let o = in_folder(at, &["build", "c.nc", "--dialect", "fanuc-mill", "--target", "rs274ngc", "--to", "fanuc-mill"]);
+    let written = text(&o.stdout);
+    assert!(o.status.success() && ["G10 L10 P1 R151.234", "G10 L12 P2 R3."].iter().all(|l| written.lines().any(|w| w == *l)), "{}", whole(&o));
+    // A Fanuc mill has no other offsets of a tool than its length and its radius.
+    std::fs::write(at.join("x.ngc"), "G10 L1 P1 X5 Z6\nM2\n").expect("writable");
+    let o = in_folder(at, &["build", "x.ngc", "--target", "rs274ngc", "--to", "fanuc-mill"]);
+    assert!(!o.status.success() && text(&o.stderr).contains("its length and its radius"), "{}", whole(&o));
     // A restart under G43 of a tool that nobody has measured, with G49 still to come: the length is in force.
     std::fs::write(at.join("d.nc"), "O1\nG21 G90 G54\nT3 M6\nS900 M3\nG0 X1. Y1.\nG43 Z50. H3\nG1 Z-1. F100.\nX10.\nG0 Z50.\nG49\nM30\n").expect("writable");
     for (line, bare) in [("8", false), ("5", true)] {

@@ -47,6 +47,37 @@ fn nothing_is_written_with_errors() {
     assert!(text(&checked.stdout).contains("far.ngc:3:") || text(&checked.stderr).contains("far.ngc:3:"), "{}{}", text(&checked.stdout), text(&checked.stderr));
 }
 
+/// What an output of the cell cannot say is told or said otherwise: switches that are on and off, numbers of outputs.
+#[test]
+fn rows_of_outputs() {
+    let folder = tempfile::tempdir().unwrap();
+    let put = |name: &str, text: &str| {
+        let path = folder.path().join(name);
+        std::fs::write(&path, text).unwrap();
+        path.display().to_string()
+    };
+    let cell = std::fs::read_to_string(root().join(CELL)).unwrap();
+    let rows = "[io.M50]\nsignal = \"doOvr\"\n[io.M53]\nsignal = \"doHold\"\nvalue = 0\n[io.M62]\nsignal = \"doAny\"\n[io.M63P2]\nsignal = \"doTwo\"\nvalue = 0\n[io.M68]\nsignal = \"aoAny\"\n[io.M68P3]\nsignal = \"aoThree\"\n";
+    let cell = put("cell.toml", &format!("{cell}\n{rows}"));
+    let of = |words: &str| {
+        let part = put("part.ngc", &format!("G21 G90 T1 M6\nG0 X0 Y0 Z20\n{words}\nG1 X5 F600\nM30\n"));
+        let out = folder.path().join("part.mod");
+        _ = std::fs::remove_file(&out);
+        let made = run(&["build", &part, "--machine", &cell, "--target", "rapid", "-o", out.to_str().unwrap(), "-q", "--message-format", "short"]);
+        let set = |l: &&str| l.trim_start().starts_with("Set");
+        let program = std::fs::read_to_string(&out).unwrap_or_default();
+        let sets: Vec<String> = program.lines().filter(set).filter_map(|l| l.split('!').next()).map(|l| l.trim().to_string()).filter(|l| l.contains("Ovr") || l.contains("Hold") || l.contains("Any") || l.contains("Two") || l.contains("Three")).collect();
+        if made.status.success() { sets.join(" ") } else { text(&made.stderr).lines().filter(|l| l.contains("error[")).collect::<Vec<_>>().join(" ") }
+    };
+    assert_eq!(of("M49\nG1 X1 F600\nM48"), "SetDO doOvr,0; SetDO doOvr,1;");
+    assert_eq!(of("M53 P0\nG1 X1 F600\nM53 P1"), "SetDO doHold,1; SetDO doHold,0;");
+    assert_eq!(of("M62 P2\nG1 X1 F600\nM63 P2\nM68 E3 Q2.5"), "SetDO doTwo,1; SetDO doTwo,0; SetAO aoThree,2.5;");
+    for (words, word) in [("M62 P1", "M62 P1"), ("M64 P3", "M64 P3"), ("M68 E1 Q2", "M68 E1 Q2")] {
+        let told = of(words);
+        assert!(told.contains("E0523") && told.contains(&format!("the number of {word}")), "{words}: {told}");
+    }
+}
+
 #[test]
 fn joint_targets() {
     for (target, beside) in [("joint-gcode", ["-cartesian.csv", "-joint.csv"]), ("setpoints", [".bin", ".bin"])] {

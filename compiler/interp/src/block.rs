@@ -49,6 +49,10 @@ pub struct Block {
     pub turning: i16,
     /// Fanuc: G67.
     pub ends_modal: bool,
+    /// Fanuc: G50.1, whose axis words name what it lets go.
+    pub mirror_off: bool,
+    /// Fanuc: G5, G5.1 or G8 (times ten), −1 = none.
+    pub look_ahead: i16,
     /// Fanuc: G53 without a motion of its own, which leaves the motion in force.
     pub machine_rapid: bool,
     /// Steps of execution that are done already (a remapped block is executed in several goes).
@@ -70,6 +74,8 @@ impl Default for Block {
             motion: -1,
             turning: -1,
             ends_modal: false,
+            mirror_off: false,
+            look_ahead: -1,
             machine_rapid: false,
             done: 0,
             remapped: 0,
@@ -120,6 +126,8 @@ impl Block {
         self.motion = -1;
         self.turning = -1;
         self.ends_modal = false;
+        self.mirror_off = false;
+        self.look_ahead = -1;
         self.machine_rapid = false;
         self.done = 0;
         self.remapped = 0;

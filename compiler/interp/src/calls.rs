@@ -16,6 +16,8 @@ use crate::{Fault, Interp, Res};
 pub(crate) const ARGS: usize = 30;
 /// Call levels, the main program counted.
 const LEVELS: usize = 10;
+/// Levels of a Fanuc control, with the main program (Series 0i/30i operator's manual, B-64484, subprogram).
+const FANUC_LEVELS: usize = 11;
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum CallKind {
@@ -80,11 +82,16 @@ pub(crate) fn structure(rs: Rs274, what: &str) -> Box<Fault> {
 }
 
 impl<S: Sink> Interp<'_, S> {
-    /// Whether the first word makes the line an M98 or M99 that works as an O-word.
+    /// Whether a line is an M98 or M99 that works as an O-word: by its first word, or on a Fanuc control by any.
     #[inline]
-    pub(crate) fn fanuc_call(&self, first: Option<&Word>) -> Option<Fanuc> {
-        let w = first?;
-        if w.form != Form::Literal {
+    pub(crate) fn subprogram_line(&self, words: &[Word], first: Option<&Word>) -> Option<Fanuc> {
+        let by_first = first.and_then(|w| self.subprogram_word(w));
+        if by_first.is_none() && self.is_fanuc() { words.iter().find_map(|w| self.subprogram_word(w)) } else { by_first }
+    }
+
+    #[inline]
+    fn subprogram_word(&self, w: &Word) -> Option<Fanuc> {
+        if w.letter != b'm' || w.form != Form::Literal {
             return None;
         }
         match whole(w.value) {
@@ -94,13 +101,21 @@ impl<S: Sink> Interp<'_, S> {
         }
     }
 
-    /// A line that begins with M98 or M99.
-    pub(crate) fn fanuc_line(&mut self, scan: &Scan, words: &[Word], which: Fanuc) -> Res {
+    /// A line with M98 or M99.
+    pub(crate) fn fanuc_line(&mut self, scan: &Scan, text: &str, words: &[Word], which: Fanuc) -> Res {
         self.count_control()?;
         self.check_listed_m(if which == Fanuc::M98 { 98 } else { 99 })?;
-        let rest: Vec<Word> = first_real(words).map_or_else(Vec::new, |first| {
+        let mut rest: Vec<Word> = first_real(words).map_or_else(Vec::new, |first| {
             words.iter().filter(|w| w.start > first.start).copied().collect()
         });
+        if self.is_fanuc() {
+            let own = |w: &Word| matches!(w.letter, b'p' | b'l' if which == Fanuc::M98 || w.letter == b'p');
+            let others: Vec<Word> = words.iter().filter(|w| !own(w) && w.letter != b'n' && self.subprogram_word(w) != Some(which)).copied().collect();
+            if others.iter().any(|w| w.form != Form::Comment) {
+                self.beside_call(scan, text, &others, which)?;
+                rest = words.iter().filter(|w| own(w)).copied().collect();
+            }
+        }
         if which == Fanuc::M99 {
             if self.config.no_fanuc_subs {
                 return Err(structure(rs274::RT_M99_DISABLED, "M99 as end of a subroutine is switched off in the INI file"));
@@ -127,9 +142,8 @@ impl<S: Sink> Interp<'_, S> {
         if self.config.no_fanuc_subs {
             return Err(structure(rs274::RT_M98_DISABLED, "M98 is switched off in the INI file"));
         }
-        let text = self.reading.text.clone();
         for w in &rest {
-            self.read_word(scan, &text, w)?;
+            self.read_word(scan, text, w)?;
         }
         let Some(p) = self.block.get(b'p') else {
             return Err(Fault::new(code::WORD_MISSING, rs274::RT_M98_P).arg("M98").arg("P").at(b'm'));
@@ -152,6 +166,29 @@ impl<S: Sink> Interp<'_, S> {
         }
         let repeats = self.block.get(b'l').map(to_int).or(in_p.map(|n| n as i32));
         self.call(label, CallKind::M98, [0.0; ARGS], 0, repeats)
+    }
+
+    /// Fanuc: the other words of a block with M98 or M99 are carried out, then the subprogram is called or left (Series 0i/30i
+    /// operator's manual, common to lathe and machining center, B-64484, subprogram).
+    fn beside_call(&mut self, scan: &Scan, text: &str, words: &[Word], which: Fanuc) -> Res {
+        let done = which == Fanuc::M98 && self.levels[self.level()].m98_left != -1;
+        if self.skip.is_some() || self.defining_sub || done {
+            return Ok(());
+        }
+        let name = if which == Fanuc::M98 { "M98" } else { "M99" };
+        let ends = |w: &&Word| w.letter == b'm' && w.form == Form::Literal && matches!(whole(w.value), Some(2 | 30 | 98 | 99));
+        if let Some(other) = words.iter().find(ends) {
+            return Err(self.not_carried_out(rs274::SILENT, format!("{name} beside M{}", other.value)).at(b'm'));
+        }
+        if !self.modal_macros.is_empty() {
+            return Err(self.not_carried_out(rs274::SILENT, format!("{name} beside other words while G66 is in force")).at(b'm'));
+        }
+        for w in words {
+            self.read_word(scan, text, w)?;
+        }
+        self.execute_line()?;
+        self.block.clear();
+        Ok(())
     }
 
     /// Fanuc: M99 P goes back to the block with that number.
@@ -270,7 +307,7 @@ impl<S: Sink> Interp<'_, S> {
     /// Calls a subroutine.
     pub(crate) fn call(&mut self, label: Label, kind: CallKind, args: [f64; ARGS], count: u32, repeats: Option<i32>) -> Res {
         let level = self.level();
-        if level + 1 >= LEVELS {
+        if level + 1 >= if self.is_fanuc() { FANUC_LEVELS } else { LEVELS } {
             return Err(Fault::new(code::SUB_LIMIT, rs274::RT_O_LEVELS).arg("subroutines call each other too deeply"));
         }
         if kind == CallKind::M98 && repeats == Some(0) {
@@ -348,9 +385,23 @@ impl<S: Sink> Interp<'_, S> {
             let what = "the subroutine is neither known so far nor a file of its own";
             let fault = structure(rs274::RT_O_NOT_FOUND, what);
             return Err(with_args(fault, &[name, &format!("{name}.ngc")]));
+        } else if self.is_fanuc() && let Some((file, line)) = self.subprogram(name) {
+            // All programs are in the control's memory, in no order.
+            if file != self.place.file {
+                self.shift = self.levels[0].ret.as_ref().map_or(0, |ret| ret.shift);
+            }
+            (self.place.file, self.next) = (file, line);
         }
         self.skip = Some(Skip { label, to_sub: true, start, from: Some(from) });
         Ok(())
+    }
+
+    /// Where a program of this file, or of the main program's, begins.
+    fn subprogram(&mut self, name: &str) -> Option<(FileId, u32)> {
+        let (here, line) = (self.place.file, self.place.line);
+        let main = self.levels[0].ret.as_ref().map_or(here, |ret| ret.place.file);
+        let mut find = |file: FileId| self.index(file).subprogram(name, line).map(|at| (file, at));
+        find(here).or_else(|| if main == here { None } else { find(main) })
     }
 
     /// Where a file that is called begins: on a Fanuc control every file opens with `%`, which is no end of it.
@@ -428,8 +479,8 @@ impl<S: Sink> Interp<'_, S> {
         if let Some(w) = first.filter(|w| w.letter == b'o') {
             return self.control_line(scan, &chunk.text, l, words, w);
         }
-        if let Some(which) = first.filter(|w| w.letter == b'm').and_then(|_| self.fanuc_call(first)) {
-            return self.fanuc_line(scan, words, which);
+        if let Some(which) = self.subprogram_line(words, first) {
+            return self.fanuc_line(scan, &chunk.text, words, which);
         }
         if self.skip.is_some() {
             return Ok(());

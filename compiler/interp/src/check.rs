@@ -324,7 +324,8 @@ impl<S: Sink> Interp<'_, S> {
                 || matches!(m5, 62..=66)
                 || m7 == 19
                 || user_m
-                || self.m98;
+                || self.m98
+                || self.is_fanuc() && b.m[4] == 99;
             if !used {
                 return unused(if new { rs274::RT_P_UNUSED_NEW } else { rs274::RT_P_UNUSED }, b'p');
             }

@@ -388,11 +388,6 @@ impl<S: Sink> Interp<'_, S> {
                 self.emit(Call::ProgramStop);
             }
             1 => self.emit(Call::OptionalProgramStop),
-            99 if self.level() > 0 && self.is_fanuc() => {
-                let back = self.block.get(b'p');
-                self.convert_return(gr_gcode::Keyword::MacroEnd, true)?;
-                return back.map_or(Ok(()), |n| self.go_to_number(n));
-            }
             99 if self.level() > 0 => {
                 let fault = Fault::new(code::SUB_STRUCTURE, rs274::RT_M99_BUG).at(b'm');
                 return Err(fault.own_args(&["M99 ends a subroutine only at the start of its line"]));
@@ -404,6 +399,10 @@ impl<S: Sink> Interp<'_, S> {
                 self.emit(Call::Finish);
                 self.count_main_pass()?;
             }
+            99 if self.goes_on_below() => {
+                let to = self.block.or_zero(b'p');
+                return self.go_to_number(to);
+            }
             99 => {
                 self.warn(Fault::own(code::PROGRAM_REPEATS).at(b'm'));
                 self.end_program(m);
@@ -411,6 +410,13 @@ impl<S: Sink> Interp<'_, S> {
             _ => self.end_program(m),
         }
         Ok(())
+    }
+
+    /// M99 P of a Fanuc main program goes to a block of that number. One further up is the program over again.
+    fn goes_on_below(&mut self) -> bool {
+        let Some(number) = self.block.get(b'p').filter(|_| self.is_fanuc()) else { return false };
+        let line = self.index(self.place.file).numbered(number as i64, self.place.line);
+        line.is_none_or(|l| l > self.place.line)
     }
 
     fn end_program(&mut self, m: i16) {

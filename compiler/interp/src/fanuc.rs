@@ -2,11 +2,11 @@
 //! coordinates (G68, G69), G80 that goes back to the motion before the cycle. Sources stand with the rows of the
 //! dialects.
 
-use gr_canon::{Axes, Call, Sink};
+use gr_canon::{Axes, Call, Plane, Sink};
 use gr_gcode::Binary;
 use gr_spec::{Dialect, Family, code, rs274};
 
-use crate::block::{Group, letters};
+use crate::block::{AXES, Group, letters};
 use crate::motion::rotate;
 use crate::queue::plane_axes;
 use crate::{Fault, Interp, Res};
@@ -19,6 +19,8 @@ const INCREMENTS: [(u8, u8); 4] = [(b'u', b'x'), (b'v', b'y'), (b'w', b'z'), (b'
 const INCREMENT_MASK: u32 = letters(b"uvwh");
 /// Words of a mill that name offsets.
 const OFFSET_NUMBERS: u32 = letters(b"dh");
+/// Words of a lathe's G1 that may be a corner.
+const CORNER_MASK: u32 = letters(b"ac");
 const LETTERS: [u8; 9] = *b"xyzabcuvw";
 const CENTRES: [u8; 3] = *b"ijk";
 
@@ -51,6 +53,20 @@ impl<S: Sink> Interp<'_, S> {
             self.block.ends_modal = true;
             return true;
         }
+        let row = |name: &str| self.setup.dialect.code(name).is_some();
+        match n {
+            50 | 51 | 80 if row("G8") => self.block.look_ahead = n as i16,
+            // What these end is refused, so nothing is on that they could switch off.
+            110 if row("G11") => {}
+            150 if row("G15") => {}
+            500 if row("G50.1") => {}
+            501 if row("G50.1") => self.block.mirror_off = true,
+            _ => return self.take_turn(n),
+        }
+        true
+    }
+
+    fn take_turn(&mut self, n: i32) -> bool {
         let turns = matches!(n, 680 | 690) && self.setup.dialect.code(if n == 680 { "G68" } else { "G69" }).is_some();
         let known = turns || n == 500 && is_lathe(self.setup.dialect);
         if known {
@@ -67,10 +83,19 @@ impl<S: Sink> Interp<'_, S> {
         if !is_lathe(self.setup.dialect) {
             self.offset_numbers()?;
         }
+        if self.block.mirror_off {
+            self.block.present &= !AXES;
+        }
+        if self.block.look_ahead != -1 {
+            self.look_ahead()?;
+        }
         match self.block.turning {
             -1 => {}
             500 => return self.clamp_spindle("G50"),
             _ => return self.turn_coordinates(),
+        }
+        if matches!(self.block.g(Group::NonModal), 100 | 280 | 300 | 520 | 920) {
+            self.motion_from_now_on();
         }
         match self.block.g(Group::NonModal) {
             100 => return self.data_input(),
@@ -85,7 +110,8 @@ impl<S: Sink> Interp<'_, S> {
             return Err(self.not_in_dialect("P with an arc", "write a block for each turn").at(b'p'));
         }
         let dwell = self.block.g(Group::NonModal) == 40;
-        if is_lathe(self.setup.dialect) && self.block.has_any_of(INCREMENT_MASK) && !dwell {
+        if is_lathe(self.setup.dialect) && self.block.has_any_of(CORNER_MASK | INCREMENT_MASK) && !dwell {
+            self.corner()?;
             self.increments()?;
         }
         // G80 goes back to the motion of group 01, which a bare axis word then makes.
@@ -95,6 +121,45 @@ impl<S: Sink> Interp<'_, S> {
             self.block.g[Group::Motion as usize] = -1;
             self.block.g_mask &= !(1 << Group::Motion as u32);
         }
+        Ok(())
+    }
+
+    /// A code of group 01 beside one of group 00 that takes the axis words: it is in force from now on.
+    fn motion_from_now_on(&mut self) {
+        let motion = self.block.g(Group::Motion);
+        if matches!(motion, 0 | 10 | 20 | 30) {
+            self.m.motion = i32::from(motion);
+            self.leave_cycle();
+            self.block.g[Group::Motion as usize] = -1;
+            self.block.g_mask &= !(1 << Group::Motion as u32);
+        }
+    }
+
+    /// G5 P, G5.1 Q and G8 P choose how far the control looks ahead; axis words name the axes that they are for.
+    fn look_ahead(&mut self) -> Res {
+        let own = if self.block.look_ahead == 51 { b'q' } else { b'p' };
+        let name = crate::check::code_name(self.block.look_ahead);
+        if !self.block.has(own) {
+            return Err(Fault::new(code::WORD_MISSING, rs274::SILENT).arg(name).arg(own.to_ascii_uppercase() as char).at(b'g'));
+        }
+        self.block.present &= !(AXES | letters(b"pqr"));
+        self.warn(Fault::own(code::PATH_LOOK_AHEAD).at(b'g').arg(name));
+        Ok(())
+    }
+
+    /// A lathe without a C axis takes C and A beside one axis of G1 for a chamfer and for the angle of the line. A lathe with one has
+    /// positioned it before it cuts.
+    fn corner(&mut self) -> Res {
+        let b = &self.block;
+        let cuts = b.g(Group::Motion) == 10 || b.g(Group::Motion) == -1 && self.m.motion == 10;
+        let cuts = cuts && b.g(Group::NonModal) == -1;
+        let goes = [b.has_any(b"xu"), b.has_any(b"zw")];
+        let letter = if b.has(b'a') { 'A' } else { 'C' };
+        if cuts && b.has_any(b"ac") && goes != [false; 2] && (letter == 'A' || self.m.c_axis == 0 && goes != [true; 2]) {
+            let what = if letter == 'A' { "angle of the line" } else { "chamfer" };
+            return Err(Fault::new(code::CODE_NOT_CARRIED_OUT, rs274::SILENT).arg(format!("{letter} with G1")).arg(what).at(letter.to_ascii_lowercase() as u8));
+        }
+        self.m.c_axis |= u8::from(b.has_any(b"ch"));
         Ok(())
     }
 
@@ -279,24 +344,33 @@ impl<S: Sink> Interp<'_, S> {
 
     /// G68 X Y R, G69.
     fn turn_coordinates(&mut self) -> Res {
-        let on = std::mem::replace(&mut self.block.turning, -1) == 680;
-        if !on {
+        if self.block.turning == 690 {
             self.m.turned = 0;
             return Ok(());
         }
         let refuse = |what: &str| {
             Err(Fault::new(code::CODE_NOT_CARRIED_OUT, rs274::RT_UNKNOWN_G).arg(format!("G68 {what}")).arg("Coordinate rotation").at(b'g'))
         };
-        if self.m.incremental != 0 {
+        if self.goes_by_increments() {
             return refuse("in G91");
         }
+        self.motion_from_now_on();
         if self.m.comp_side != 0 {
             return refuse("while cutter compensation is on");
         }
-        if self.block.g_mask & !(1 << Group::Plane as u32) != 0 || self.block.g(Group::Plane) != -1 {
-            return refuse("together with another G-code");
+        let b = &self.block;
+        if b.g(Group::NonModal) != -1 || b.g(Group::Motion) != -1 || !matches!(b.g(Group::ToolLength), -1 | 490) || !matches!(b.g(Group::CutterComp), -1 | 400) {
+            return refuse("together with a code that moves the tool");
         }
-        let [one, two, _] = plane_axes(self.m.plane());
+        let [one, two, _] = plane_axes(match b.g(Group::Plane) {
+            170 => Plane::Xy,
+            180 => Plane::Xz,
+            190 => Plane::Yz,
+            _ => self.m.plane(),
+        });
+        if b.g(Group::CoordSystem) != -1 && !(b.has(LETTERS[one]) && b.has(LETTERS[two])) {
+            return refuse("with a coordinate system and without both coordinates of the centre");
+        }
         let Some(angle) = self.block.get(b'r') else {
             return Err(Fault::new(code::WORD_MISSING, rs274::RT_UNKNOWN_G).arg("G68").arg("R").at(b'g'));
         };

@@ -31,10 +31,8 @@ impl<S: Sink> Interp<'_, S> {
         self.block.clear();
         self.comment = None;
         let first = if words.first().is_some_and(|w| w.letter == b'n') { words.get(1) } else { words.first() };
-        if first.is_some_and(|w| w.letter == b'm') {
-            if let Some(which) = self.fanuc_call(first) {
-                return self.fanuc_line(scan, words, which);
-            }
+        if let Some(which) = self.subprogram_line(words, first) {
+            return self.fanuc_line(scan, text, words, which);
         }
         if self.is_fanuc() && is_macro_call(words) {
             return self.macro_call(scan, text, line, words);
@@ -55,7 +53,7 @@ impl<S: Sink> Interp<'_, S> {
             self.grbl_words()?;
         }
         self.enhance()?;
-        if fanuc && self.m.turned != 0 {
+        if fanuc && self.m.turned != 0 && self.block.turning == -1 {
             self.turn_words()?;
         }
         if fanuc && self.block.motion == 330 {
@@ -159,12 +157,10 @@ impl<S: Sink> Interp<'_, S> {
         let first = if words.first().is_some_and(|w| w.letter == b'n') { words.get(1) } else { words.first() };
         match first {
             Some(w) if w.letter == b'o' => return self.control_line(scan, text, line, words, w),
-            Some(w) if w.letter == b'm' => {
-                if let Some(which) = self.fanuc_call(first) {
-                    return self.fanuc_line(scan, words, which);
-                }
-            }
             _ => {}
+        }
+        if let Some(which) = self.subprogram_line(words, first) {
+            return self.fanuc_line(scan, text, words, which);
         }
         if self.skip.is_some() {
             return Ok(());

@@ -32,6 +32,7 @@ impl<S: Sink> Interp<'_, S> {
             63 => Ok(()), // 2.10 knows the code and does nothing: the knots end the curve.
             _ => {
                 self.check_spline()?;
+                self.inverse_time_spline();
                 if matches!(g, 51 | 61) { self.quadratic_spline() } else { self.cubic_spline() }
             }
         }
@@ -58,6 +59,14 @@ impl<S: Sink> Interp<'_, S> {
             return Err(words(rs274::SPLINE_AXES, "it can't move Z, A, B or C"));
         }
         Ok(())
+    }
+
+    /// G93: no feed is made of F and the length of a spline.
+    fn inverse_time_spline(&mut self) {
+        if self.m.feed_mode == 1 {
+            let what = if self.m.feed == 0.0 { "no feed is in force, and the machine does not move".into() } else { format!("the feed in force, F{}, stays", (self.m.feed * 1e4).round() / 1e4) };
+            self.warn(Fault::own(code::SPLINE_INVERSE_TIME).at(b'f').arg(what));
+        }
     }
 
     /// First and second axis of the plane of splines: 2.9 knows XY only; 2.10 has (Y, Z) and (Z, X) too.
@@ -263,6 +272,7 @@ impl<S: Sink> Interp<'_, S> {
     /// Sends the curve. The last `order` lines hold knots only. In every plane the controller takes the first of the
     /// last point's two coordinates for X and the second for Y.
     fn send_knotted(&mut self, plane: Plane) {
+        self.inverse_time_spline();
         let mut spline = std::mem::take(&mut self.queue.spline);
         spline.plane = plane;
         if let Some(last) = spline.points.last() {
@@ -282,6 +292,7 @@ impl<S: Sink> Interp<'_, S> {
             let order = spline.order;
             return Err(words(rs274::NURBS_TOO_FEW, "too few control points").arg(order));
         }
+        self.inverse_time_spline();
         let mut spline = std::mem::take(&mut self.queue.spline);
         spline.plane = self.spline_plane();
         if let Some(last) = spline.points.last() {

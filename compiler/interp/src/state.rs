@@ -164,8 +164,10 @@ pub struct Modal {
     pub parked: u8,
     /// G43 is in force (or what LinuxCNC has beside it).
     pub length_on: u8,
+    /// Fanuc lathe: the program has positioned the C axis.
+    pub c_axis: u8,
     /// Always 0; keeps the size a multiple of eight.
-    pub pad: [u8; 5],
+    pub pad: [u8; 4],
 }
 
 impl Modal {

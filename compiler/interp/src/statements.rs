@@ -16,6 +16,8 @@ pub(crate) struct FileIndex {
     pub(crate) lines: Vec<u32>,
     /// First lines of the programs (`O1000`), ascending.
     programs: Vec<u32>,
+    /// The same by their numbers.
+    numbered_programs: FxHashMap<Box<str>, Vec<u32>>,
     /// The first block of each number, in each program.
     numbers: FxHashMap<(usize, i64), u32>,
 }
@@ -28,6 +30,11 @@ impl FileIndex {
     /// The block of a number in the program that `line` stands in: every program has block numbers of its own.
     pub(crate) fn numbered(&self, number: i64, line: u32) -> Option<u32> {
         self.numbers.get(&(self.program(line), number)).copied()
+    }
+    /// The first line of the program of a number: the next one behind `line`, else the first of the file.
+    pub(crate) fn subprogram(&self, number: &str, line: u32) -> Option<u32> {
+        let all = self.numbered_programs.get(number)?;
+        all.iter().find(|l| **l > line).or(all.first()).copied()
     }
     /// Whether two lines stand in one program.
     pub(crate) fn in_one_program(&self, a: u32, b: u32) -> bool {
@@ -193,6 +200,9 @@ impl<S: Sink> Interp<'_, S> {
                 }
                 if scan.begins_program(l as u32) {
                     index.programs.push(at);
+                    if let Some(s) = statement(scan, &chunk.text, l as u32) {
+                        index.numbered_programs.entry(s.label).or_default().push(at);
+                    }
                 }
                 if let Some(n) = words.first().filter(|w| w.letter == b'n' && w.form == Form::Literal) {
                     index.numbers.entry((index.programs.len(), n.value as i64)).or_insert(at);

@@ -216,7 +216,8 @@ impl<S: Sink> Interp<'_, S> {
             432 => offset = self.added_tool_length(h)?,
             _ => {}
         }
-        self.emit(Call::UseToolLengthOffset(offset));
+        let number = h.filter(|_| matches!(g, 430 | 432)).and_then(|h| u32::try_from(h).ok());
+        self.emit(Call::UseToolLengthOffset(offset, number));
         let loaded = self.in_spindle();
         let m = &mut self.m;
         let mut change: Axes = std::array::from_fn(|i| m.tool_offset[i] - offset[i]);

@@ -97,7 +97,7 @@ impl World {
             Call::EnableSpeedOverride(_) => self.speed_held = 0,
             Call::DisableSpeedOverride(_) => self.speed_held = 1,
             Call::SetNaivecamTolerance(t) => self.naivecam = *t,
-            Call::UseToolLengthOffset(offset) => self.tool_offset = *offset,
+            Call::UseToolLengthOffset(offset, _) => self.tool_offset = *offset,
             _ => {}
         }
     }

@@ -269,7 +269,6 @@ fn grbl_g43_1_needs_z() {
 fn dialects_are_closed_lists() {
     for (id, line) in [
         ("fanuc-mill", "G38.2 Z-5. F100."),
-        ("fanuc-mill", "G5.1 X1. I1. J1."),
         ("fanuc-mill", "M66 P0"),
         ("fanuc-turn", "G7"),
         ("fanuc-turn", "G64"),
@@ -625,6 +624,123 @@ fn a_fanuc_g53_is_a_rapid_of_its_own() {
         let (_, outcome) = run_in("fanuc-mill", &format!("G21 G90\n{text}M30\n"));
         assert_eq!(outcome.findings[0].fault.code, expected, "{text}");
     }
+}
+
+/// A code of group 01 beside a one-shot code of group 00 is in force from then on.
+#[test]
+fn motion_beside_a_one_shot_code() {
+    let of = |id: &str, text: &str| -> Vec<String> {
+        let (calls, outcome) = run_in(id, &format!("G21 F100. S100 M3\nG1 X5. Z5.\n{text}{}Z7.\nM30\n", if text.ends_with("\nG0") { " " } else { "\n" }));
+        assert!(outcome.findings.is_empty(), "{id} {text} {:?}", outcome.findings);
+        calls
+    };
+    let apart = [
+        ("fanuc-mill", "G0 G91 G28 Z0.", "G91 G28 Z0.\nG0"),
+        ("fanuc-mill", "G91 G28 G00 X0 Y0", "G91 G28 X0 Y0\nG0"),
+        ("fanuc-mill", "G90 G0 G28 X0 Y0", "G90 G28 X0 Y0\nG0"),
+        ("fanuc-mill", "G0 G30 Z0", "G30 Z0\nG0"),
+        ("fanuc-mill", "G0 G52 X5.", "G52 X5.\nG0"),
+        ("fanuc-mill", "G90 G0 G92 X5.", "G92 X5.\nG0"),
+        ("fanuc-mill", "G0 G10 L2 P1 X5.", "G10 L2 P1 X5.\nG0"),
+        ("fanuc-mill", "G90 G68 X1. Y2. R30.\nG0 X4.\nG69", "G68 X1. Y2. R30.\nG0 X4.\nG69"),
+        ("fanuc-mill", "G17 G0 G68 X1. Y2. R30.\nX4.\nG69", "G68 X1. Y2. R30.\nG0 X4.\nG69"),
+        ("fanuc-mill", "G18 G68 X1. Z2. R30.\nG1 X4.\nG69", "G18\nG68 X1. Z2. R30.\nG1 X4.\nG69"),
+        ("fanuc-mill", "G55 G68 X1. Y2. R30.\nG1 X4.\nG69", "G55\nG68 X1. Y2. R30.\nG1 X4.\nG69"),
+        ("fanuc-mill", "G15 G50 G50.1 X0 Y0\nG11", ""),
+        ("fanuc-turn", "G0 G28 U0 W0", "G28 U0 W0\nG0"),
+        ("fanuc-turn", "G0 G30 U0 W0", "G30 U0 W0\nG0"),
+    ];
+    let moves = |mut calls: Vec<String>| -> Vec<String> {
+        calls.retain(|c| ["STRAIGHT", "SET_G5", "SET_G92"].iter().any(|n| c.starts_with(n)));
+        calls
+    };
+    for (id, beside, apart) in apart {
+        assert_eq!(moves(of(id, beside)), moves(of(id, apart)), "{id} {beside}");
+    }
+    for text in ["G91 G68 X0 Y0 R30.", "G55 G68 R30.", "G68 G43 H1 X0 Y0 R30."] {
+        let (_, outcome) = run_in("fanuc-mill", &format!("G21 G90\nT1 M6\n{text}\nM30\n"));
+        assert_eq!(outcome.findings.iter().map(|f| f.fault.code).collect::<Vec<_>>(), [code::CODE_NOT_CARRIED_OUT], "{text}");
+    }
+    let (_, outcome) = run_in("fanuc-mill", "G21 G90\nG5.1 X1. I1. J1.\nM30\n");
+    assert_eq!(outcome.findings[0].fault.code, code::WORD_MISSING);
+    for text in ["G5.1 Q1", "G05.1 Q1 R5", "G05.1 Q2 X0 Y0 Z0", "G8 P1", "G05 P10000"] {
+        let (_, outcome) = run_in("fanuc-mill", &format!("G21 G90\n{text}\nG0 X1.\nM30\n"));
+        assert_eq!(outcome.findings.iter().map(|f| f.fault.code).collect::<Vec<_>>(), [code::PATH_LOOK_AHEAD], "{text}");
+    }
+}
+
+/// C and A of a lathe without a C axis are a chamfer and the angle of a line.
+#[test]
+fn corners_of_a_lathe() {
+    let told = |text: &str| -> Vec<gr_spec::Code> {
+        let (_, outcome) = run_in("fanuc-turn", &format!("G21 G98 F100.\nG0 X10. Z2.\n{text}\nM30\n"));
+        outcome.findings.iter().map(|f| f.fault.code).collect()
+    };
+    for text in ["G1 X20. C-0.5", "G1 Z-5. C1.", "G1 U4. C1.", "G1 X30. A135.", "G1 Z-9. A10.", "G0 C9.\nG1 X30. A135."] {
+        assert_eq!(told(text), [code::CODE_NOT_CARRIED_OUT], "{text}");
+    }
+    for text in ["G0 C90.", "G0 X5. C90.", "G1 C30.", "G28 H0\nG1 Z-5. C360.", "G0 C0\nG1 Z-9. C720.", "G1 X5. Z5. C90."] {
+        assert_eq!(told(text), [], "{text}");
+    }
+}
+
+/// Subprogram: a call or a return in a block with other words comes after them, and once.
+#[test]
+fn words_beside_a_subprogram_call() {
+    let ends = |text: &str| -> Vec<String> {
+        let (calls, outcome) = run_in("fanuc-mill", &format!("G21 G90 F9.\n{text}\nM30\nO7\nG91 X1.\nG90 M99\n"));
+        assert!(outcome.findings.is_empty(), "{text}{:?}", outcome.findings);
+        calls.iter().filter(|c| c.starts_with("STRAIGHT")).map(|c| c[c.find('(').unwrap() + 1..].split(", ").take(2).collect::<Vec<_>>().join(" ")).collect()
+    };
+    let plain = ["5.0000 0.0000", "6.0000 0.0000"];
+    for text in ["G0 X5.\nM98 P7", "G0 X5. M98 P7", "M98 P7 G0 X5.", "N1 M98 G0 P7 X5. (call)", "#1=7\nG0 M98 P#1 X5.", "G1 X5. M98 P0007 L1"] {
+        assert_eq!(ends(text), plain, "{text}");
+    }
+    for text in ["G0 X5. M98 P30007", "M98 G0 X5. P7 L3"] {
+        assert_eq!(ends(text), ["5.0000 0.0000", "6.0000 0.0000", "7.0000 0.0000", "8.0000 0.0000"], "{text}");
+    }
+    assert_eq!(ends("G10 L2 P2 X3.\nG55 M98 P7\nG0 X9."), ends("G10 L2 P2 X3.\nG55\nM98 P7\nG0 X9."));
+    let (calls, _) = run_in("fanuc-mill", "G21 G90 M8 M98 P7\nM98 P7 M9 S500 M3\nM30\nO7\nG0 X1.\nM99 M8 Y2.\n");
+    let order: Vec<&str> = calls.iter().filter_map(|c| c.split('(').next()).filter(|c| c.contains("FLOOD") || c.contains("TRAVERSE") || c.contains("START_SPINDLE")).collect();
+    let flood_before_each_move = ["FLOOD_ON", "STRAIGHT_TRAVERSE", "FLOOD_ON", "STRAIGHT_TRAVERSE", "START_SPINDLE_CLOCKWISE", "FLOOD_OFF", "STRAIGHT_TRAVERSE", "FLOOD_ON", "STRAIGHT_TRAVERSE", "FLOOD_OFF"];
+    assert_eq!(order, flood_before_each_move);
+    for (text, told) in [
+        ("G0 X5. M98 P7 M30", "M98 beside M30"),
+        ("G66 P7\nG0 X5. M98 P7\nG67", "M98 beside other words while G66 is in force"),
+        ("G0 X5. M98", "M98"),
+        ("G0 X5. M98 P9", "main.ngc"),
+    ] {
+        let (_, outcome) = run_in("fanuc-mill", &format!("G21 G90\n{text}\nM30\nO7\nG91 X1.\nG90 M99\n"));
+        assert_eq!((outcome.findings.len(), outcome.findings[0].fault.args[0].as_str()), (1, told), "{text} {:?}", outcome.findings);
+    }
+}
+
+/// Programs are in the control's memory in no order: one that stands before the program that calls it is found too.
+#[test]
+fn subprograms_in_any_order() {
+    let ends = |text: &str| -> Vec<String> {
+        let (calls, outcome) = run_in("fanuc-mill", text);
+        assert!(outcome.findings.is_empty(), "{text}{:?}", outcome.findings);
+        calls.iter().filter(|c| c.starts_with("STRAIGHT")).map(|c| c[c.find('(').unwrap() + 1..].split(',').next().unwrap().to_string()).collect()
+    };
+    let program = "%\nO1\nG21 G90\nCALL\nM30\nO1000\nG0 X1.\nM99\nO1001\nG0 X2.\nM99\nO1002\nM98 P1000\nG65 P1001 A1.\nM98 P1000\nM99\nO1003\nG66 P1000\nX9.\nG67\nM99\n%\n";
+    assert_eq!(ends(&program.replace("CALL", "M98 P1002")), ["1.0000", "2.0000", "1.0000"]);
+    assert_eq!(ends(&program.replace("CALL", "M98 P1002 L2\nM98 P1001")), ["1.0000", "2.0000", "1.0000", "1.0000", "2.0000", "1.0000", "2.0000"]);
+    assert_eq!(ends(&program.replace("CALL", "M98 P1003")), ["9.0000", "1.0000"]);
+    // M99 P in the main program goes to a block; to one above it is the program over again.
+    let skipped = "O1\nG21 G90\nN5 G0 X1.\nM99 P20\nX2.\nN20 X3.\nM30\n";
+    assert_eq!(ends(skipped), ["1.0000", "3.0000"]);
+    let (_, outcome) = run_in("fanuc-mill", &skipped.replace("M30", "M99 P5"));
+    assert_eq!(outcome.findings.iter().map(|f| f.fault.code).collect::<Vec<_>>(), [code::PROGRAM_REPEATS]);
+    let (_, outcome) = run_in("fanuc-mill", &skipped.replace("P20", "P21"));
+    assert_eq!(outcome.findings.iter().map(|f| f.fault.code).collect::<Vec<_>>(), [code::FLOW_LABEL]);
+    // Ten levels of them.
+    let deep = |levels: usize| (1..=levels).map(|n| format!("O{n}\nG0 X{n}.\n{}\n{}\n", if n < levels { format!("M98 P{}", n + 1) } else { String::new() }, if n == 1 { "M30" } else { "M99" })).collect::<String>();
+    assert_eq!(ends(&deep(11)).len(), 11);
+    let (_, outcome) = run_in("fanuc-mill", &deep(12));
+    assert_eq!(outcome.findings.iter().map(|f| f.fault.code).collect::<Vec<_>>(), [code::SUB_LIMIT]);
+    let (_, outcome) = run_in("fanuc-mill", &program.replace("CALL", "M98 P1004"));
+    assert_eq!(outcome.findings.iter().map(|f| f.fault.code).collect::<Vec<_>>(), [code::SUB_NOT_FOUND]);
 }
 
 /// Machining center, tool length offset and cutter compensation: H and D hold, number 0 is no offset, H under G43 changes the length.

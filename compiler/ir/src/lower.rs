@@ -198,7 +198,7 @@ impl Lowering {
             }),
             Call::SetNaivecamTolerance(t) => Op::MergeTolerance(t * k),
             Call::SetPlannerMode(kind, corner) => Op::Planner((kind != 0).then_some(corner)),
-            Call::UseToolLengthOffset(ref a) => Op::ToolOffset(self.axes(a)),
+            Call::UseToolLengthOffset(ref a, number) => Op::ToolOffset { offset: self.axes(a), number },
             Call::SetToolTableEntry(pocket, tool, ref o, diameter, front, back, orientation) => {
                 let k = if self.machine == Units::Inch { 25.4 } else { 1.0 };
                 let (offset, diameter) = (Self::scaled(o, k), diameter * k);

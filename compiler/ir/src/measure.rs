@@ -267,7 +267,7 @@ impl Known {
     /// Where a move may be taken to begin: none when even its end is not known yet. Call for every operation.
     pub fn start(&mut self, view: &View<'_, '_>) -> Option<crate::Pose> {
         let (from, to) = (&view.start.axes, &view.end.axes);
-        if matches!(view.op, Op::ToolOffset(_)) {
+        if matches!(view.op, Op::ToolOffset { .. }) {
             for i in 0..3 {
                 self.0[i] &= from[i] == to[i];
             }

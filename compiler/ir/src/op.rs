@@ -285,7 +285,12 @@ pub enum Op<'a> {
         orientation: i32,
     },
     /// G43 and its like.
-    ToolOffset(Axes),
+    ToolOffset {
+        /// Offset.
+        offset: Axes,
+        /// The number that asks for it (H), if one does.
+        number: Option<u32>,
+    },
     /// Work offset: 1 = G54 … 9 = G59.3.
     WorkOffset(u8, Axes),
     /// G10: a work offset that is not in force is stored for later.

@@ -154,7 +154,7 @@ impl State {
 
     /// Whether an operation moves the frame positions are written in.
     pub(crate) fn moves_frame(op: &Op<'_>) -> bool {
-        matches!(op, Op::ToolOffset(_) | Op::WorkOffset(..) | Op::LocalOffset(_) | Op::Rotation(_))
+        matches!(op, Op::ToolOffset { .. } | Op::WorkOffset(..) | Op::LocalOffset(_) | Op::Rotation(_))
     }
 
     /// Takes over what the operation sets. When it moves the frame, the pose is written anew: the machine
@@ -211,7 +211,7 @@ impl State {
             Op::ToolPrepare(t) => self.prepared = t,
             Op::ToolChange(_) => self.tool = self.prepared,
             Op::ToolNumber(t) => self.tool = t,
-            Op::ToolOffset(o) => self.tool_offset = o,
+            Op::ToolOffset { offset, .. } => self.tool_offset = offset,
             Op::WorkOffset(n, o) => (self.work, self.work_offset) = (n, o),
             Op::LocalOffset(o) => self.local_offset = o,
             Op::Rotation(r) => {

@@ -38,7 +38,7 @@ fn part() -> Program {
         Call::SelectTool(3),
         Call::StartChange,
         Call::ChangeTool(1),
-        Call::UseToolLengthOffset(at(0.0, 0.0, 4.0)),
+        Call::UseToolLengthOffset(at(0.0, 0.0, 4.0), None),
         Call::SetSpindleMode(0, 0.0, None),
         Call::SetSpindleSpeed(0, 1200.0),
         Call::StartSpindleClockwise(0),
@@ -87,7 +87,7 @@ fn machine_frame_as_the_controller_has_it() {
         Call::SetG92Offset(at(1.0, 2.0, 3.0)),
         Call::SetXyRotation(90.0),
         Call::SetG5xOffset(1, at(10.0, 20.0, 30.0)),
-        Call::UseToolLengthOffset(at(0.0, 0.0, 100.0)),
+        Call::UseToolLengthOffset(at(0.0, 0.0, 100.0), None),
         Call::StraightFeed(at(4.0, 5.0, 6.0)),
     ]);
     let mut cursor = program.cursor_at(4);

@@ -54,7 +54,7 @@ fn op() -> impl Strategy<Value = Op<'static>> {
             .prop_map(|(spindle, per_rev, velocity)| { Op::SyncStart(Sync { spindle, per_rev, velocity }) }),
     ];
     let frames = prop_oneof![
-        axes().prop_map(Op::ToolOffset),
+        (axes(), proptest::option::of(0u32..100)).prop_map(|(offset, number)| Op::ToolOffset { offset, number }),
         (1u8..10, axes()).prop_map(|(n, a)| Op::WorkOffset(n, a)),
         (1u8..10, axes(), number()).prop_map(|(number, offset, rotation)| Op::StoredOffset { number, offset, rotation }),
         axes().prop_map(Op::LocalOffset),

@@ -445,7 +445,7 @@ impl<'a> Emit<'a> {
         self.push(Op::ToolChange(number));
         let mut offset = [0.0; 9];
         offset[2] = tool.length.unwrap_or(0.0);
-        self.push(Op::ToolOffset(offset));
+        self.push(Op::ToolOffset { offset, number: None });
         self.tool = Some(tool.number);
         self.cutter = Cutter::of(tool);
         // The operator may have moved the machine.
@@ -457,7 +457,7 @@ impl<'a> Emit<'a> {
         if self.tool.take().is_some() {
             self.push(Op::Close(Marker::Tool));
         }
-        for op in [Op::ToolPrepare(0), Op::ToolChangeStart, Op::ToolChange(0), Op::ToolOffset([0.0; 9])] {
+        for op in [Op::ToolPrepare(0), Op::ToolChangeStart, Op::ToolChange(0), Op::ToolOffset { offset: [0.0; 9], number: None }] {
             self.push(op);
         }
         self.at = None;

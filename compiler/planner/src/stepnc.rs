@@ -277,7 +277,7 @@ impl<'a> Writer<'a> {
             Op::Override(gr_ir::Override::Adaptive, true) => self.cannot("adaptive feed (M52)", v),
             Op::ToolChange(_) => self.changed(v.state.prepared, v.source),
             Op::ToolNumber(number) => self.changed(number, v.source),
-            Op::ToolOffset(offset) => self.offset(&offset, v),
+            Op::ToolOffset { offset, .. } => self.offset(&offset, v),
             Op::Stop(stop) => {
                 let text = match stop {
                     Stop::Program => "PROGRAM_STOP('stop')",

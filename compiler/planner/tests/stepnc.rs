@@ -23,7 +23,7 @@ impl Build {
         self.0.push_to(op, &at(x, y, z), Source::default());
     }
     fn tool(&mut self, n: i32) {
-        for op in [Op::ToolPrepare(n), Op::ToolChangeStart, Op::ToolChange(n), Op::ToolOffset([0.0; 9])] {
+        for op in [Op::ToolPrepare(n), Op::ToolChangeStart, Op::ToolChange(n), Op::ToolOffset { offset: [0.0; 9], number: None }] {
             self.push(op);
         }
     }

@@ -140,7 +140,7 @@ impl Cells {
         if output(new).is_some_and(|s| s.signal == on.signal) {
             return None;
         }
-        let value = Some(if on.value == Some(0.0) { 1.0 } else { 0.0 });
+        let value = Some(contrary(on.value));
         let signal = Signal { value, wait: None, seconds: None, ..on.clone() };
         Some(Action::Signal { word: Word::new(new), value, signal })
     }
@@ -186,8 +186,16 @@ impl Cells {
         (off, on)
     }
 
-    /// M62 … M65: a row for the output's own number (`M62P3`) comes before one for all.
-    pub fn digital(&self, index: i32, on: bool, synced: bool) -> Made {
+    /// An output that a word switches on and off: what its row says is for on.
+    pub fn switched(&self, word: Word, on: bool) -> Made {
+        let Some(signal) = self.row(&word) else { return Made::NOTHING };
+        let value = Some(if on { signal.value.unwrap_or(1.0) } else { contrary(signal.value) });
+        Made { actions: steps(word, None, Signal { value, ..signal }), by_hand: None }
+    }
+
+    /// M62 … M65: a row for the output's own number (`M62P3`) comes before one for all, which has to pass the number on. The word:
+    /// it can't.
+    pub fn digital(&self, index: i32, on: bool, synced: bool) -> Result<Made, Word> {
         let (own, other) = match (on, synced) {
             (true, true) => ("M62", "M64"),
             (true, false) => ("M64", "M62"),
@@ -197,26 +205,33 @@ impl Cells {
         let numbered = |w: &str| self.io.get(&format!("{w}P{index}")).cloned();
         let word = Word::numbered(own, 'P', index);
         if let Some(signal) = numbered(own).or_else(|| numbered(other)) {
-            return Made { actions: steps(word, None, signal), by_hand: None };
+            return Ok(Made { actions: steps(word, None, signal), by_hand: None });
         }
         let opposite = if on { ["M63", "M65"] } else { ["M62", "M64"] };
         if let Some(signal) = opposite.into_iter().find_map(numbered).filter(|s| s.signal.is_some()) {
             // The contrary of what its row says: some outputs are on at 0.
-            let value = Some(signal.value.map_or(f64::from(u8::from(on)), |v| if v == 0.0 { 1.0 } else { 0.0 }));
-            return Made { actions: steps(word, None, Signal { value, ..signal }), by_hand: None };
+            let value = Some(signal.value.map_or(f64::from(u8::from(on)), |v| contrary(Some(v))));
+            return Ok(Made { actions: steps(word, None, Signal { value, ..signal }), by_hand: None });
         }
-        self.word(word, Some(f64::from(index)))
+        if !self.own_words && self.row(&word).is_some_and(|s| s.routine.is_none() && s.signal.is_some()) {
+            return Err(word);
+        }
+        Ok(self.word(word, Some(f64::from(index))))
     }
 
-    /// M67, M68.
-    pub fn analog(&self, index: i32, value: f64, synced: bool) -> Made {
+    /// M67, M68. The word: its row can't pass on the number.
+    pub fn analog(&self, index: i32, value: f64, synced: bool) -> Result<Made, Word> {
         let (own, other) = if synced { ("M67", "M68") } else { ("M68", "M67") };
         let word = Word::numbered(own, 'E', index).with('Q', value);
         let other = self.io.get(&Word::numbered(other, 'E', index).key());
         if let (None, Some(signal)) = (self.io.get(&word.key()), other) {
-            return Made { actions: steps(word, Some(value), signal.clone()), by_hand: None };
+            return Ok(Made { actions: steps(word, Some(value), signal.clone()), by_hand: None });
         }
-        self.word(word, Some(value))
+        // Of the two numbers it is the value that is passed on.
+        if !self.own_words && !self.io.contains_key(&word.key()) && self.row(&word).is_some() {
+            return Err(word);
+        }
+        Ok(self.word(word, Some(value)))
     }
 
     /// Name of the input that M66 waits for.
@@ -232,6 +247,11 @@ fn turn_word(turn: Turn) -> &'static str {
         Turn::Ccw => "M4",
         Turn::Stop => "M5",
     }
+}
+
+/// What switches off an output that is on at a value; some are on at 0.
+fn contrary(on: Option<f64>) -> f64 {
+    if on == Some(0.0) { 1.0 } else { 0.0 }
 }
 
 /// The operator does it.

@@ -315,7 +315,10 @@ impl<'a> Emit<'a> {
             let (limit, joint) = (self.speeds[joint], &self.machine.joints[joint]);
             let per_second = |v: f64| format!("{}/s", joint.show(v));
             let fits = libm::floor(fits * FITS * 60.0 * 10.0) / 10.0;
-            findings.say(code::ROBOT_JOINT_SPEED, source, &[joint.name.clone(), per_second(limit * part), per_second(limit), format!("{fits} mm/min")]);
+            // The share holds in whatever unit the program has its F (inches, 1/min under G93).
+            let share = libm::floor(FITS / part * 1000.0) / 10.0;
+            let fits = format!("{fits} mm/min, {share} % of its feed,");
+            findings.say(code::ROBOT_JOINT_SPEED, source, &[joint.name.clone(), per_second(limit * part), per_second(limit), fits]);
         }
     }
 

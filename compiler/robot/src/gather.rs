@@ -372,7 +372,7 @@ impl<'a> Gather<'a> {
                 }
             }
             Op::RunTime(what) => self.findings.say(code::ROBOT_RUN_TIME, Some(view.source), &[what.to_string()]),
-            Op::ToolOffset(_) => self.tool_offset(view),
+            Op::ToolOffset { .. } => self.tool_offset(view),
             Op::PathMode(_) => self.path_said = true,
             Op::Begin { marker: Marker::Cycle, code, .. } => self.cycle = Some(code),
             Op::Close(Marker::Cycle) => self.cycle = None,
@@ -458,11 +458,11 @@ impl<'a> Gather<'a> {
             Op::Flood(on) => self.coolant("M8", on, state),
             Op::DigitalOut { index, on, synced } => {
                 let made = self.cells.digital(index, on, synced);
-                self.made(made);
+                self.numbered(made);
             }
             Op::AnalogOut { index, value, synced } => {
                 let made = self.cells.analog(index, value, synced);
-                self.made(made);
+                self.numbered(made);
             }
             Op::InputWait { index, digital, wait, timeout } => self.input(index, digital, wait, timeout),
             Op::UserM { code, p, q } => self.user(code, p, q),

@@ -26,7 +26,7 @@ static TRAITS: Traits = Traits {
 /// Commands, functions and words of the language; a program of the name `MAIN` is the controller's own.
 const RESERVED: &[&str] = &[
     "ABS", "ACCEL", "ACOS", "AND", "APPROACH", "ARCHMOVE", "AREA", "AREAPOS", "AREASIZE", "ARRIVE", "ASC", "ASIN", "ATN", "ATN2", "AVEC", "CALL",
-    "CASE", "CHANGETOOL", "CHANGEWORK", "CLEARLOG", "CREATESEM", "CURACC", "CURDEC", "CUREXJ", "CURFIG", "CURJACC", "CURJDEC", "CURJNT", "CURJSPD",
+    "CASE", "CHANGETOOL", "CHANGEWORK", "CLEARLOG", "COS", "CREATESEM", "CURACC", "CURDEC", "CUREXJ", "CURFIG", "CURJACC", "CURJDEC", "CURJNT", "CURJSPD",
     "CURPOS", "CURSPD", "CURTOOL", "CURTRN", "CURWORK", "DECEL", "DEF", "DEFDBL", "DEFEND", "DEFINT", "DEFIO", "DEFJNT", "DEFPOS", "DEFSNG",
     "DEFSTR", "DEFTRN", "DEFVEC", "DEGRAD", "DELAY", "DELETESEM", "DEPART", "DESTJNT", "DESTPOS", "DESTTRN", "DIM", "DIST", "DO", "DRAW", "DRIVE",
     "DRIVEA", "ELSE", "ELSEIF", "END", "ENDIF", "ERL", "ERR", "EXIT", "EXP", "FALSE", "FIG", "FIGAPRL", "FIGAPRP", "FLUSH", "FOR", "GETENV",

@@ -3,7 +3,7 @@
 use super::emit::Emitter;
 use super::{ChangeAt, Language};
 use super::write::AXES;
-use crate::sources::{Words, length_number, number_of, sets_here};
+use crate::sources::{Words, number_of, sets_here};
 use gr_ir::{Axes, Op, Override, PathMode, Source, Turn, View};
 use gr_text::code;
 
@@ -22,7 +22,7 @@ impl Emitter<'_> {
             Op::StoredOffset { number, offset, rotation } => self.stored_offset(number, &offset, rotation, view),
             Op::Rotation(angle) => self.rotation(angle, view),
             Op::LocalOffset(offset) => self.local_offset(&offset, view),
-            Op::ToolOffset(offset) => self.tool_offset(&offset, view),
+            Op::ToolOffset { offset, number } => self.tool_offset(&offset, number, view),
             Op::ToolPrepare(n) => self.w.block(&format!("T{n}")),
             Op::ToolChange(_) => self.tool_change(view),
             Op::ToolNumber(n) if self.linuxcnc() => self.w.block(&format!("M61 Q{n}")),
@@ -332,14 +332,15 @@ impl Emitter<'_> {
         self.motion = None;
     }
 
-    fn tool_offset(&mut self, offset: &Axes, view: &View<'_, '_>) {
+    fn tool_offset(&mut self, offset: &Axes, number: Option<u32>, view: &View<'_, '_>) {
         let words = self.words(view.source);
         let zero = offset.iter().all(|v| *v == 0.0);
         // A tool that has not been measured has a length of 0 too, so for 0 the source decides.
         // A lathe's T names the offset with its last two digits.
         let station = self.sources.increments().then(|| number_of(self.sources, 't', view.source)).flatten().map(|t| t % 100);
-        let wanted = words.is_some_and(|w| w.asks_length(self.sources));
-        let asked = if wanted { length_number(self.sources, view.source) } else { station };
+        // H alone changes the length in force where it holds.
+        let wanted = words.map_or(number.is_some(), |w| w.g(430) || number.is_some() && !w.g(432) && !w.g(490)) && station.is_none();
+        let asked = if wanted { number } else { station };
         let named = match words {
             // The length is the program's own.
             Some(w) if w.g(431) => None,
@@ -352,21 +353,19 @@ impl Emitter<'_> {
             // Offset number 0 is none there.
             Some(_) if wanted && self.sources.offset_numbers() && (asked == Some(0) || zero && named.is_none() && !self.tools.is_empty()) => true,
             Some(w) => w.g(490) || zero && !wanted && !w.g(432),
-            None => zero && (view.state.tool <= 0 || named != Some(view.state.tool)),
+            None => zero && !wanted && (view.state.tool <= 0 || named != Some(view.state.tool)),
         };
         // Nothing is known of the lengths of a machine without a tool table; the program says which it wants.
         let unmeasured = zero && !off && named.is_none();
         let wanted = wanted || station.is_some();
-        let added = words.is_some_and(|w| w.g(432)).then(|| number_of(self.sources, 'h', view.source)).flatten();
+        let added = number.filter(|_| words.is_some_and(|w| w.g(432)));
         let said = match station {
             Some(n) if unmeasured => Some(format!("G43 H{n}")),
             _ if unmeasured => self.length_asked(asked, view),
             _ => None,
         };
-        // The number is a variable's, or stands in another program.
-        let unnamed = wanted && self.sources.offset_numbers() && asked.is_none();
         let block = match (named, self.options.language) {
-            (None, language) if unmeasured && (unnamed || wanted && language == Language::Grbl) => {
+            (None, language) if unmeasured && wanted && language == Language::Grbl => {
                 self.cannot("a tool length that no tool table names here (--tools)", view.source);
                 return self.move_frame(view.state);
             }
@@ -405,14 +404,11 @@ impl Emitter<'_> {
 
     /// The block that asks for the length of a tool of which the source knows no length.
     fn length_asked(&self, asked: Option<u32>, view: &View<'_, '_>) -> Option<String> {
-        let line = self.sources.line(view.source.file, view.source.line)?;
-        let code = line.split(['(', ';']).next()?;
         let tool = u32::try_from(view.state.tool).ok().filter(|t| *t > 0);
-        let has_h = code.contains(['h', 'H']);
-        match asked.or(tool.filter(|_| has_h || self.options.language == Language::FanucMill)) {
+        // Without H it is the length of the tool in the spindle.
+        match asked.or(tool.filter(|_| self.options.language == Language::FanucMill)) {
             Some(number) => Some(format!("G43 H{number}")),
-            // Without H it is the length of the tool in the spindle.
-            None => (!has_h && self.options.language == Language::Linuxcnc).then(|| "G43".to_string()),
+            None => (self.options.language == Language::Linuxcnc).then(|| "G43".to_string()),
         }
     }
 
@@ -464,7 +460,7 @@ impl Emitter<'_> {
         let Op::ToolEntry { tool, offset, diameter, front, back, orientation, .. } = view.op else {
             return;
         };
-        if !self.linuxcnc() {
+        if self.options.language == Language::Grbl {
             return self.cannot("writing the tool table (G10 L1)", view.source);
         }
         let places = self.w.places.max(9);
@@ -490,12 +486,22 @@ impl Emitter<'_> {
         if words.is_empty() {
             return;
         }
-        let touched = matches!(number_of(self.sources, 'l', view.source), Some(10 | 11));
+        let touched = !self.sources.offset_numbers() && matches!(number_of(self.sources, 'l', view.source), Some(10 | 11));
         if touched && (0..9).any(|i| self.loose[i].is_some() && said(AXES[i])) {
             // The length is the simulation's.
             self.say(code::EMIT_RUNTIME_VALUE, view.source, &["where the probe stopped".into()]);
         }
-        self.w.block(&format!("G10 L1 P{tool} {}", words.join(" ")));
+        if self.linuxcnc() {
+            self.w.block(&format!("G10 L1 P{tool} {}", words.join(" ")));
+        } else if words.iter().all(|w| w.starts_with(['Z', 'R'])) {
+            // A length there is R of L10, a radius R of L12.
+            for word in &words {
+                let kind = if word.starts_with('Z') { "L10" } else { "L12" };
+                self.w.block(&format!("G10 {kind} P{tool} R{}", &word[1..]));
+            }
+        } else {
+            return self.cannot("a tool's offset other than its length and its radius", view.source);
+        }
         self.tools.retain(|(n, _)| *n != tool);
         self.tools.push((tool, offset));
     }

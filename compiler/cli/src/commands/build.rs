@@ -237,7 +237,7 @@ impl<'a> Round<'a> {
             let station = stations.get(n)?;
             let mut options = self.args.options.clone();
             options.reference = options.reference.or(station.project.as_ref().and_then(|p| p.file.project.reference));
-            let goal = out.map(|o| if is_folder(o) { o.join(file_name(source, target)) } else { o.to_path_buf() });
+            let goal = out.map(|o| if is_folder(o) { o.join(file_name(source, target, station, &options)) } else { o.to_path_buf() });
             Some(Job { source: source.clone(), station, target, options, goal, row: None })
         };
         Ok(self.args.files.iter().enumerate().filter_map(job).collect())
@@ -454,8 +454,10 @@ fn is_folder(path: &Path) -> bool {
     path.is_dir() || path.to_string_lossy().ends_with(['/', std::path::MAIN_SEPARATOR])
 }
 
-fn file_name(source: &Path, target: &TargetDef) -> String {
-    format!("{}.{}", stem(source), target.extension)
+/// What a result is called in a folder. The interface of the planar arm saves the joints of `part.g` as `part - juntas.g` (UFMG 2008).
+fn file_name(source: &Path, target: &TargetDef, station: &Station, options: &TargetOptions) -> String {
+    let joints = target.id == "joint-gcode" && !crate::robot::planned(options, station.machine.as_ref());
+    format!("{}{}.{}", stem(source), if joints { " - juntas" } else { "" }, target.extension)
 }
 
 /// Options of a target in the project file, read like those of the command line.

@@ -355,7 +355,7 @@ impl Lints<'_> {
                 let old = std::mem::replace(&mut self.g92, *offset);
                 self.moved_frame(old, self.g92);
             }
-            Call::UseToolLengthOffset(offset) => {
+            Call::UseToolLengthOffset(offset, _) => {
                 for (position, (old, new)) in self.position.iter_mut().zip(self.tool_offset.iter().zip(offset)) {
                     *position += old - new;
                 }

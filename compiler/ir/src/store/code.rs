@@ -44,7 +44,7 @@ pub(super) fn kind(op: &Op<'_>) -> u8 {
         Op::ToolNumber(_) => 28,
         Op::ToolReload => 29,
         Op::ToolEntry { .. } => 30,
-        Op::ToolOffset(_) => 31,
+        Op::ToolOffset { .. } => 31,
         Op::WorkOffset(..) => 32,
         Op::StoredOffset { .. } => 51,
         Op::LocalOffset(_) => 33,
@@ -186,7 +186,11 @@ impl Builder {
                 self.values(&offset);
                 self.values(&[diameter, front, back]);
             }
-            Op::ToolOffset(axes) | Op::LocalOffset(axes) => self.values(&axes),
+            Op::ToolOffset { offset, number } => {
+                self.int(number.map_or(-1, |n| i32::try_from(n).unwrap_or(i32::MAX)));
+                self.values(&offset);
+            }
+            Op::LocalOffset(axes) => self.values(&axes),
             Op::WorkOffset(n, axes) => {
                 self.int(i32::from(n));
                 self.values(&axes);
@@ -312,7 +316,10 @@ impl<'p> Cursor<'p> {
                 let [diameter, front, back] = self.three()?;
                 Op::ToolEntry { pocket, tool, offset, diameter, front, back, orientation }
             }
-            31 => Op::ToolOffset(self.nine()?),
+            31 => {
+                let number = u32::try_from(self.int()?).ok();
+                Op::ToolOffset { offset: self.nine()?, number }
+            }
             32 => Op::WorkOffset(u8::try_from(self.int()?).ok()?, self.nine()?),
             51 => Op::StoredOffset { number: u8::try_from(self.int()?).ok()?, offset: self.nine()?, rotation: self.value()? },
             33 => Op::LocalOffset(self.nine()?),

@@ -206,7 +206,7 @@ fn tool_op(f: &mut Fields<'_>) -> Res<Op<'static>> {
             orientation: f.int_field("orientation")?,
             offset: f.axes([0.0; 9])?,
         },
-        "tool-offset" => Op::ToolOffset(f.axes([0.0; 9])?),
+        "tool-offset" => Op::ToolOffset { number: f.take("number").map(number).transpose()?, offset: f.axes([0.0; 9])? },
         other => return Err(format!("unknown operation `{other}`")),
     })
 }

@@ -231,7 +231,13 @@ impl Line {
                 self.num("diameter", *diameter).num("front", *front).num("back", *back);
                 self.field("orientation", orientation).axes(&[0.0; 9], offset)
             }
-            Op::ToolOffset(axes) => self.word("tool-offset").axes(&[0.0; 9], axes),
+            Op::ToolOffset { offset, number } => {
+                let line = self.word("tool-offset");
+                if let Some(number) = number {
+                    line.field("number", number);
+                }
+                line.axes(&[0.0; 9], offset)
+            }
             Op::WorkOffset(n, axes) => self.word("work-offset").bare(n).axes(&[0.0; 9], axes),
             Op::StoredOffset { number, offset, rotation } => {
                 self.word("store-offset").bare(number).num("rotation", *rotation).axes(&[0.0; 9], offset)

@@ -233,7 +233,7 @@ pub(super) fn drains(op: &Op<'_>) -> bool {
     match op {
         Op::Dwell(_) | Op::Probe(_) | Op::ProbeMode(_) | Op::RigidTap { .. } | Op::ToolChangeStart | Op::ToolChange(_) => true,
         Op::SpindleSpeed { .. } | Op::SpindleTurn { .. } | Op::SpindleOrient { .. } | Op::SpindleWait { .. } => true,
-        Op::Mist(_) | Op::Flood(_) | Op::ToolReload | Op::ToolOffset(_) | Op::ToolEntry { .. } => true,
+        Op::Mist(_) | Op::Flood(_) | Op::ToolReload | Op::ToolOffset { .. } | Op::ToolEntry { .. } => true,
         Op::WorkOffset(..) | Op::LocalOffset(_) | Op::Rotation(_) | Op::Override(Override::Adaptive, _) => true,
         Op::DigitalOut { synced, .. } | Op::AnalogOut { synced, .. } => !synced,
         Op::InputWait { .. } | Op::UserM { .. } | Op::Stop(_) | Op::IndexerLock(..) | Op::Note(Note::Message, _) | Op::End => true,

@@ -4,6 +4,7 @@ use gr_ir::{Override, State, Stop, Turn};
 use gr_text::code;
 
 use super::{Gather, Item};
+use crate::cell::Made;
 use crate::{Action, Step, Word};
 
 impl Gather<'_> {
@@ -64,6 +65,17 @@ impl Gather<'_> {
         !self.cells.own_words() && self.cells.row(word).is_some_and(|s| s.routine.is_none() && s.signal.is_some())
     }
 
+    /// M62 to M68; none: the row for all of the outputs is that of one.
+    pub(super) fn numbered(&mut self, made: Result<Made, Word>) {
+        match made {
+            Ok(made) => self.made(made),
+            Err(word) => {
+                let (code, own) = (&word.code, word.key());
+                self.cannot(&format!("the number of {word} (the row `{code}` of the machine file can't pass it on; a row `{own}` is for this output alone)"));
+            }
+        }
+    }
+
     /// M48 to M53: switches of the operator's panel, which a robot's controller keeps to itself.
     pub(super) fn switch(&mut self, which: Override, free: bool) {
         let (code, usual) = match which {
@@ -78,6 +90,10 @@ impl Gather<'_> {
             return;
         }
         let word = Word::new(code).with('P', f64::from(u8::from(free)));
+        if self.on_or_off(&word) {
+            let made = self.cells.switched(word, free);
+            return self.made(made);
+        }
         if self.cells.own_words() || self.cells.row(&word).is_some() {
             return self.word(word, Some(f64::from(u8::from(free))));
         }
