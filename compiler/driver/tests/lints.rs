@@ -55,6 +55,16 @@ fn a_dive_in_another_work_frame_compares_with_nothing() {
     assert_eq!(found(&same), ["8: rapid/into-stock"]);
 }
 
+/// What was cut before the part turned lies on another side.
+#[test]
+fn a_dive_beside_another_side_of_the_part_is_none() {
+    let text = "G21 F100\nM3 S100\nG1 Z-3\nX20\nY20\nG0 Z50\nG0 A-90\nG0 X0 Y90 Z-20\nG0 Y42\nG1 Y30\nG0 Y60\nG0 X10 Z-35\nG0 Y90\nM5\nM2\n";
+    assert_eq!(found(&text.replace("G0 A-90\n", "")).len(), 2);
+    assert_eq!(found(&text.replace("A-90", "C-90")), ["12: rapid/into-stock"]);
+    // Beside a tilted tool Z is not the depth.
+    assert_eq!(found(text), Vec::<String>::new());
+}
+
 #[test]
 fn spindle_on_at_m2_is_a_hint_and_m5_on_the_same_line_counts() {
     assert_eq!(found("G21\nM3 S100\nG0 X1\nM2\n"), ["4: end/spindle-on"]);

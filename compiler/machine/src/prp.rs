@@ -327,8 +327,13 @@ impl Kinematics for TwoLegs {
     }
     fn violations(&self, joints: &[f64]) -> Vec<Violation> {
         let Ok(&[h1, h2, h3]) = checked(joints, 3) else { return Vec::new() };
-        // Of several assemblies the one that breaks least is meant.
-        let all = self.assemblies([h1, h2, h3]);
-        all.into_iter().map(|at| self.broken(at)).min_by_key(Vec::len).unwrap_or_default()
+        // Of several assemblies the one that breaks least is meant; of several that break nothing nobody knows which.
+        let all: Vec<Vec<Violation>> = self.assemblies([h1, h2, h3]).into_iter().map(|at| self.broken(at)).collect();
+        let inside = all.iter().filter(|v| v.is_empty()).count();
+        if inside > 1 {
+            let what = "the number of tool positions that fit the joint values".into();
+            return vec![Violation { name: "assembly", what, value: inside as f64, limit: 1.0 }];
+        }
+        all.into_iter().min_by_key(Vec::len).unwrap_or_default()
     }
 }

@@ -247,8 +247,10 @@ fn parallel_machine_as_published() {
     assert!((all[0][0] - 1000.0).abs() < 1e-9 && (all[0][1] - 30f64.to_radians()).abs() < 1e-12);
     assert!((all[1][0] - 503.618).abs() < 1e-3 && (all[1][1].to_degrees() - 83.13).abs() < 0.01);
     assert_eq!(machine.forward(&h), Err(KinematicsError::Ambiguous { count: 2 }));
+    assert_eq!(machine.violations(&h).iter().map(|v| (v.name, v.value)).collect::<Vec<_>>(), [("assembly", 2.0)]);
     let narrow = TwoLegs { shape: TwoLegsShape { arm: (604.1, 2000.0), ..machine.shape.clone() } };
     assert!((narrow.forward(&h).unwrap().rotation[2] - 30f64.to_radians()).abs() < 1e-12);
+    assert!(narrow.violations(&h).is_empty());
 }
 
 fn nodes(machine: &Machine, height: f64) -> (usize, f64) {

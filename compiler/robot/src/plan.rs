@@ -335,6 +335,7 @@ fn amount(v: &gr_machine::Violation) -> String {
     match (angle, v.name) {
         (true, _) => format!("{:.3}°", v.value.to_degrees()),
         (_, "singular") => format!("{:.3e}", v.value),
+        (_, "assembly") => format!("{}", v.value),
         _ => format!("{:.3} mm", v.value),
     }
 }

@@ -70,7 +70,10 @@ impl Known {
         let beside = (0..3).any(|i| !along(&i) && doubtful(i) && !needed[i] && used[i]);
         let stays_up = beside && !sinks;
         // Before an index to come, the slides stay where the machine stands: what the program has named in the part is not there.
-        let turns = said.tool.is_some() && (stays_up || !blind.is_empty()) && turns_first(program, index, &blind, sources);
+        // A retract beside a tilted tool holds until a block names its axis, too: a slide may make the height of another axis there.
+        let retracted = (0..3).filter(|i| tilt.is_some() && blind.is_empty() && places[*i] == Place::Machine);
+        let unknown: Vec<usize> = blind.iter().copied().chain(retracted).collect();
+        let turns = said.tool.is_some() && (stays_up || !blind.is_empty()) && turns_first(program, index, &unknown, sources);
         let goes: [bool; 9] = std::array::from_fn(|i| match i {
             0..3 if (turns || tilt.is_some() && !blind.is_empty() && !lifts) && !needed[i] => false,
             i if along(&i) => sure(&i) && !stays_up && late.is_empty() && (blind.is_empty() || lifts),

@@ -149,6 +149,8 @@ pub(crate) struct Lints<'a> {
     pub(crate) summary: Summary,
     /// Position in the active work frame and program units.
     position: [f64; 3],
+    /// A B C there.
+    rotary: [f64; 3],
     /// G5x, G92 and tool offsets, summed when needed.
     origin: Axes,
     g92: Axes,
@@ -177,6 +179,7 @@ pub(crate) struct Lints<'a> {
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) struct Seen {
     position: [f64; 3],
+    rotary: [f64; 3],
     offsets: [Axes; 3],
     rotation: f64,
     feed: f64,
@@ -200,6 +203,7 @@ impl<'a> Lints<'a> {
             found: Vec::new(),
             summary: Summary::default(),
             position: xyz(&state.current),
+            rotary: xyz(&state.current[3..]),
             origin: state.origin,
             g92: state.g92,
             tool_offset: state.tool_offset,
@@ -223,6 +227,7 @@ impl<'a> Lints<'a> {
     pub(crate) fn seen(&self) -> Seen {
         Seen {
             position: self.position,
+            rotary: self.rotary,
             offsets: [self.origin, self.g92, self.tool_offset],
             rotation: self.rotation,
             feed: self.feed,
@@ -237,7 +242,7 @@ impl<'a> Lints<'a> {
 
     /// Goes on from what the stream had said.
     pub(crate) fn resume(&mut self, seen: &Seen) {
-        self.position = seen.position;
+        (self.position, self.rotary) = (seen.position, seen.rotary);
         [self.origin, self.g92, self.tool_offset] = seen.offsets;
         [self.compensation, self.mist, self.flood, self.feed_per_revolution, self.thread] = seen.switches;
         [self.selected, self.tool] = seen.tools;
@@ -271,6 +276,21 @@ impl<'a> Lints<'a> {
         }
     }
 
+    /// Another side of the part comes before the tool.
+    #[inline]
+    fn turned(&mut self, end: &Axes) {
+        let rotary = xyz(&end[3..]);
+        if rotary != self.rotary {
+            self.rotary = rotary;
+            self.frame_changed();
+        }
+    }
+
+    /// Whether Z is the depth, as far as the program shows.
+    fn upright(&self) -> bool {
+        self.rotary[..2] == [0.0; 2]
+    }
+
     fn frame_changed(&mut self) {
         self.summary.new_frame = true;
         self.summary.cuts = Cuts::default();
@@ -283,11 +303,13 @@ impl Sink for Lints<'_> {
         match call {
             Call::StraightFeed(end) => {
                 travel::check(self, at, end);
+                self.turned(end);
                 self.cut(at, xyz(end));
             }
             Call::StraightTraverse(end) => {
                 units::check(self, at);
                 travel::check(self, at, end);
+                self.turned(end);
                 let end = xyz(end);
                 stock::rapid(self, at, end);
                 self.position = end;

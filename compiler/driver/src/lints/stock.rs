@@ -76,7 +76,7 @@ pub(super) fn cut(lints: &mut Lints<'_>, from: [f64; 3], end: [f64; 3]) {
 pub(super) fn rapid(lints: &mut Lints<'_>, at: &At<'_>, end: [f64; 3]) {
     let from = lints.position;
     let deeper = end[2] < from[2] && end[2] < 0.0 && end[2] < lints.summary.cuts.lowest;
-    if deeper && lints.plane == Plane::Xy && lints.summary.dives.len() < MOST_PER_CHUNK && !to_the_machine(at.now) {
+    if deeper && lints.upright() && lints.plane == Plane::Xy && lints.summary.dives.len() < MOST_PER_CHUNK && !to_the_machine(at.now) {
         lints.summary.dives.push(Dive {
             place: at.into(),
             end,
