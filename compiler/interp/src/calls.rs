@@ -180,8 +180,9 @@ impl<S: Sink> Interp<'_, S> {
         if let Some(other) = words.iter().find(ends) {
             return Err(self.not_carried_out(rs274::SILENT, format!("{name} beside M{}", other.value)).at(b'm'));
         }
-        if !self.modal_macros.is_empty() {
-            return Err(self.not_carried_out(rs274::SILENT, format!("{name} beside other words while G66 is in force")).at(b'm'));
+        // A movement would call two programs, or one that is to be left.
+        if self.modal_to_call().is_some() && words.iter().any(|w| b"xyzabcuvwh".contains(&w.letter)) {
+            return Err(self.not_carried_out(rs274::SILENT, format!("{name} beside a movement while G66 is in force")).at(b'm'));
         }
         for w in words {
             self.read_word(scan, text, w)?;

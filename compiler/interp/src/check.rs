@@ -261,7 +261,8 @@ impl<S: Sink> Interp<'_, S> {
         let unused = |rs, letter: u8| {
             Err(Fault::new(code::WORD_UNUSED, rs).arg(char::from(letter.to_ascii_uppercase())).at(letter))
         };
-        if cycle {
+        // A Fanuc control turns them on the way to the hole (0i/30i operator's manual, machining center, canned cycles).
+        if cycle && !self.is_fanuc() {
             for (letter, rs) in [(b'a', rs274::RT_A_IN_CYCLE), (b'b', rs274::RT_B_IN_CYCLE), (b'c', rs274::RT_C_IN_CYCLE)] {
                 if b.has(letter) {
                     return unused(rs, letter);

@@ -184,6 +184,7 @@ impl<S: Sink> Interp<'_, S> {
             if self.spent() {
                 return Err(self.too_many());
             }
+            self.turn_to_hole();
             self.mark(&Mark::CycleBegin(g));
             let done = self.cycle_pass(&mut hole, pass == 0);
             self.mark(&Mark::CycleEnd);
@@ -198,6 +199,17 @@ impl<S: Sink> Interp<'_, S> {
             self.restore_path_mode(path, tolerances);
         }
         Ok(())
+    }
+
+    /// Fanuc: rotary axes turn on the way to the hole, with each repetition.
+    fn turn_to_hole(&mut self) {
+        if !self.is_fanuc() {
+            return;
+        }
+        for i in 3..6 {
+            let Some(word) = self.block.get(LETTERS[i]) else { continue };
+            self.m.current[i] = if self.m.incremental != 0 { self.m.current[i] + word } else { word };
+        }
     }
 
     pub(crate) fn restore_path_mode(&mut self, path: u8, [tolerance, naivecam]: [f64; 2]) {

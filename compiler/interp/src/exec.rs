@@ -363,7 +363,7 @@ impl<S: Sink> Interp<'_, S> {
             382..=385 => self.convert_probe(motion),
             800 => {
                 if self.is_fanuc() {
-                    self.m.motion = self.m.before_cycle;
+                    self.end_cycle();
                     return Ok(());
                 }
                 self.remark("interpreter: motion mode set to none");
@@ -388,6 +388,12 @@ impl<S: Sink> Interp<'_, S> {
                 self.emit(Call::ProgramStop);
             }
             1 => self.emit(Call::OptionalProgramStop),
+            // Behind THEN; else M99 makes a line of its own kind.
+            99 if self.level() > 0 && self.is_fanuc() => {
+                let back = self.block.get(b'p');
+                self.convert_return(gr_gcode::Keyword::MacroEnd, true)?;
+                return back.map_or(Ok(()), |n| self.go_to_number(n));
+            }
             99 if self.level() > 0 => {
                 let fault = Fault::new(code::SUB_STRUCTURE, rs274::RT_M99_BUG).at(b'm');
                 return Err(fault.own_args(&["M99 ends a subroutine only at the start of its line"]));

@@ -92,6 +92,7 @@ impl<S: Sink> Interp<'_, S> {
         match self.block.turning {
             -1 => {}
             500 => return self.clamp_spindle("G50"),
+            690 => self.m.turned = 0,
             _ => return self.turn_coordinates(),
         }
         if matches!(self.block.g(Group::NonModal), 100 | 280 | 300 | 520 | 920) {
@@ -116,12 +117,19 @@ impl<S: Sink> Interp<'_, S> {
         }
         // G80 goes back to the motion of group 01, which a bare axis word then makes.
         if self.block.g(Group::Motion) == 800 && self.has_axes() {
-            self.m.motion = self.m.before_cycle;
-            self.leave_cycle();
+            self.end_cycle();
             self.block.g[Group::Motion as usize] = -1;
             self.block.g_mask &= !(1 << Group::Motion as u32);
         }
         Ok(())
+    }
+
+    /// G80: the motion of before the cycle is in force again; without a cycle the one in force stays.
+    pub(crate) fn end_cycle(&mut self) {
+        if crate::check::is_cycle(self.m.motion as i16) {
+            self.m.motion = self.m.before_cycle;
+        }
+        self.leave_cycle();
     }
 
     /// A code of group 01 beside one of group 00 that takes the axis words: it is in force from now on.
@@ -342,12 +350,8 @@ impl<S: Sink> Interp<'_, S> {
         Ok(())
     }
 
-    /// G68 X Y R, G69.
+    /// G68 X Y R.
     fn turn_coordinates(&mut self) -> Res {
-        if self.block.turning == 690 {
-            self.m.turned = 0;
-            return Ok(());
-        }
         let refuse = |what: &str| {
             Err(Fault::new(code::CODE_NOT_CARRIED_OUT, rs274::RT_UNKNOWN_G).arg(format!("G68 {what}")).arg("Coordinate rotation").at(b'g'))
         };
@@ -378,7 +382,7 @@ impl<S: Sink> Interp<'_, S> {
         let centre = [one, two].map(|i| self.block.get(LETTERS[i]).unwrap_or(self.m.current[i]));
         self.m.turn = [centre[0], centre[1], angle];
         self.m.turned = 1;
-        self.block.present = 0;
+        self.block.present &= !(AXES | letters(b"r"));
         Ok(())
     }
 

@@ -155,10 +155,15 @@ impl<S: Sink> Interp<'_, S> {
         Ok(())
     }
 
+    /// The G66 that a movement would call.
+    pub(crate) fn modal_to_call(&self) -> Option<usize> {
+        let called = self.levels.iter().rev().find_map(|l| l.modal);
+        called.map_or(self.modal_macros.len(), |c| c.index).checked_sub(1)
+    }
+
     /// After a block: a movement calls the macro of the last G66. Movements of that macro call the one of the G66 before.
     pub(crate) fn call_modal(&mut self) -> Res {
-        let called = self.levels.iter().rev().find_map(|l| l.modal);
-        let Some(index) = called.map_or(self.modal_macros.len(), |c| c.index).checked_sub(1) else { return Ok(()) };
+        let Some(index) = self.modal_to_call() else { return Ok(()) };
         if self.flow != Flow::Next || !self.has_axes() && !self.block.has(b'h') {
             return Ok(());
         }

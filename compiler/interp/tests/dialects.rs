@@ -657,6 +657,11 @@ fn motion_beside_a_one_shot_code() {
     for (id, beside, apart) in apart {
         assert_eq!(moves(of(id, beside)), moves(of(id, apart)), "{id} {beside}");
     }
+    // The other words of their blocks count.
+    let (calls, outcome) = run_in("fanuc-mill", "G21 G90\nG68 X0 Y0 R90. F300. S2000\nG1 X5.\nG69 G80 X7.\nG69 G0 G28 Z0\nM30\n");
+    assert!(outcome.findings.is_empty(), "{:?}", outcome.findings);
+    assert!(calls.iter().any(|c| c == "SET_FEED_RATE(300.0000)") && calls.iter().any(|c| c.starts_with("SET_SPINDLE_SPEED(0, 2000")), "{calls:?}");
+    assert!(calls.iter().any(|c| c.starts_with("STRAIGHT_FEED(7.0000, 0.0000")), "{calls:?}");
     for text in ["G91 G68 X0 Y0 R30.", "G55 G68 R30.", "G68 G43 H1 X0 Y0 R30."] {
         let (_, outcome) = run_in("fanuc-mill", &format!("G21 G90\nT1 M6\n{text}\nM30\n"));
         assert_eq!(outcome.findings.iter().map(|f| f.fault.code).collect::<Vec<_>>(), [code::CODE_NOT_CARRIED_OUT], "{text}");
@@ -667,6 +672,29 @@ fn motion_beside_a_one_shot_code() {
         let (_, outcome) = run_in("fanuc-mill", &format!("G21 G90\n{text}\nG0 X1.\nM30\n"));
         assert_eq!(outcome.findings.iter().map(|f| f.fault.code).collect::<Vec<_>>(), [code::PATH_LOOK_AHEAD], "{text}");
     }
+}
+
+/// G80 where no cycle is in force leaves the motion alone.
+#[test]
+fn a_cycle_that_is_not_on_ends_nothing() {
+    for text in ["G1 X5.\nG80\nX7.", "G1 X5.\nG80 X7.", "G81 X5. Z-2. R2.\nG80\nG1 X5.\nG80\nX7."] {
+        let (calls, outcome) = run_in("fanuc-mill", &format!("G21 G90 F100. S100 M3\n{text}\nM30\n"));
+        assert!(outcome.findings.is_empty(), "{text} {:?}", outcome.findings);
+        assert!(calls.iter().any(|c| c.starts_with("STRAIGHT_FEED(7.0000")), "{text} {calls:?}");
+    }
+}
+
+/// Machining center, canned cycles: rotary axes turn on the way to the hole.
+#[test]
+fn cycles_turn_rotary_axes() {
+    let (calls, outcome) = run_in("fanuc-mill", "G21 G90 F100. S100 M3\nG0 X0 Y0 Z20. A0\nG98 G81 X5. A10. Z-2. R2.\nA90.\nG91 A30. K2\nG80\nM30\n");
+    assert!(outcome.findings.is_empty(), "{:?}", outcome.findings);
+    let at = |c: &String| c.split(['(', ')', ',']).map(str::trim).collect::<Vec<_>>()[1..5].join(" ");
+    let feeds: Vec<String> = calls.iter().filter(|c| c.starts_with("STRAIGHT_FEED")).map(at).collect();
+    assert_eq!(feeds, ["5.0000 0.0000 -2.0000 10.0000", "5.0000 0.0000 -2.0000 90.0000", "5.0000 0.0000 -2.0000 120.0000", "5.0000 0.0000 -2.0000 150.0000"]);
+    let rapids: Vec<String> = calls.iter().filter(|c| c.starts_with("STRAIGHT_TRAVERSE")).map(at).collect();
+    assert_eq!(rapids[1..4], ["5.0000 0.0000 20.0000 10.0000", "5.0000 0.0000 2.0000 10.0000", "5.0000 0.0000 20.0000 10.0000"]);
+    assert_eq!(rapids[4], "5.0000 0.0000 20.0000 90.0000");
 }
 
 /// C and A of a lathe without a C axis are a chamfer and the angle of a line.
@@ -706,7 +734,7 @@ fn words_beside_a_subprogram_call() {
     assert_eq!(order, flood_before_each_move);
     for (text, told) in [
         ("G0 X5. M98 P7 M30", "M98 beside M30"),
-        ("G66 P7\nG0 X5. M98 P7\nG67", "M98 beside other words while G66 is in force"),
+        ("G66 P7\nG0 X5. M98 P7\nG67", "M98 beside a movement while G66 is in force"),
         ("G0 X5. M98", "M98"),
         ("G0 X5. M98 P9", "main.ngc"),
     ] {
@@ -727,6 +755,11 @@ fn subprograms_in_any_order() {
     assert_eq!(ends(&program.replace("CALL", "M98 P1002")), ["1.0000", "2.0000", "1.0000"]);
     assert_eq!(ends(&program.replace("CALL", "M98 P1002 L2\nM98 P1001")), ["1.0000", "2.0000", "1.0000", "1.0000", "2.0000", "1.0000", "2.0000"]);
     assert_eq!(ends(&program.replace("CALL", "M98 P1003")), ["9.0000", "1.0000"]);
+    // M99 beside words that don't move while G66 is in force, and behind THEN.
+    let left = "%\nO1\nG21 G90\nM98 P1000\nG0 X9.\nM30\nO1000\nG66 P1001\nX2.\nG67 M99\nO1001\nG0 Z1.\nG90 M99\n%\n";
+    assert_eq!(ends(left), ["2.0000", "2.0000", "9.0000"]);
+    let behind_then = "O1\nG21 G90\nM98 P2\nG0 X9.\nM30\nO2\nG0 X1.\nIF [1 EQ 1] THEN M99\nX2.\nM99\n";
+    assert_eq!(ends(behind_then), ["1.0000", "9.0000"]);
     // M99 P in the main program goes to a block; to one above it is the program over again.
     let skipped = "O1\nG21 G90\nN5 G0 X1.\nM99 P20\nX2.\nN20 X3.\nM30\n";
     assert_eq!(ends(skipped), ["1.0000", "3.0000"]);

@@ -221,7 +221,8 @@ impl<'a> Emitter<'a> {
         const MOST_LINES: u32 = 1000;
         let source = view.source;
         let last = self.last_source.replace(source);
-        if matches!(view.op, Op::WorkOffset(..)) {
+        // G10 changes the one in force, and selects none.
+        if matches!(view.op, Op::WorkOffset(..)) && !self.words(source).is_some_and(|w| w.g(100) && !SYSTEMS[1..].iter().any(|g| w.g(*g))) {
             self.said_system = true;
             return;
         }
