@@ -129,7 +129,7 @@ pub fn from_line(
         return Err(vec![Diagnostic::new(code::FROM_LINE_PLACE_OF_MACHINE, place.0, place.1, &[known.lost.join(" ")])]);
     }
     let length = length_to_come(program, found.index, &state, sources);
-    let heights = Heights { program, state: &state, begins: &pose, tilt, sources };
+    let heights = Heights { program, state: &state, begins: &pose, tilt, tips: options.tool.is_some() && !lathe, sources };
     let own = if tilt.is_none() || known.height { heights.of(&pose, &state) } else { f64::NEG_INFINITY };
     let safe = match (options.room, options.safe_z) {
         (Some(room), _) => room.safe,

@@ -310,7 +310,6 @@ fn a_translation_holds_on_every_machine_or_says_so() {
         assert_eq!(found, (vec!["E0607".into()], Some(0)), "{unit}");
     }
     for text in [
-        "G21 G90\nG10 L2 P1 X0 Y0 Z0\nG54 G0 X1 Y1 Z5\nM2\n",
         "G21 G90\nG10 L2 P2 X[#5221+5]\nG55 G0 X1\nM2\n",
         "G21 G90\nG0 Z4\nG28.1\nG0 Z1\nG28\nM2\n",
         "G21 G90 F100\nT1 M6\nG0 X0 Y0 Z5\nG41 D1 G1 X10\nY10\nX20\nG40 X30\nM2\n",
@@ -346,6 +345,8 @@ fn a_translation_holds_on_every_machine_or_says_so() {
         "G21 G90 G54 F100\nG0 X0 Y0 Z10\nG38.2 Z-10\nG91 G0 Z1\nG38.2 Z-2 F10\nG90 G10 L20 P1 Z0\nG0 Z5\nM2\n",
         "G21 G90 G54\nG0 X1 Y2 Z3\nG10 L20 P2 X50 Z[2+3]\nG10 L2 P3 X0 Y[1+1] R20\nG10 L2 P1 X0\nG55 G0 X3 Y4 Z5\nG92 X9\nG10 L20 P3 X1 Y1\nG56 G0 X1 Y1\nG10 L2 P6 Z0\nM2\n",
         "G21 G90 G17 G40 G49 G54\nG0 X1 Y1 Z1\nM2\n",
+        // G10 selects nothing: the G54 behind it is said.
+        "G21 G90\nG10 L2 P1 X0 Y0 Z0\nG54 G0 X1 Y1 Z5\nM2\n",
         // What the control may have in store is said again: a rotation of 0 too.
         "G21 G90 G17 G54\nG10 L2 P1 X0 Y0 Z0 R0\nG0 X10 Y0 Z5\nG10 L2 P0 R0 Y3\nG0 X20 Y1\nM2\n",
         // A first block that names G0 and no axis.

@@ -57,21 +57,21 @@ fn rows_of_outputs() {
         path.display().to_string()
     };
     let cell = std::fs::read_to_string(root().join(CELL)).unwrap();
-    let rows = "[io.M50]\nsignal = \"doOvr\"\n[io.M53]\nsignal = \"doHold\"\nvalue = 0\n[io.M62]\nsignal = \"doAny\"\n[io.M63P2]\nsignal = \"doTwo\"\nvalue = 0\n[io.M68]\nsignal = \"aoAny\"\n[io.M68P3]\nsignal = \"aoThree\"\n";
+    let rows = "[io.M50]\nsignal = \"doOvr\"\n[io.M53]\nsignal = \"doHold\"\nvalue = 0\n[io.M62]\nsignal = \"doAny\"\n[io.M63P2]\nsignal = \"doTwo\"\nvalue = 0\nwait = \"diTwo\"\n[io.M68]\nsignal = \"aoAny\"\n[io.M68P3]\nsignal = \"aoThree\"\n";
     let cell = put("cell.toml", &format!("{cell}\n{rows}"));
     let of = |words: &str| {
         let part = put("part.ngc", &format!("G21 G90 T1 M6\nG0 X0 Y0 Z20\n{words}\nG1 X5 F600\nM30\n"));
         let out = folder.path().join("part.mod");
         _ = std::fs::remove_file(&out);
         let made = run(&["build", &part, "--machine", &cell, "--target", "rapid", "-o", out.to_str().unwrap(), "-q", "--message-format", "short"]);
-        let set = |l: &&str| l.trim_start().starts_with("Set");
+        let set = |l: &&str| l.trim_start().starts_with("Set") || l.contains("diTwo");
         let program = std::fs::read_to_string(&out).unwrap_or_default();
         let sets: Vec<String> = program.lines().filter(set).filter_map(|l| l.split('!').next()).map(|l| l.trim().to_string()).filter(|l| l.contains("Ovr") || l.contains("Hold") || l.contains("Any") || l.contains("Two") || l.contains("Three")).collect();
         if made.status.success() { sets.join(" ") } else { text(&made.stderr).lines().filter(|l| l.contains("error[")).collect::<Vec<_>>().join(" ") }
     };
     assert_eq!(of("M49\nG1 X1 F600\nM48"), "SetDO doOvr,0; SetDO doOvr,1;");
     assert_eq!(of("M53 P0\nG1 X1 F600\nM53 P1"), "SetDO doHold,1; SetDO doHold,0;");
-    assert_eq!(of("M62 P2\nG1 X1 F600\nM63 P2\nM68 E3 Q2.5"), "SetDO doTwo,1; SetDO doTwo,0; SetAO aoThree,2.5;");
+    assert_eq!(of("M62 P2\nG1 X1 F600\nM63 P2\nM68 E3 Q2.5"), "SetDO doTwo,1; SetDO doTwo,0; WaitDI diTwo,1; SetAO aoThree,2.5;");
     for word in ["M62 P1", "M68 E1 Q2"] {
         let told = of(word);
         assert!(told.contains("E0523") && told.contains(&format!("the number of {word}")), "{word}: {told}");
@@ -698,6 +698,24 @@ fn a_five_axis_mill_restarts() {
     std::fs::write(path("a.ngc"), "G21 G90 G17 G54\nG0 X0 Y0 Z50 A0\nG1 Z-60 F300\nG1 X10\nG0 Z50\nM2\n").unwrap();
     let o = run(&["build", &path("a.ngc"), "--machine", "generic/mill3", "--target", "joint-gcode", "--from-line", "4", "--safe-z", "60", "-q"]);
     assert!(o.status.success(), "{}", text(&o.stderr));
+}
+
+/// Between the change to a shorter tool and its G43 the length of the one before is in force: the machine file has the tips, whose highest counts.
+#[test]
+fn a_restart_before_the_length_of_a_shorter_tool() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_string();
+    std::fs::write(path("m.toml"), "format = 1\nid = \"shop/m\"\nextends = \"generic/mill3\"\n[frames.table]\nposition = [0, 0, -250]\n[[joint]]\nname = \"Z\"\nmin = -900\nmax = 900\n[[tool]]\nnumber = 1\nname = \"a\"\nposition = [0, 0, 40]\n[[tool]]\nnumber = 2\nname = \"b\"\nposition = [0, 0, 120]\n").unwrap();
+    let program = "G21 G90 G17 G54\nG53 G0 Z0\nT2 M6\nS8000 M3\nG0 X-60 Y0\nG43 H2 Z30\nG1 Z-20 F300\nX-50\nG0 Z30\nG53 G0 Z0\nM5\nT1 M6\nS6000 M3\nG0 X0 Y0\nG43 H1 Z80\nG1 Z49 F300\nY-30\nG0 Z80\nM5\nM2\n";
+    std::fs::write(path("a.ngc"), program).unwrap();
+    for line in ["12", "13", "14", "15"] {
+        let o = run(&["build", &path("a.ngc"), "--machine", &path("m.toml"), "--target", "joint-gcode", "--from-line", line, "--message-format", "short", "-q"]);
+        assert!(o.status.success() && text(&o.stderr).contains("Z 80.000"), "{line}: {}", text(&o.stderr));
+        let ways = text_lines(&o.stdout).into_iter().take_while(|l| !l.starts_with("G1 ")).filter(|l| l.starts_with("G0 "));
+        // The tip 80 above the base, 250 below the machine's zero, of a tool 40 long.
+        let lowest = ways.filter_map(|l| l.split(' ').find_map(|w| w.strip_prefix('Z')).and_then(|z| z.parse::<f64>().ok())).fold(f64::INFINITY, f64::min);
+        assert!(lowest >= -130.0 - 1e-6, "{line}: {lowest}");
+    }
 }
 
 /// In a section where the table tilts the part a restart turns the rotary axes first, where the machine stands, and comes along the tool.

@@ -416,7 +416,12 @@ impl<S: Sink> Interp<'_, S> {
                 if g != 810 {
                     self.emit(Call::Dwell(hole.dwell));
                 }
-                if g == 890 {
+                if g == 890 && self.is_fanuc() {
+                    self.cycle_feed(hole, hole.retract);
+                    if hole.clear > hole.retract {
+                        self.cycle_rapid(hole, hole.at, hole.clear);
+                    }
+                } else if g == 890 {
                     self.cycle_feed(hole, hole.clear);
                 } else {
                     self.cycle_rapid(hole, hole.at, hole.clear);
@@ -493,7 +498,9 @@ impl<S: Sink> Interp<'_, S> {
     /// G84, G74 with a floating tap holder.
     fn tap(&mut self, hole: &Hole) -> Res {
         self.check_tap_spindle(hole)?;
-        let Some(depth) = tap_points(hole) else {
+        // A Fanuc control feeds back to R, and goes up from there by rapid (0i/30i operator's manual, machining center, canned cycles).
+        let lifts = self.is_fanuc() && hole.clear > hole.retract;
+        let Some(depth) = tap_points(hole, if lifts { hole.retract } else { hole.clear }) else {
             return Err(Fault::new(code::CYCLE_NOT_HERE, rs274::CYCLE_TAP_PLANE)
                 .arg("tapping works in G17, G18 and G19 only")
                 .arg(code_name(hole.g))
@@ -518,6 +525,9 @@ impl<S: Sink> Interp<'_, S> {
         }
         if !speed_held {
             self.emit(Call::EnableSpeedOverride(hole.spindle));
+        }
+        if lifts {
+            self.cycle_rapid(hole, hole.at, hole.clear);
         }
         Ok(())
     }
@@ -581,7 +591,7 @@ impl<S: Sink> Interp<'_, S> {
 
 /// X, Y, Z of the bottom and of the clear level. (In G19 and G18 the controller gives its axes in another order
 /// than it later reads them; the tool goes where it says.)
-fn tap_points(hole: &Hole) -> Option<[[f64; 3]; 2]> {
+fn tap_points(hole: &Hole, top: f64) -> Option<[[f64; 3]; 2]> {
     let [a, b] = hole.at;
     let point = |level: f64| match hole.plane {
         Plane::Xy => Some([a, b, level]),
@@ -589,7 +599,7 @@ fn tap_points(hole: &Hole) -> Option<[[f64; 3]; 2]> {
         Plane::Xz => Some([level, a, b]),
         _ => None,
     };
-    Some([point(hole.bottom)?, point(hole.clear)?])
+    Some([point(hole.bottom)?, point(top)?])
 }
 
 fn polar_increment(at: [f64; 2], radius: f64, angle: f64) -> Res<[f64; 2]> {

@@ -661,7 +661,7 @@ fn motion_beside_a_one_shot_code() {
     let (calls, outcome) = run_in("fanuc-mill", "G21 G90\nG68 X0 Y0 R90. F300. S2000\nG1 X5.\nG69 G80 X7.\nG69 G0 G28 Z0\nM30\n");
     assert!(outcome.findings.is_empty(), "{:?}", outcome.findings);
     assert!(calls.iter().any(|c| c == "SET_FEED_RATE(300.0000)") && calls.iter().any(|c| c.starts_with("SET_SPINDLE_SPEED(0, 2000")), "{calls:?}");
-    assert!(calls.iter().any(|c| c.starts_with("STRAIGHT_FEED(7.0000, 0.0000")), "{calls:?}");
+    assert!(calls.iter().any(|c| c.starts_with("STRAIGHT_FEED(7.0000, 5.0000")), "{calls:?}");
     for text in ["G91 G68 X0 Y0 R30.", "G55 G68 R30.", "G68 G43 H1 X0 Y0 R30."] {
         let (_, outcome) = run_in("fanuc-mill", &format!("G21 G90\nT1 M6\n{text}\nM30\n"));
         assert_eq!(outcome.findings.iter().map(|f| f.fault.code).collect::<Vec<_>>(), [code::CODE_NOT_CARRIED_OUT], "{text}");
@@ -678,9 +678,22 @@ fn motion_beside_a_one_shot_code() {
 #[test]
 fn a_cycle_that_is_not_on_ends_nothing() {
     for text in ["G1 X5.\nG80\nX7.", "G1 X5.\nG80 X7.", "G81 X5. Z-2. R2.\nG80\nG1 X5.\nG80\nX7."] {
-        let (calls, outcome) = run_in("fanuc-mill", &format!("G21 G90 F100. S100 M3\n{text}\nM30\n"));
+        let (calls, outcome) = run_in("fanuc-mill", &format!("G21 G90 F100. S100 M3\nG0 Z9.\n{text}\nM30\n"));
         assert!(outcome.findings.is_empty(), "{text} {:?}", outcome.findings);
         assert!(calls.iter().any(|c| c.starts_with("STRAIGHT_FEED(7.0000")), "{text} {calls:?}");
+    }
+}
+
+/// Machining center, canned cycles: tapping and G89 feed back to R; the way to the initial level is a rapid.
+#[test]
+fn taps_come_back_to_r_by_feed() {
+    for (cycle, last) in [("G98 G84", "TRAVERSE 50"), ("G99 G84", "FEED 5"), ("G98 G74", "TRAVERSE 50"), ("G98 G89", "TRAVERSE 50"), ("G99 G89", "FEED 5")] {
+        let (calls, outcome) = run_in("fanuc-mill", &format!("G21 G90 F500. S500 M3\nG0 Z50.\n{}{cycle} X1. Z-10. R5. P100\nG80\nM30\n", if cycle.ends_with("74") { "M4\n" } else { "" }));
+        assert!(outcome.findings.is_empty(), "{cycle} {:?}", outcome.findings);
+        let moves: Vec<String> = calls.iter().filter_map(|c| c.strip_prefix("STRAIGHT_")).map(|c| format!("{} {}", c.split('(').next().unwrap(), c.split(", ").nth(2).unwrap().trim_end_matches(".0000"))).collect();
+        let expected = ["FEED -10", "FEED 5", last];
+        let end = if last.starts_with("FEED") { &expected[..2] } else { &expected[..] };
+        assert!(moves.ends_with(&end.iter().map(|m| m.to_string()).collect::<Vec<_>>()), "{cycle} {moves:?}");
     }
 }
 

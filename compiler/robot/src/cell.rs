@@ -140,9 +140,8 @@ impl Cells {
         if output(new).is_some_and(|s| s.signal == on.signal) {
             return None;
         }
-        let value = Some(contrary(on.value));
-        let signal = Signal { value, wait: None, seconds: None, ..on.clone() };
-        Some(Action::Signal { word: Word::new(new), value, signal })
+        let signal = off(on.clone());
+        Some(Action::Signal { word: Word::new(new), value: signal.value, signal })
     }
 
     pub fn coolant(&mut self, word: &str, on: bool, any: bool) -> Made {
@@ -189,8 +188,8 @@ impl Cells {
     /// An output that a word switches on and off: what its row says is for on.
     pub fn switched(&self, word: Word, on: bool) -> Made {
         let Some(signal) = self.row(&word) else { return Made::NOTHING };
-        let value = Some(if on { signal.value.unwrap_or(1.0) } else { contrary(signal.value) });
-        Made { actions: steps(word, None, Signal { value, ..signal }), by_hand: None }
+        let signal = if on { Signal { value: signal.value.or(Some(1.0)), ..signal } } else { off(signal) };
+        Made { actions: steps(word, None, signal), by_hand: None }
     }
 
     /// M62 … M65: a row for the output's own number (`M62P3`) comes before one for all, which has to pass the number on. The word:
@@ -211,7 +210,7 @@ impl Cells {
         if let Some(signal) = opposite.into_iter().find_map(numbered).filter(|s| s.signal.is_some()) {
             // The contrary of what its row says: some outputs are on at 0.
             let value = Some(signal.value.map_or(f64::from(u8::from(on)), |v| contrary(Some(v))));
-            return Ok(Made { actions: steps(word, None, Signal { value, ..signal }), by_hand: None });
+            return Ok(Made { actions: steps(word, None, Signal { value, ..off(signal) }), by_hand: None });
         }
         if !self.own_words && self.row(&word).is_some_and(|s| s.routine.is_none() && s.signal.is_some()) {
             return Err(word);
@@ -247,6 +246,11 @@ fn turn_word(turn: Turn) -> &'static str {
         Turn::Ccw => "M4",
         Turn::Stop => "M5",
     }
+}
+
+/// The contrary of a row: what the row waits for doesn't come then.
+fn off(row: Signal) -> Signal {
+    Signal { value: Some(contrary(row.value)), wait: None, seconds: None, ..row }
 }
 
 /// What switches off an output that is on at a value; some are on at 0.

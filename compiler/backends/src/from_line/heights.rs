@@ -2,7 +2,7 @@
 
 use gr_ir::{Op, Pose, Program, Sources, State, View};
 
-use super::V3;
+use super::{UP, V3};
 use crate::sources::{Words, is_hidden};
 
 /// A tool whose direction has a Z no smaller than 1 less this stands upright.
@@ -16,6 +16,8 @@ pub(super) struct Heights<'a> {
     pub begins: &'a Pose,
     /// Direction from the tool point to the spindle, where that isn't Z.
     pub tilt: Option<V3>,
+    /// A machine file is known, which has the tools' lengths: heights are those of their tips, whatever length is in force.
+    pub tips: bool,
     pub sources: &'a dyn Sources,
 }
 
@@ -23,7 +25,7 @@ impl Heights<'_> {
     /// Of a place.
     pub fn of(&self, pose: &Pose, state: &State) -> f64 {
         let mut machine = state.machine(&pose.axes);
-        match self.tilt {
+        match self.tilt.or(self.tips.then_some(UP)) {
             None => machine[2] - self.state.machine(&[0.0; 9])[2],
             Some(up) => {
                 // With a length in force it is the place of the tool's tip, else of the spindle's nose, a length along the tool above it.
