@@ -146,6 +146,10 @@ pub fn from_line(
     if let Some(way) = lifted_before_change(program, found.index, sources) {
         notes.push(Diagnostic::new(code::FROM_LINE_TOOL_CHANGE, place.0, place.1, &[state.tool.to_string(), way.into()]));
     }
+    let still = (0..3).all(|i| !known.goes[i] && !known.lifted[i]);
+    if tilt.is_some() && still && known.goes[3..6].contains(&true) {
+        notes.push(Diagnostic::new(code::FROM_LINE_FROM_WHERE_IT_STANDS, place.0, place.1, &[]));
+    }
     if length == Some(0.0) {
         notes.push(Diagnostic::new(code::FROM_LINE_BARE_SPINDLE, place.0, place.1, &[state.tool.to_string()]));
     }

@@ -795,7 +795,7 @@ fn a_restart_comes_along_a_tilted_tool() {
         for line in index - 4..=index {
             for more in [&[][..], &["--safe-z", "150"]] {
                 let (rows, found) = made(&[&["--from-line", &line.to_string()], more].concat());
-                assert!(!found.contains("error"), "{line}: {found}");
+                assert!(!found.contains("error") && found.contains("E0654"), "{line}: {found}");
                 assert_eq!(behind(rows), whole, "{line}");
             }
         }
