@@ -37,6 +37,9 @@ pub struct Options<'a> {
     pub room: Option<Room>,
     /// Direction from the tool point to the spindle in the work frame, where a machine is known; else it is Z.
     pub tool: Option<&'a ToolDirection<'a>>,
+    /// Where a length is in force, numbers are places of the tip of the tool that is carried, as a machine file has it: not of what the
+    /// length makes of them.
+    pub tips: bool,
     /// Where rotary axes turn alone, the slides stay that stand at a place of the machine, and the tool point doesn't: a mill's.
     pub slides: bool,
 }
@@ -129,14 +132,20 @@ pub fn from_line(
         return Err(vec![Diagnostic::new(code::FROM_LINE_PLACE_OF_MACHINE, place.0, place.1, &[known.lost.join(" ")])]);
     }
     let length = length_to_come(program, found.index, &state, sources);
-    let heights = Heights { program, state: &state, begins: &pose, tilt, tips: options.tool.is_some() && !lathe, sources };
+    let heights = Heights { program, state: &state, begins: &pose, tilt, sources };
     let own = if tilt.is_none() || known.height { heights.of(&pose, &state) } else { f64::NEG_INFINITY };
+    // How far below the height that is written the tip is, where a length is in force that is not the tool's, or none.
+    let holds = options.tips && state.tool_offset[2] != 0.0;
+    let below = if holds { Some(0.0) } else { carried(program, found.index, &state, sources).map(|length| length - state.tool_offset[2]) };
     let safe = match (options.room, options.safe_z) {
         (Some(room), _) => room.safe,
         // What is asked for is the height of the tool; where its length is not in force yet, the spindle goes higher.
-        (None, Some(z)) => z + length.unwrap_or(0.0),
+        (None, Some(z)) => z + length.or(below).unwrap_or(0.0).max(0.0),
         (None, None) => {
             let top = heights.top().unwrap_or(own);
+            // No tip comes lower than the highest of any tool, whatever length is in force for the one that is carried.
+            let tip = heights.highest_tip().filter(|_| tilt.is_none() && !lathe);
+            let top = tip.zip(below).map_or(top, |(tip, below)| top.max(tip + below));
             if tilt.is_none() || (0..3).any(|i| known.goes[i] && up[i].abs() > UPRIGHT || known.lifted[i]) {
                 notes.push(Diagnostic::new(code::FROM_LINE_NO_SAFE_HEIGHT, place.0, place.1, &[heights.show(top)]));
             }
@@ -368,23 +377,34 @@ fn length_to_come(program: &Program, index: usize, state: &State, sources: &dyn 
         return None;
     }
     // Of a tool that was never measured the length is 0, in force or not.
-    let asked = |s: &gr_ir::Step<'_>| !asks(s, &[490], sources);
+    if in_force(program, index, sources) { None } else { length_asked(program, index, sources) }
+}
+
+/// Length of the tool in the spindle, as the program has it: in force, or what it asks for before it changes the tool again.
+fn carried(program: &Program, index: usize, state: &State, sources: &dyn Sources) -> Option<f64> {
+    if in_force(program, index, sources) { Some(state.tool_offset[2]) } else { length_asked(program, index, sources) }
+}
+
+/// Whether the length in force is that of the tool in the spindle: it was asked for since the tool was changed.
+fn in_force(program: &Program, index: usize, sources: &dyn Sources) -> bool {
     let mut in_force = false;
     for s in own(program, index) {
         match s.op {
             Op::ToolChange(_) | Op::ToolNumber(_) => in_force = false,
-            Op::ToolOffset { .. } => in_force = asked(&s),
+            Op::ToolOffset { .. } => in_force = !asks(&s, &[490], sources),
             _ => {}
         }
     }
-    if in_force {
-        return None;
-    }
+    in_force
+}
+
+/// The greatest length that is asked for from an operation on, before the tool is changed.
+fn length_asked(program: &Program, index: usize, sources: &dyn Sources) -> Option<f64> {
     let mut said = None;
     for s in program.steps().skip(index) {
         match s.op {
             Op::ToolChange(_) | Op::ToolNumber(_) | Op::End => break,
-            Op::ToolOffset { offset, .. } if asked(&s) => said = Some(said.unwrap_or(0.0f64).max(offset[2])),
+            Op::ToolOffset { offset, .. } if !asks(&s, &[490], sources) => said = Some(said.unwrap_or(0.0f64).max(offset[2])),
             _ => {}
         }
     }

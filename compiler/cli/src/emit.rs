@@ -469,7 +469,7 @@ fn restart(motion: &mut Motion, unit: &Unit, (line, safe_z): (u32, Option<f64>),
     let turns = machine.map(gr_robot::Turns::new);
     let tool = |pose: &Pose, state: &State| turns.as_ref()?.up(pose, state);
     let begin = |motion: &Motion, unsure| {
-        let options = gr_backends::from_line::Options { safe_z, unsure, stored: !unit.setup.params.is_empty(), room: None, tool: Some(&tool), slides: machine.is_some_and(|m| m.kind == gr_machine::Kind::Mill) };
+        let options = gr_backends::from_line::Options { safe_z, unsure, stored: !unit.setup.params.is_empty(), room: None, tool: Some(&tool), tips: machine.is_some(), slides: machine.is_some_and(|m| m.kind == gr_machine::Kind::Mill) };
         gr_backends::from_line::from_line(&motion.program, FileId(0), line, &options, &texts(motion))
     };
     let mut unsure = [false; 9];

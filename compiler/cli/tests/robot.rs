@@ -718,6 +718,36 @@ fn a_restart_before_the_length_of_a_shorter_tool() {
     }
 }
 
+/// The change to a longer tool is made as high as that one needs it, also where the length in force is still another one's, or none is.
+#[test]
+fn a_restart_at_the_change_to_a_longer_tool() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_string();
+    std::fs::write(path("m.toml"), "format = 1\nid = \"shop/m\"\nextends = \"generic/mill3\"\n[frames.table]\nposition = [0, 0, -250]\n[[joint]]\nname = \"Z\"\nmin = -900\nmax = 900\n[[tool]]\nnumber = 1\nname = \"a\"\nposition = [0, 0, 50]\n[[tool]]\nnumber = 2\nname = \"b\"\nposition = [0, 0, 120]\n").unwrap();
+    std::fs::write(path("t.tbl"), "T1 P1 Z50 D10\nT2 P2 Z120 D6\n").unwrap();
+    let program = "G21 G90 G17 G54\nT1 M6\nS3000 M3\nG0 X0 Y0\nG43 H1 Z80\nG1 Z-1 F300\nX50\nG0 Z80\nT2 M6\nS3000 M3\nG0 X0 Y20\nG43 H2 Z15\nG1 Z-5 F300\nG0 Z15\nM5\nM2\n";
+    std::fs::write(path("a.ngc"), program).unwrap();
+    // The spindle's nose as low as it comes before a cut, above the work's zero: the highest tip at 80, of a tool of 120.
+    for line in ["3", "4", "9", "10", "11", "12"] {
+        let o = run(&["build", &path("a.ngc"), "-t", &path("t.tbl"), "--from-line", line, "--message-format", "short", "-q"]);
+        assert!(o.status.success(), "{line}: {}", text(&o.stderr));
+        let (mut length, mut lowest) = (0.0, f64::INFINITY);
+        for row in text_lines(&o.stdout).iter().take_while(|l| !l.contains("G1 ")) {
+            length = if row.contains("G43 H1") { 50.0 } else if row.contains("G43 H2") { 120.0 } else { length };
+            let z = row.split(' ').find_map(|w| w.strip_prefix('Z')).and_then(|z| z.parse::<f64>().ok());
+            lowest = z.map_or(lowest, |z: f64| lowest.min(z + length));
+        }
+        // At the change the program itself stands at 80 under the length of the shorter tool.
+        let needed = if matches!(line, "3" | "4" | "9") { 130.0 } else { 135.0 };
+        assert!(lowest >= needed, "{line}: {lowest} {}", text(&o.stdout));
+        let o = run(&["build", &path("a.ngc"), "-t", &path("t.tbl"), "--machine", &path("m.toml"), "--target", "joint-gcode", "--from-line", line, "--message-format", "short", "-q"]);
+        assert!(o.status.success(), "{line}: {}", text(&o.stderr));
+        let ways = text_lines(&o.stdout).into_iter().take_while(|l| !l.starts_with("G1 ")).filter(|l| l.starts_with("G0 "));
+        let lowest = ways.filter_map(|l| l.split(' ').find_map(|w| w.strip_prefix('Z')).and_then(|z| z.parse::<f64>().ok())).fold(f64::INFINITY, f64::min);
+        assert!(lowest + 250.0 >= needed, "{line}: {lowest}");
+    }
+}
+
 /// In a section where the table tilts the part a restart turns the rotary axes first, where the machine stands, and comes along the tool.
 #[test]
 fn a_restart_comes_along_a_tilted_tool() {

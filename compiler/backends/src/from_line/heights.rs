@@ -1,8 +1,8 @@
 //! How high the moves of a program go: along Z, or along a tool that is tilted where the program begins.
 
-use gr_ir::{Op, Pose, Program, Sources, State, View};
+use gr_ir::{Axes, Op, Pose, Program, Sources, State, View};
 
-use super::{UP, V3};
+use super::V3;
 use crate::sources::{Words, is_hidden};
 
 /// A tool whose direction has a Z no smaller than 1 less this stands upright.
@@ -16,8 +16,6 @@ pub(super) struct Heights<'a> {
     pub begins: &'a Pose,
     /// Direction from the tool point to the spindle, where that isn't Z.
     pub tilt: Option<V3>,
-    /// A machine file is known, which has the tools' lengths: heights are those of their tips, whatever length is in force.
-    pub tips: bool,
     pub sources: &'a dyn Sources,
 }
 
@@ -25,7 +23,7 @@ impl Heights<'_> {
     /// Of a place.
     pub fn of(&self, pose: &Pose, state: &State) -> f64 {
         let mut machine = state.machine(&pose.axes);
-        match self.tilt.or(self.tips.then_some(UP)) {
+        match self.tilt {
             None => machine[2] - self.state.machine(&[0.0; 9])[2],
             Some(up) => {
                 // With a length in force it is the place of the tool's tip, else of the spindle's nose, a length along the tool above it.
@@ -51,6 +49,16 @@ impl Heights<'_> {
             return self.fold(f64::max, any);
         }
         self.fold(f64::max, |view| any(view).filter(|_| self.stands_so(view)))
+    }
+
+    /// Of the highest point of a tip whose length was in force, in the part; none where no length ever was.
+    pub fn highest_tip(&self) -> Option<f64> {
+        let tip = |machine: Axes, state: &State| machine[2] - state.tool_offset[2];
+        let zero = tip(self.state.machine(&[0.0; 9]), self.state);
+        self.fold(f64::max, |view| {
+            let measured = view.state.tool_offset != [0.0; 9] && view.op.moves() && !self.to_the_machine(view);
+            measured.then(|| tip(view.state.machine(&view.end.axes), view.state) - zero)
+        })
     }
 
     /// How low its rapids go sideways.
@@ -91,9 +99,13 @@ impl Heights<'_> {
 
     /// Beside a tilted tool only moves of the part count.
     fn counts(&self, view: &View<'_, '_>) -> bool {
-        let words = || Words::at(self.sources, view.source.file, view.source.line);
-        let machine = || words().is_some_and(|w| [280, 300, 530].into_iter().any(|g| w.g(g)) || !w.names_axes() && is_hidden(self.program, view.index));
-        self.tilt.is_none() || !machine()
+        self.tilt.is_none() || !self.to_the_machine(view)
+    }
+
+    /// Whether a move goes to a place of the machine.
+    fn to_the_machine(&self, view: &View<'_, '_>) -> bool {
+        let words = Words::at(self.sources, view.source.file, view.source.line);
+        words.is_some_and(|w| [280, 300, 530].into_iter().any(|g| w.g(g)) || !w.names_axes() && is_hidden(self.program, view.index))
     }
 
     /// Whether the tool stands as it does where the program begins, all along a move.

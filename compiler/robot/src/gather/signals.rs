@@ -94,6 +94,10 @@ impl Gather<'_> {
             let made = self.cells.switched(word, free);
             return self.made(made);
         }
+        if self.cells.own_words() && !free {
+            // What its row waits for comes when it is on.
+            return self.act(Action::Signal { word, value: Some(0.0), signal: gr_machine::Signal::default() });
+        }
         if self.cells.own_words() || self.cells.row(&word).is_some() {
             return self.word(word, Some(f64::from(u8::from(free))));
         }
