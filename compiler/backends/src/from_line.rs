@@ -136,7 +136,9 @@ pub fn from_line(
     let own = if tilt.is_none() || known.height { heights.of(&pose, &state) } else { f64::NEG_INFINITY };
     // How far below the height that is written the tip is, where a length is in force that is not the tool's, or none.
     let holds = options.tips && state.tool_offset[2] != 0.0;
-    let below = if holds { Some(0.0) } else { carried(program, found.index, &state, sources).map(|length| length - state.tool_offset[2]) };
+    let carried = if holds { Some(state.tool_offset[2]) } else { carried(program, found.index, &state, sources) };
+    let longest = carried.into_iter().chain(longest_to_come(program, found.index, sources)).reduce(f64::max);
+    let below = longest.map(|length| length - state.tool_offset[2]);
     let safe = match (options.room, options.safe_z) {
         (Some(room), _) => room.safe,
         // What is asked for is the height of the tool; where its length is not in force yet, the spindle goes higher.
@@ -396,6 +398,16 @@ fn in_force(program: &Program, index: usize, sources: &dyn Sources) -> bool {
         }
     }
     in_force
+}
+
+/// The greatest length that is asked for from an operation on, also of a tool that is changed for, before a move names Z.
+fn longest_to_come(program: &Program, index: usize, sources: &dyn Sources) -> Option<f64> {
+    let named = |s: &gr_ir::Step<'_>| s.op.moves() && says(2, &s.start, &s.end, s.source, sources) || matches!(s.op, Op::End);
+    let lengths = program.steps().skip(index).take_while(|s| !named(s)).filter_map(|s| match s.op {
+        Op::ToolOffset { offset, .. } if !asks(&s, &[490], sources) => Some(offset[2]),
+        _ => None,
+    });
+    lengths.reduce(f64::max)
 }
 
 /// The greatest length that is asked for from an operation on, before the tool is changed.

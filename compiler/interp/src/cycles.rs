@@ -500,7 +500,8 @@ impl<S: Sink> Interp<'_, S> {
         self.check_tap_spindle(hole)?;
         // A Fanuc control feeds back to R, and goes up from there by rapid (0i/30i operator's manual, machining center, canned cycles).
         let lifts = self.is_fanuc() && hole.clear > hole.retract;
-        let Some(depth) = tap_points(hole, if lifts { hole.retract } else { hole.clear }) else {
+        let top = if lifts { hole.retract } else { hole.clear };
+        let Some(depth) = tap_points(hole, top) else {
             return Err(Fault::new(code::CYCLE_NOT_HERE, rs274::CYCLE_TAP_PLANE)
                 .arg("tapping works in G17, G18 and G19 only")
                 .arg(code_name(hole.g))
@@ -513,6 +514,9 @@ impl<S: Sink> Interp<'_, S> {
         for (i, point) in depth.iter().enumerate() {
             let mut to = self.m.current;
             to[..3].copy_from_slice(point);
+            if self.is_fanuc() {
+                to = self.cycle_point(hole, hole.at, [hole.bottom, top][i]);
+            }
             self.emit(Call::StraightFeed(to));
             self.emit(Call::StopSpindleTurning(hole.spindle));
             self.turn_spindle(hole.spindle, if i == 0 { back } else { !back });

@@ -418,11 +418,13 @@ impl<S: Sink> Interp<'_, S> {
         Ok(())
     }
 
-    /// M99 P of a Fanuc main program goes to a block of that number. One further up is the program over again.
+    /// M99 P of a Fanuc main program goes to a block of that number. One further up is the program over again, unless a GOTO between the two
+    /// leads out.
     fn goes_on_below(&mut self) -> bool {
         let Some(number) = self.block.get(b'p').filter(|_| self.is_fanuc()) else { return false };
-        let line = self.index(self.place.file).numbered(number as i64, self.place.line);
-        line.is_none_or(|l| l > self.place.line)
+        let here = self.place.line;
+        let line = self.index(self.place.file).numbered(number as i64, here);
+        line.is_none_or(|l| l > here || self.has_goto(l, here))
     }
 
     fn end_program(&mut self, m: i16) {

@@ -91,6 +91,18 @@ impl<S: Sink> Interp<'_, S> {
         Ok(())
     }
 
+    /// Whether a GOTO stands between two lines.
+    pub(crate) fn has_goto(&mut self, from: u32, to: u32) -> bool {
+        let index = self.index(self.place.file);
+        let lines = index.lines.iter().copied().skip_while(|l| *l < from).take_while(|l| *l <= to);
+        let file = self.files.file(self.place.file);
+        lines.filter_map(|l| file.locate(l)).any(|(c, l)| {
+            let scan = &file.chunks[c].scan;
+            let control = first_real(scan.words(l)).filter(|w| w.form == Form::Control).and_then(|w| scan.controls.get(w.index()));
+            control.is_some_and(|c| matches!(c.keyword, Keyword::MacroGoto | Keyword::MacroIfGoto))
+        })
+    }
+
     /// The END that belongs to a WHILE (forward), or the WHILE or DO that belongs to an END (backward).
     fn find_macro(&mut self, n: f64, forward: bool) -> Res<Option<u32>> {
         let index = self.index(self.place.file);

@@ -674,6 +674,14 @@ fn motion_beside_a_one_shot_code() {
     }
 }
 
+/// Machining center: a tap in G18 goes along Y.
+#[test]
+fn taps_in_other_planes() {
+    let (calls, _) = run_in("fanuc-mill", "G21 G90 G18 F500. S500 M3\nG0 Y20.\nG98 G84 X10. Z-10. Y-5. R2. P1\nG80\nM30\n");
+    let moves: Vec<String> = calls.iter().filter_map(|c| c.strip_prefix("STRAIGHT_")).map(|c| c.split(", ").take(3).collect::<Vec<_>>().join(" ").replace(".0000", "")).collect();
+    assert_eq!(moves[1..], ["TRAVERSE(10 20 -10", "TRAVERSE(10 2 -10", "FEED(10 -5 -10", "FEED(10 2 -10", "TRAVERSE(10 20 -10"]);
+}
+
 /// G80 where no cycle is in force leaves the motion alone.
 #[test]
 fn a_cycle_that_is_not_on_ends_nothing() {
@@ -778,6 +786,8 @@ fn subprograms_in_any_order() {
     assert_eq!(ends(skipped), ["1.0000", "3.0000"]);
     let (_, outcome) = run_in("fanuc-mill", &skipped.replace("M30", "M99 P5"));
     assert_eq!(outcome.findings.iter().map(|f| f.fault.code).collect::<Vec<_>>(), [code::PROGRAM_REPEATS]);
+    let counted = "O1\nG21 G90\n#1=0\nN5 #1=#1+1\nG0 X#1\nIF [#1 GE 3] GOTO 9\nM99 P5\nN9 X50.\nM30\n";
+    assert_eq!(ends(counted), ["1.0000", "2.0000", "3.0000", "50.0000"]);
     let (_, outcome) = run_in("fanuc-mill", &skipped.replace("P20", "P21"));
     assert_eq!(outcome.findings.iter().map(|f| f.fault.code).collect::<Vec<_>>(), [code::FLOW_LABEL]);
     // Ten levels of them.
